@@ -1,0 +1,21 @@
+"""geomech: how a jointed, cracked rock mass comes apart.
+
+Blocks slide and rotate along joints (discontinuous deformation analysis, `geomech.dda`), cracks grow through the rock
+bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` lets each drive the
+other. `load_scene`, `cycles` and `run` are the whole pipeline; each solver also stands alone.
+"""
+
+from importlib import import_module
+
+__version__ = "0.1.0"
+
+# Resolved on first use, so that `import geomech` costs nothing that is not asked for.
+_PUBLIC = {"load_scene": "geomech.scene", "cycles": "geomech.pipeline", "run": "geomech.pipeline"}
+
+__all__ = ["__version__", *_PUBLIC]
+
+
+def __getattr__(name: str):
+    if name in _PUBLIC:
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,34 @@
+"""Plain arrays that the solvers share: blocks, cracks, materials, joint laws, loads, the state of a run."""
+
+from .blocks import Blocks
+from .cracks import Cracks
+from .joint import JointLaw
+from .loads import EdgeTraction, History, Loads, PointLoad
+from .material import Material
+from .problem import DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings
+from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, State
+
+__all__ = [
+    "CONTACT",
+    "OPEN",
+    "SLIP",
+    "STICK",
+    "TIP",
+    "Blocks",
+    "CrackFaces",
+    "Cracks",
+    "Cycle",
+    "DdaSettings",
+    "DdmSettings",
+    "EdgeTraction",
+    "Event",
+    "GrowthSettings",
+    "History",
+    "JointLaw",
+    "Loads",
+    "Material",
+    "PointLoad",
+    "Problem",
+    "RunSettings",
+    "State",
+]

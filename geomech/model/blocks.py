@@ -1,0 +1,158 @@
+"""Blocks: polygons of rock, stored as flat arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """A system of polygonal blocks in their reference positions.
+
+    Vertices of all blocks stand in one array, loop after loop, block after block; the first loop of a block is its
+    outline (counter-clockwise), any further ones are holes (clockwise). *Edge i* is the edge that leaves vertex i
+    towards the next vertex of its loop, so per-edge arrays have n_vertices rows.
+
+        vertices      (n_vertices, 2)   reference coordinates, m
+        loop_start    (n_loops + 1,)    first vertex of each loop
+        block_loop    (n_blocks + 1,)   first loop of each block
+        material      (n_blocks,)       index into the scene's materials
+        fixed         (n_blocks,)       True: the block does not move
+        edge_name     (n_vertices,)     index into ``edge_names`` (0, the empty name: nothing said)
+        edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
+        names         tuple of str      one name a block, for messages and files
+    """
+
+    vertices: np.ndarray
+    loop_start: np.ndarray
+    block_loop: np.ndarray
+    material: np.ndarray
+    fixed: np.ndarray
+    edge_name: np.ndarray
+    edge_names: tuple[str, ...] = ("",)
+    names: tuple[str, ...] = ()
+
+    @classmethod
+    def from_polygons(
+        cls,
+        polygons: Sequence[Sequence[np.ndarray]],
+        *,
+        material: Sequence[int] | None = None,
+        fixed: Sequence[bool] | None = None,
+        edge_names: Sequence[Sequence[Sequence[str]]] | None = None,
+        names: Sequence[str] | None = None,
+    ) -> "Blocks":
+        """Build from ``polygons[block][loop]`` = (n, 2) vertices without the closing repetition; a bare (n, 2) array
+        stands for a block without holes. ``edge_names[block][loop][edge]`` names edges. Loops are turned to the
+        house's sense. Raises ValueError naming the block for loops of fewer than three vertices, repeated vertices,
+        non-finite coordinates or no area."""
+        n_blocks = len(polygons)
+        names = tuple(names) if names is not None else tuple(f"block {b}" for b in range(n_blocks))
+        known: dict[str, int] = {"": 0}
+        vertices, labels, loop_start, block_loop = [], [], [0], [0]
+        for b, loops in enumerate(polygons):
+            bare = isinstance(loops, np.ndarray) or np.ndim(loops[0][0]) == 0
+            loops = [loops] if bare else loops
+            for k, loop in enumerate(loops):
+                loop = np.asarray(loop, dtype=float)
+                label = list(edge_names[b][k]) if edge_names is not None else [""] * len(loop)
+                loop, label = _oriented(loop, label, counter_clockwise=k == 0, name=names[b])
+                vertices.append(loop)
+                labels.append([known.setdefault(name, len(known)) for name in label])
+                loop_start.append(loop_start[-1] + len(loop))
+            block_loop.append(len(loop_start) - 1)
+        return cls(
+            vertices=np.concatenate(vertices) if vertices else np.empty((0, 2)),
+            loop_start=np.array(loop_start),
+            block_loop=np.array(block_loop),
+            material=np.zeros(n_blocks, int) if material is None else np.asarray(material, dtype=int),
+            fixed=np.zeros(n_blocks, bool) if fixed is None else np.asarray(fixed, dtype=bool),
+            edge_name=np.concatenate(labels).astype(int) if labels else np.empty(0, int),
+            edge_names=tuple(known),
+            names=names,
+        )
+
+    @property
+    def n_blocks(self) -> int:
+        return len(self.block_loop) - 1
+
+    @property
+    def n_vertices(self) -> int:
+        return len(self.vertices)
+
+    @cached_property
+    def next_vertex(self) -> np.ndarray:
+        """(n_vertices,) the vertex at the far end of each edge."""
+        following = np.arange(1, self.n_vertices + 1)
+        following[self.loop_start[1:] - 1] = self.loop_start[:-1]
+        return following
+
+    @cached_property
+    def previous_vertex(self) -> np.ndarray:
+        """(n_vertices,) the vertex before each vertex of its loop."""
+        before = np.empty(self.n_vertices, int)
+        before[self.next_vertex] = np.arange(self.n_vertices)
+        return before
+
+    @cached_property
+    def vertex_start(self) -> np.ndarray:
+        """(n_blocks + 1,) first vertex of each block."""
+        return self.loop_start[self.block_loop]
+
+    @cached_property
+    def vertex_block(self) -> np.ndarray:
+        """(n_vertices,) the block that owns each vertex (and the edge that leaves it)."""
+        return np.repeat(np.arange(self.n_blocks), np.diff(self.vertex_start))
+
+    def loops(self, block: int, vertices: np.ndarray | None = None) -> list[np.ndarray]:
+        """The loops of ``block`` as (n, 2) arrays, taken from ``vertices`` (default: the reference ones)."""
+        vertices = self.vertices if vertices is None else vertices
+        first, last = self.block_loop[block], self.block_loop[block + 1]
+        return [vertices[self.loop_start[k] : self.loop_start[k + 1]] for k in range(first, last)]
+
+    def edges_named(self, name: str) -> np.ndarray:
+        """Indices of the edges called ``name``; empty when there are none."""
+        if name not in self.edge_names:
+            return np.empty(0, int)
+        return np.flatnonzero(self.edge_name == self.edge_names.index(name))
+
+    def areas(self, vertices: np.ndarray | None = None) -> np.ndarray:
+        """(n_blocks,) areas, m², holes taken out."""
+        v = self.vertices if vertices is None else vertices
+        # The shoelace sum about each block's own first vertex keeps its digits far from the origin.
+        own = v - v[self.vertex_start[:-1]][self.vertex_block]
+        w = own[self.next_vertex]
+        return 0.5 * np.bincount(
+            self.vertex_block, weights=own[:, 0] * w[:, 1] - own[:, 1] * w[:, 0], minlength=self.n_blocks
+        )
+
+    def with_vertices(self, vertices: np.ndarray) -> "Blocks":
+        """The same blocks with other reference coordinates."""
+        return replace(self, vertices=np.asarray(vertices, dtype=float))
+
+
+def _oriented(loop: np.ndarray, label: list[str], counter_clockwise: bool, name: str) -> tuple[np.ndarray, list[str]]:
+    if loop.ndim != 2 or loop.shape[1] != 2 or len(loop) < 3:
+        raise ValueError(f"{name}: an outline needs at least three vertices (x, y), got an array of shape {loop.shape}")
+    if not np.isfinite(loop).all():
+        raise ValueError(f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not a finite point")
+    if len(label) != len(loop):
+        raise ValueError(f"{name}: {len(loop)} edges but {len(label)} edge names")
+    span = np.ptp(loop, axis=0).max()
+    step = np.roll(loop, -1, axis=0) - loop
+    short = np.hypot(step[:, 0], step[:, 1]) <= 1e-12 * span
+    if short.any():
+        at = int(np.flatnonzero(short)[0])
+        raise ValueError(f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide at ({loop[at, 0]:g}, {loop[at, 1]:g})")
+    own = loop - loop[0]
+    area = 0.5 * np.sum(own[:, 0] * np.roll(own[:, 1], -1) - own[:, 1] * np.roll(own[:, 0], -1))
+    if abs(area) <= 1e-14 * span**2:
+        raise ValueError(f"{name}: the outline encloses no area")
+    if (area > 0) != counter_clockwise:
+        # Reversed, the edge that left vertex i arrives at it, so the labels shift by one.
+        loop, label = loop[::-1], [*label[-2::-1], label[-1]]
+    return loop, label

@@ -1,0 +1,126 @@
+"""Cracks: a network of straight segments inside blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Cracks:
+    """Cracks as a planar graph in the reference coordinates of their blocks.
+
+        nodes         (n_nodes, 2)      m
+        segments      (n_segments, 2)   node indices, start and end; a crack's segments follow one another
+        crack         (n_segments,)     the crack each segment belongs to, from 0
+        block         (n_segments,)     the block it lies in
+        birth_cycle   (n_segments,)     0 for what the scene drew, else the cycle in which it grew
+        aperture      (n_segments,)     initial aperture, m: 0 is a closed crack, inf a slot that never closes
+        surface       (n_nodes,)        True where a node lies on its block's boundary (a crack mouth)
+        names         tuple of str      one name a crack
+
+    A node that ends one segment only and is not on the surface is a *tip*. A node shared by three or more segments,
+    or by two cracks, is a junction.
+    """
+
+    nodes: np.ndarray
+    segments: np.ndarray
+    crack: np.ndarray
+    block: np.ndarray
+    birth_cycle: np.ndarray
+    aperture: np.ndarray
+    surface: np.ndarray
+    names: tuple[str, ...] = ()
+
+    @classmethod
+    def from_polylines(
+        cls,
+        polylines: Sequence[np.ndarray],
+        *,
+        block: Sequence[int] | int = 0,
+        aperture: Sequence[float] | float = 0.0,
+        names: Sequence[str] | None = None,
+        surface: Sequence[tuple[bool, bool]] | None = None,
+    ) -> "Cracks":
+        """One crack a polyline (n, 2). Nodes are not shared between cracks: crossing cracks are noded by whoever reads
+        the scene. ``surface`` says, crack by crack, which end is a mouth. Raises ValueError naming the crack."""
+        n = len(polylines)
+        names = tuple(names) if names is not None else tuple(f"crack {k}" for k in range(n))
+        blocks = np.broadcast_to(np.asarray(block, dtype=int), (n,))
+        apertures = np.broadcast_to(np.asarray(aperture, dtype=float), (n,))
+        nodes, segments, crack, mouth = [], [], [], []
+        first = 0
+        for k, line in enumerate(polylines):
+            line = np.asarray(line, dtype=float)
+            if line.ndim != 2 or line.shape[1] != 2 or len(line) < 2:
+                raise ValueError(f"{names[k]}: a crack needs at least two points (x, y), got shape {line.shape}")
+            if not np.isfinite(line).all():
+                raise ValueError(f"{names[k]}: a crack point is not finite")
+            step = np.hypot(*(line[1:] - line[:-1]).T)
+            if (step <= 1e-12 * max(step.sum(), np.finfo(float).tiny)).any():
+                raise ValueError(f"{names[k]}: a crack segment has no length")
+            nodes.append(line)
+            at = first + np.arange(len(line) - 1)
+            segments.append(np.column_stack([at, at + 1]))
+            crack.append(np.full(len(line) - 1, k))
+            ends = np.zeros(len(line), bool)
+            if surface is not None:
+                ends[0], ends[-1] = surface[k]
+            mouth.append(ends)
+            first += len(line)
+        crack = np.concatenate(crack) if n else np.empty(0, int)
+        return cls(
+            nodes=np.concatenate(nodes) if n else np.empty((0, 2)),
+            segments=np.concatenate(segments) if n else np.empty((0, 2), int),
+            crack=crack,
+            block=blocks[crack] if n else np.empty(0, int),
+            birth_cycle=np.zeros(len(crack), int),
+            aperture=apertures[crack] if n else np.empty(0),
+            surface=np.concatenate(mouth) if n else np.empty(0, bool),
+            names=names,
+        )
+
+    @property
+    def n_segments(self) -> int:
+        return len(self.segments)
+
+    @property
+    def n_cracks(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def lengths(self) -> np.ndarray:
+        """(n_segments,) m."""
+        return np.hypot(*(self.nodes[self.segments[:, 1]] - self.nodes[self.segments[:, 0]]).T)
+
+    @cached_property
+    def valence(self) -> np.ndarray:
+        """(n_nodes,) how many segments end at each node."""
+        return np.bincount(self.segments.ravel(), minlength=len(self.nodes))
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        """(n_tips,) nodes where a crack ends inside the rock, in the order of their segments, start before end."""
+        flat = self.segments.ravel()
+        return flat[(self.valence[flat] == 1) & ~self.surface[flat]]
+
+    def in_block(self, block: int) -> "Cracks":
+        """The cracks of one block, with nodes renumbered (crack numbers and names stay those of the whole)."""
+        return self.take(np.flatnonzero(self.block == block))
+
+    def take(self, segments: np.ndarray) -> "Cracks":
+        """A network of only these ``segments`` (indices), unused nodes dropped."""
+        used, renumbered = np.unique(self.segments[segments].ravel(), return_inverse=True)
+        return Cracks(
+            nodes=self.nodes[used],
+            segments=renumbered.reshape(-1, 2),
+            crack=self.crack[segments],
+            block=self.block[segments],
+            birth_cycle=self.birth_cycle[segments],
+            aperture=self.aperture[segments],
+            surface=self.surface[used],
+            names=self.names,
+        )

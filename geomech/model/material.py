@@ -1,0 +1,71 @@
+"""Elastic, brittle rock: one material of the scene."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic linear elastic material with a fracture toughness.
+
+    ``density`` kg/m³, ``youngs_modulus`` Pa, ``k_ic`` Pa √m (infinite: cracks in it do not grow), ``plane`` either
+    "strain" or "stress". Raises ValueError, naming the material, on constants that no elastic solid has.
+    """
+
+    name: str
+    youngs_modulus: float
+    poissons_ratio: float
+    density: float = 0.0
+    k_ic: float = math.inf
+    plane: str = "strain"
+
+    def __post_init__(self) -> None:
+        def refuse(what: str) -> None:
+            raise ValueError(f"material {self.name!r}: {what}")
+
+        if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0):
+            refuse(f"Young's modulus must be positive and finite, got {self.youngs_modulus!r} Pa")
+        if not -1.0 < self.poissons_ratio < 0.5:
+            refuse(f"Poisson's ratio must lie between -1 and 0.5, got {self.poissons_ratio!r}")
+        if not (math.isfinite(self.density) and self.density >= 0):
+            refuse(f"density must not be negative, got {self.density!r} kg/m³")
+        if not self.k_ic > 0:
+            refuse(f"fracture toughness must be positive, got {self.k_ic!r} Pa √m")
+        if self.plane not in ("strain", "stress"):
+            refuse(f'plane must be "strain" or "stress", got {self.plane!r}')
+
+    @property
+    def shear_modulus(self) -> float:
+        return self.youngs_modulus / (2 * (1 + self.poissons_ratio))
+
+    @property
+    def effective_poissons_ratio(self) -> float:
+        """The ν that makes plane-strain formulas hold: ν itself, or ν/(1+ν) in plane stress."""
+        nu = self.poissons_ratio
+        return nu if self.plane == "strain" else nu / (1 + nu)
+
+    @property
+    def plane_modulus(self) -> float:
+        """E' = E/(1−ν²) in plane strain, E in plane stress: G = (K_I² + K_II²)/E'."""
+        return 2 * self.shear_modulus / (1 - self.effective_poissons_ratio)
+
+    def stiffness(self) -> np.ndarray:
+        """C (3, 3) with σ = C ε, components (xx, yy, xy), engineering shear strain."""
+        mu, nu = self.shear_modulus, self.effective_poissons_ratio
+        lam = 2 * mu * nu / (1 - 2 * nu)
+        return np.array([[lam + 2 * mu, lam, 0.0], [lam, lam + 2 * mu, 0.0], [0.0, 0.0, mu]])
+
+    def compliance(self) -> np.ndarray:
+        """C⁻¹ (3, 3)."""
+        mu, nu = self.shear_modulus, self.effective_poissons_ratio
+        return np.array([[1 - nu, -nu, 0.0], [-nu, 1 - nu, 0.0], [0.0, 0.0, 2.0]]) / (2 * mu)
+
+    def out_of_plane_stress(self, stress: np.ndarray) -> np.ndarray:
+        """σzz (...,) that goes with in-plane ``stress`` (..., 3): ν(σxx + σyy) in plane strain, zero in plane stress."""
+        stress = np.asarray(stress, dtype=float)
+        nu = self.poissons_ratio if self.plane == "strain" else 0.0
+        return nu * (stress[..., 0] + stress[..., 1])

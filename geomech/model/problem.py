@@ -1,0 +1,100 @@
+"""A scene made ready for the solvers: what `geomech.scene.build` fills and `geomech.coupling` runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .blocks import Blocks
+from .cracks import Cracks
+from .joint import JointLaw
+from .loads import Loads
+from .material import Material
+
+
+@dataclass(frozen=True)
+class DdaSettings:
+    """How blocks are moved (names and values of Shi 1988 where he has them).
+
+    ``normal_penalty`` and ``shear_penalty`` are contact spring stiffnesses, N/m per metre of thickness (Pa); None
+    picks them from the blocks' stiffness. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
+    static, 1 fully dynamic. ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
+    height of the domain.
+    """
+
+    time_step: float = 1.0
+    dynamic_factor: float = 0.0
+    max_displacement_ratio: float = 0.001
+    normal_penalty: float | None = None
+    shear_penalty: float | None = None
+    max_open_close_iterations: int = 30
+    max_step_cuts: int = 12
+
+
+@dataclass(frozen=True)
+class DdmSettings:
+    """How cracked blocks are meshed: order ``p``, node family, elements of a straight crack, of a boundary side."""
+
+    order: int = 4
+    nodes: str = "chebyshev"
+    elements_per_crack: int = 4
+    elements_per_side: int = 6
+    grading_ratio: float = 0.3
+    grading_layers: int = 2
+
+
+@dataclass(frozen=True)
+class GrowthSettings:
+    """When and how far tips go. ``increment`` m, longest advance in a cycle; ``min_increment`` m, shortest."""
+
+    criterion: str = "mts"
+    increment: float = 1e-3
+    min_increment: float = 1e-4
+    join_distance: float = 0.5  # in units of the increment: nearer than that to a crack or surface, a tip joins it
+    max_passes: int = 200  # growth passes at one load
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``."""
+
+    end_time: float = 1.0
+    stop_at: tuple[str, ...] = ("coalescence", "split")
+    boundary_stress: str = "contacts"
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Everything a run needs. ``joint_of`` maps a pair of edge names to the law of contacts between such edges.
+
+    ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
+    compression); ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
+    """
+
+    title: str
+    blocks: Blocks
+    cracks: Cracks
+    materials: tuple[Material, ...]
+    joints: tuple[JointLaw, ...]
+    joint_of: dict[tuple[str, str], int] = field(default_factory=dict)
+    loads: Loads = field(default_factory=Loads)
+    dda: DdaSettings = field(default_factory=DdaSettings)
+    ddm: DdmSettings = field(default_factory=DdmSettings)
+    growth: GrowthSettings = field(default_factory=GrowthSettings)
+    run: RunSettings = field(default_factory=RunSettings)
+    load_edge: str = ""
+    gauge: tuple[tuple[int, tuple[float, float]], tuple[int, tuple[float, float]]] | None = None
+    monitors: dict[str, tuple[int, tuple[float, float]]] = field(default_factory=dict)
+
+    def joint_index(self, edge_name: str, other_name: str) -> int:
+        """The joint law between two edges by their names: the pair's, else either name's alone, else the first law."""
+        a, b = sorted((edge_name, other_name))
+        for key in ((a, b), ("", b), ("", a)):
+            if key in self.joint_of:
+                return self.joint_of[key]
+        return 0
+
+    def __post_init__(self) -> None:
+        if self.cracks.n_segments and not np.isin(self.cracks.block, np.arange(self.blocks.n_blocks)).all():
+            raise ValueError("a crack lies in a block that does not exist")

@@ -1,0 +1,150 @@
+"""What changes while a scene runs, and the record that every coupling cycle leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .blocks import Blocks
+from .cracks import Cracks
+
+#: Contact and crack-face states.
+OPEN, STICK, SLIP = 0, 1, 2
+
+#: One row a contact. Forces are those on the block that owns ``vertex``; see ``geomech.conventions``.
+CONTACT = np.dtype(
+    [
+        ("vertex", np.int64),  # the touching vertex
+        ("edge", np.int64),  # the edge it touches (index of the vertex the edge leaves)
+        ("block", np.int64),  # owner of the vertex
+        ("other", np.int64),  # owner of the edge
+        ("state", np.int64),  # OPEN, STICK or SLIP
+        ("position", np.float64),  # along the edge, 0 at its start and 1 at its end
+        ("point", np.float64, 2),  # where, current coordinates, m
+        ("normal", np.float64, 2),  # outward normal of the edge: the way the contact pushes the vertex's block
+        ("normal_force", np.float64),  # N/m, positive in compression
+        ("shear_force", np.float64),  # N/m, along the edge's direction
+        ("gap", np.float64),  # m, negative when penetrating
+        ("slip", np.float64),  # m, accumulated sliding along the edge's direction
+        ("length", np.float64),  # tributary length, m
+        ("law", np.int64),  # index of the joint law
+    ]
+)
+
+#: One row a crack tip.
+TIP = np.dtype(
+    [
+        ("node", np.int64),  # node of the crack network
+        ("crack", np.int64),
+        ("block", np.int64),
+        ("point", np.float64, 2),  # reference coordinates, m
+        ("direction", np.float64, 2),  # unit vector out of the crack
+        ("k_i", np.float64),  # Pa √m
+        ("k_ii", np.float64),
+        ("k_eq", np.float64),  # of the growth criterion
+        ("angle", np.float64),  # growth angle from ``direction``, rad, counter-clockwise
+        ("grown", np.float64),  # m grown in this cycle, 0 when the tip stood
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Motion and stress of the blocks at one time.
+
+        time          s
+        vertices      (n_vertices, 2)   current coordinates, m
+        velocity      (n_blocks, 6)     rates of (u0, v0, r0, εx, εy, γxy) about the current centroid
+        stress        (n_blocks, 3)     Pa, current axes
+        rotation      (n_blocks,)       accumulated rotation, rad
+        crack_strain  (n_blocks, 3)     mean strain that the block's cracks carry, current axes
+        contacts      CONTACT rows      open ones that are near included
+    """
+
+    time: float
+    vertices: np.ndarray
+    velocity: np.ndarray
+    stress: np.ndarray
+    rotation: np.ndarray
+    crack_strain: np.ndarray
+    contacts: np.ndarray
+
+    @classmethod
+    def at_rest(cls, blocks: Blocks) -> "State":
+        n = blocks.n_blocks
+        return cls(
+            time=0.0,
+            vertices=blocks.vertices.copy(),
+            velocity=np.zeros((n, 6)),
+            stress=np.zeros((n, 3)),
+            rotation=np.zeros(n),
+            crack_strain=np.zeros((n, 3)),
+            contacts=np.empty(0, CONTACT),
+        )
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened: ``kind`` is initiation, coalescence, daylighting, split, arrest, failure …"""
+
+    kind: str
+    cycle: int
+    time: float
+    load: float
+    point: tuple[float, float]
+    detail: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class CrackFaces:
+    """Opening and slip along every crack, sampled element by element (they jump between elements).
+
+        segment   (n_elements,)             row in the crack network
+        points    (n_elements, n, 2)        sampling points, reference coordinates, from start to end
+        opening   (n_elements, n)           n·(u⁺ − u⁻), m
+        slip      (n_elements, n)           t·(u⁺ − u⁻), m
+        traction  (n_elements, n, 2)        (normal, shear) on the faces, Pa, normal negative when they press
+        state     (n_elements, n)           OPEN, STICK or SLIP
+    """
+
+    segment: np.ndarray
+    points: np.ndarray
+    opening: np.ndarray
+    slip: np.ndarray
+    traction: np.ndarray
+    state: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """One coupling cycle, complete: what observers (writers, progress, pictures) see.
+
+        number      0, 1, 2 …, one a cycle
+        load_step   the load step it belongs to; ``growth_pass`` counts the passes at that step's load
+        load        the scene's leading load at ``state.time``: for a specimen the axial stress, Pa, positive in
+                    compression
+        strain      axial strain that goes with it, positive when shortening; nan where the scene names no axis
+        tips        TIP rows of all blocks
+        faces       the crack faces, or None when no block holds a crack
+        bodies      block index → solved elastic body with ``stress(points)``, (n, 3), and ``displacement(points)``,
+                    (n, 2), in reference coordinates, for interior fields
+        monitors    name → displacement (2,) of the monitor point, m
+        statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
+    """
+
+    number: int
+    load_step: int
+    growth_pass: int
+    load: float
+    strain: float
+    blocks: Blocks
+    state: State
+    cracks: Cracks
+    tips: np.ndarray
+    faces: CrackFaces | None = None
+    bodies: dict[int, Any] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+    monitors: dict[str, np.ndarray] = field(default_factory=dict)
+    statistics: dict[str, float] = field(default_factory=dict)
