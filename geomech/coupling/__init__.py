@@ -1,0 +1,5 @@
+"""Blocks and cracks drive each other: tractions from contacts, growth, compliance back, splitting, the cycle."""
+
+from .cycle import cycles
+
+__all__ = ["cycles"]

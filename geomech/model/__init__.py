@@ -5,6 +5,7 @@ from .cracks import Cracks
 from .joint import JointLaw
 from .loads import EdgeTraction, History, Loads, PointLoad
 from .material import Material
+from .motion import Motion
 from .problem import DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, State
 
@@ -27,6 +28,7 @@ __all__ = [
     "JointLaw",
     "Loads",
     "Material",
+    "Motion",
     "PointLoad",
     "Problem",
     "RunSettings",

@@ -132,6 +132,7 @@ class Cycle:
                     (n, 2), in reference coordinates, for interior fields
         monitors    name → displacement (2,) of the monitor point, m
         statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
+        seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
     """
 
     number: int
@@ -148,3 +149,4 @@ class Cycle:
     events: tuple[Event, ...] = ()
     monitors: dict[str, np.ndarray] = field(default_factory=dict)
     statistics: dict[str, float] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)

@@ -1,0 +1,39 @@
+"""What a block's cracks add to its strain, handed back to the block solver.
+
+The crack strain of a block is made linear in its mean stress, ε_c(σ) = offset + S σ: S from unit-stress solves of its
+elastic body (`geomech.ddm.Body.compliance`), the offset from the solve under the actual boundary load, so that the two
+agree where they were taken. The block solver then treats S implicitly (an explicit hand-back diverges as soon as the
+cracks are softer than the rock, which every nearly split block reaches).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..conventions import rotate_stress
+
+
+def stress_rotation(angle: float) -> np.ndarray:
+    """Q (3, 3): components of a stress carried along by a rotation of ``angle`` rad, σ' = Q σ."""
+    return rotate_stress(np.eye(3), angle).T
+
+
+def strain_rotation(angle: float) -> np.ndarray:
+    """The same for strain with engineering shear: Q⁻ᵀ, since σ·ε does not change."""
+    return np.linalg.inv(stress_rotation(angle)).T
+
+
+def turned_compliance(compliance: np.ndarray, angle: float) -> np.ndarray:
+    """S (3, 3) of a body that has turned by ``angle`` rad."""
+    if angle == 0.0:
+        return compliance
+    return strain_rotation(angle) @ compliance @ np.linalg.inv(stress_rotation(angle))
+
+
+def crack_response(
+    compliance: np.ndarray, crack_strain: np.ndarray, stress: np.ndarray, angle: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(S, offset) in current axes from ``compliance`` and ``crack_strain`` in the block's reference axes and the mean
+    ``stress`` (current axes) at which the crack strain was found."""
+    s = turned_compliance(compliance, angle)
+    return s, strain_rotation(angle) @ crack_strain - s @ stress

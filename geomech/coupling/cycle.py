@@ -1,0 +1,418 @@
+"""The coupling cycle: blocks move, their contact forces load the cracked ones, cracks grow and soften them, again.
+
+At each load the cycle is repeated from the same start of the step until no tip grows; every pass is yielded as a
+`Cycle`. The state that leaves the last pass starts the next load step.
+"""
+
+from __future__ import annotations
+
+import logging
+import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from .. import dda
+from ..model import TIP, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
+from .compliance import crack_response
+from .splitting import split_blocks
+from .tractions import BoundaryLoad, boundary_load
+
+log = logging.getLogger(__name__)
+
+#: A pass is repeated while the crack strain it assumed and the one it found differ by more than this part of the
+#: block's elastic strain.
+COMPLIANCE_TOLERANCE = 1e-6
+
+#: … but not more often than this at one geometry: a lag of one step is corrected by the next.
+COMPLIANCE_PASSES = 4
+
+
+def cycles(problem: Problem) -> Iterator[Cycle]:
+    """Run ``problem``, one `Cycle` a coupling cycle, from the initial state (number 0) to the scene's end.
+
+    The last cycle's statistics hold ``end``: 1 when a stop event ended the run. Raises `geomech.dda.NotConverged`
+    when the block system finds no consistent contact state even at the smallest step.
+    """
+    return Coupling(problem).cycles()
+
+
+class Coupling:
+    """The running state of one coupled problem: blocks and cracks as they are now, and the solvers' kept work."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.blocks: Blocks = problem.blocks
+        self.cracks: Cracks = problem.cracks
+        self.state = State.at_rest(problem.blocks)
+        self.gauge = problem.gauge
+        self.monitors = dict(problem.monitors)
+        self.seconds: dict[str, float] = {}
+        self.number = 0
+        self.load_step = 0
+        self.bodies: dict[int, object] = {}
+        self._take_blocks()
+
+    # -- the generator -------------------------------------------------------------------------------------------
+
+    def cycles(self) -> Iterator[Cycle]:
+        settings = self.problem.run
+        yield self._record(self.state, np.empty(0, TIP), {}, (), 0, {})
+        # Rounding of the summed steps must not add a last, empty one.
+        end = settings.end_time - 1e-9 * self.problem.dda.time_step
+        while self.state.time < end:
+            self.load_step += 1
+            stopped = yield from self._load_step()
+            if stopped:
+                return
+
+    def _load_step(self):
+        """All passes at one load. Returns True when a stop event happened."""
+        dt = min(self.problem.dda.time_step, self.problem.run.end_time - self.state.time)
+        pending: tuple[Event, ...] = ()
+        for growth_pass in range(self.problem.growth.max_passes + 1):
+            self.number += 1
+            result, solutions, mismatch = self._equilibrium(dt)
+            tips = self._tips(solutions)
+            may_grow = growth_pass < self.problem.growth.max_passes
+            growth = self._growth(tips) if may_grow and not self._stops(pending) else None
+            events = pending
+            if growth is not None:
+                tips["grown"] = growth.grown
+                events += self._initiations(tips, result.state)
+            statistics = {**result.statistics, **mismatch}
+            yield self._record(result.state, tips, solutions, events, growth_pass, statistics)
+            if growth is None:
+                if not may_grow:
+                    log.warning(
+                        "cycle %d: tips still grow after %d passes at one load; going on to the next load",
+                        self.number,
+                        growth_pass,
+                    )
+                self.state = result.state
+                return self._stops(events)
+            pending = self._take_growth(growth, result, solutions)
+        raise AssertionError("unreachable: the last pass takes no growth")
+
+    # -- one pass ------------------------------------------------------------------------------------------------
+
+    def _equilibrium(self, dt: float):
+        """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds."""
+        for attempt in range(COMPLIANCE_PASSES):
+            with self._timed("dda"):
+                result = self.system.step(self.state, self.problem.loads, dt, crack=self.response)
+            if not self.bodies:
+                return result, {}, {}
+            solutions, loads = self._solve_bodies(result)
+            mismatch = self._take_response(result.state, solutions)
+            if mismatch < COMPLIANCE_TOLERANCE:
+                break
+        imbalance = max(load.imbalance for load in loads.values())
+        return result, solutions, {
+            "compliance_passes": attempt + 1,
+            "compliance_mismatch": mismatch,
+            "traction_imbalance": imbalance,
+        }
+
+    def _solve_bodies(self, result):
+        from .. import ddm
+
+        loads: dict[int, BoundaryLoad] = {}
+        with self._timed("tractions"):
+            # Equilibrium holds on the geometry at the start of the step.
+            motion = Motion.of(self.blocks, self.state.vertices)
+            now = result.state.time
+            gravity = self.problem.loads.gravity.at(now)
+            tractions = self._edge_tractions(now)
+            for b in self.bodies:
+                loads[b] = boundary_load(
+                    b,
+                    self.blocks,
+                    self.state.vertices,
+                    motion,
+                    float(self.state.rotation[b]),
+                    result.contacts,
+                    tractions.get(b, []),
+                    [(p.at, p.history.at(now)) for p in self.problem.loads.point_loads if p.block == b],
+                    self.problem.materials[self.blocks.material[b]].density,
+                    gravity,
+                    result.acceleration[b],
+                    float(result.state.velocity[b, 2]),
+                )
+        solutions = {}
+        with self._timed("ddm solve"):
+            for b, body in self.bodies.items():
+                load = loads[b]
+                solutions[b] = body.solve(
+                    ddm.BodyLoad(
+                        segments=load.segments,
+                        tractions=load.tractions,
+                        body_force=load.body_force,
+                        body_force_gradient=load.body_force_gradient,
+                        about=load.about,
+                    )
+                )
+        return solutions, loads
+
+    def _edge_tractions(self, now: float) -> dict[int, list[tuple[int, np.ndarray]]]:
+        acting: dict[int, list[tuple[int, np.ndarray]]] = {}
+        for load in self.problem.loads.edge_tractions:
+            for edge in self.blocks.edges_named(load.edge_name):
+                acting.setdefault(int(self.blocks.vertex_block[edge]), []).append((int(edge), load.history.at(now)))
+        return acting
+
+    def _take_response(self, state: State, solutions: dict) -> float:
+        """Set what DDA should assume next, and say how far off the last assumption was (relative strain)."""
+        worst = 0.0
+        compliance, offset = self.response.compliance.copy(), self.response.offset.copy()
+        with self._timed("compliance"):
+            for b, solution in solutions.items():
+                body = self.bodies[b]
+                s, e = crack_response(
+                    body.compliance(solution), solution.crack_strain, state.stress[b], float(state.rotation[b])
+                )
+                found, assumed = e + s @ state.stress[b], state.crack_strain[b]
+                material = self.problem.materials[self.blocks.material[b]]
+                elastic = material.compliance() @ state.stress[b]
+                size = np.abs(elastic).max() + np.abs(found).max()
+                if size > 0:
+                    worst = max(worst, float(np.abs(found - assumed).max() / size))
+                compliance[b], offset[b] = s, e
+        self.response = dda.CrackResponse(compliance, offset)
+        return worst
+
+    def _tips(self, solutions: dict) -> np.ndarray:
+        """TIP rows of all bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
+        if not solutions:
+            return np.empty(0, TIP)
+        from ..ddm.criteria import CRITERIA
+
+        criterion = CRITERIA[self.problem.growth.criterion]
+        rows = []
+        for b, solution in solutions.items():
+            tips = solution.tips.copy()
+            tips["node"] = self.nodes_of[b][tips["node"]]
+            tips["angle"], tips["k_eq"] = criterion(
+                tips["k_i"], tips["k_ii"], self.problem.materials[self.blocks.material[b]]
+            )
+            rows.append(tips)
+        return np.concatenate(rows)
+
+    # -- growth --------------------------------------------------------------------------------------------------
+
+    def _growth(self, tips: np.ndarray):
+        """The new network when some tip has reached its toughness, else None."""
+        k_ic = np.array([self.problem.materials[m].k_ic for m in self.blocks.material[tips["block"]]])
+        if not np.any(tips["k_eq"] >= k_ic):
+            return None
+        from ..ddm.growth import advance
+
+        with self._timed("growth"):
+            growth = advance(self.cracks, self.blocks.loops, tips, self.problem.growth, k_ic, self.number)
+        return growth if np.any(growth.grown > 0) or growth.joins else None
+
+    def _initiations(self, tips: np.ndarray, state: State) -> tuple[Event, ...]:
+        """An event for every tip that grows for the first time; wings inherit their crack and end by position."""
+        events = []
+        first = {int(s): k for k, s in reversed(list(enumerate(self.cracks.segments.ravel())))}
+        for tip in tips[tips["grown"] > 0]:
+            segment = first[int(tip["node"])] // 2
+            if self.cracks.birth_cycle[segment] == 0:
+                events.append(
+                    self._event("initiation", state, tip["point"], f"{self.cracks.names[tip['crack']]} starts to grow")
+                )
+        return tuple(events)
+
+    def _take_growth(self, growth, result, solutions) -> tuple[Event, ...]:
+        """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought."""
+        names = self.cracks.names
+        events = []
+        for join in growth.joins:
+            other = f" {names[join.other_crack]}" if join.other_crack >= 0 else " the surface"
+            events.append(self._event(join.kind, result.state, join.point, f"{names[join.crack]} meets{other}"))
+        self.cracks = growth.cracks
+        with self._timed("growth"):
+            split = None
+            if growth.joins:
+                split = split_blocks(self.blocks, self.state, self.cracks, self._mean_stress(solutions))
+        if split is None:
+            self._take_bodies()
+            return tuple(events)
+        for b in np.flatnonzero(np.bincount(split.parent, minlength=self.blocks.n_blocks) > 1):
+            parts = np.flatnonzero(split.parent == b)
+            centre = self.blocks.loops(b)[0].mean(axis=0)
+            events.append(
+                self._event("split", result.state, centre, f"{self.blocks.names[b]} is cut into {len(parts)} blocks")
+            )
+        self._follow_split(split)
+        return tuple(events)
+
+    def _follow_split(self, split) -> None:
+        """Blocks, state and cracks of the split; gauges and monitors go to the child that holds their point."""
+
+        def child(block: int, point) -> int:
+            parts = np.flatnonzero(split.parent == block)
+            if len(parts) == 1:
+                return int(parts[0])
+            inside = [winding_number(split.blocks.loops(p), np.asarray(point, dtype=float)) for p in parts]
+            return int(parts[int(np.argmax(np.abs(inside)))])
+
+        if self.gauge is not None:
+            self.gauge = tuple((child(b, p), p) for b, p in self.gauge)
+        self.monitors = {name: (child(b, p), p) for name, (b, p) in self.monitors.items()}
+        self.problem = replace(
+            self.problem,
+            loads=replace(
+                self.problem.loads,
+                point_loads=tuple(replace(p, block=child(p.block, p.at)) for p in self.problem.loads.point_loads),
+            ),
+        )
+        self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
+        self._take_blocks()
+
+    def _mean_stress(self, solutions: dict):
+        """block → (polygon → mean stress there, current axes), from the last solved elastic body."""
+
+        def of_block(block: int):
+            solution = solutions[block]
+            return lambda loops: rotated_mean_stress(solution, loops, float(self.state.rotation[block]))
+
+        return {b: of_block(b) for b in solutions}
+
+    # -- geometry changed ----------------------------------------------------------------------------------------
+
+    def _take_blocks(self) -> None:
+        """New blocks: a new block system, no kept bodies."""
+        problem = self.problem
+        self.system = dda.BlockSystem(
+            self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda
+        )
+        n = self.blocks.n_blocks
+        self.response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))
+        self.bodies, self.nodes_of = {}, {}
+        self._take_bodies()
+
+    def _take_bodies(self) -> None:
+        """(Re)build the elastic bodies of the blocks that hold cracks, keeping what has not changed."""
+        cracked = np.unique(self.cracks.block)
+        if not len(cracked):
+            self.bodies = {}
+            return
+        from .. import ddm
+
+        kept, self.bodies, self.nodes_of = self.bodies, {}, {}
+        with self._timed("ddm assembly"):
+            for b in cracked.tolist():
+                segments = np.flatnonzero(self.cracks.block == b)
+                self.nodes_of[b] = np.unique(self.cracks.segments[segments])
+                self.bodies[b] = ddm.Body(
+                    self.blocks.loops(b),
+                    self.cracks.take(segments),
+                    self.problem.materials[self.blocks.material[b]],
+                    self.problem.ddm,
+                    previous=kept.get(b),
+                )
+
+    # -- records -------------------------------------------------------------------------------------------------
+
+    def _record(self, state, tips, solutions, events, growth_pass, statistics) -> Cycle:
+        motion = Motion.of(self.blocks, state.vertices)
+        return Cycle(
+            number=self.number,
+            load_step=self.load_step,
+            growth_pass=growth_pass,
+            load=self._load(state.time),
+            strain=self._strain(motion),
+            blocks=self.blocks,
+            state=state,
+            cracks=self.cracks,
+            tips=tips,
+            faces=self._faces(solutions),
+            bodies=solutions,
+            events=tuple(events),
+            monitors={
+                name: motion.current(b, point) - np.asarray(point) for name, (b, point) in self.monitors.items()
+            },
+            statistics=statistics,
+            seconds=dict(self.seconds),
+        )
+
+    def _load(self, now: float) -> float:
+        """The leading load, Pa, positive in compression."""
+        name = self.problem.load_edge
+        edges = self.blocks.edges_named(name) if name else []
+        if not len(edges):
+            return 0.0
+        along = self.blocks.vertices[self.blocks.next_vertex[edges[0]]] - self.blocks.vertices[edges[0]]
+        outward = np.array([along[1], -along[0]]) / np.hypot(*along)
+        return sum(
+            -float(load.history.at(now) @ outward)
+            for load in self.problem.loads.edge_tractions
+            if load.edge_name == name
+        )
+
+    def _strain(self, motion: Motion) -> float:
+        if self.gauge is None:
+            return float("nan")
+        (a, p), (b, q) = self.gauge
+        before = np.hypot(*(np.asarray(q) - np.asarray(p)))
+        return float(1 - np.hypot(*(motion.current(b, q) - motion.current(a, p))) / before)
+
+    def _faces(self, solutions: dict) -> CrackFaces | None:
+        if not solutions:
+            return None
+        rows = {b: np.flatnonzero(self.cracks.block == b) for b in solutions}
+        faces = [solution.faces for solution in solutions.values()]
+        return CrackFaces(
+            segment=np.concatenate([rows[b][s.faces.segment] for b, s in solutions.items()]),
+            **{
+                name: np.concatenate([getattr(f, name) for f in faces])
+                for name in ("points", "opening", "slip", "traction", "state")
+            },
+        )
+
+    def _event(self, kind: str, state: State, point, detail: str) -> Event:
+        return Event(kind, self.number, state.time, self._load(state.time), (float(point[0]), float(point[1])), detail)
+
+    def _stops(self, events: tuple[Event, ...]) -> bool:
+        return any(event.kind in self.problem.run.stop_at for event in events)
+
+    @contextmanager
+    def _timed(self, phase: str):
+        start = clock.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[phase] = self.seconds.get(phase, 0.0) + clock.perf_counter() - start
+
+
+def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
+    """How often ``loops`` together wind about ``point``: 1 inside a polygon, 0 outside or in its holes."""
+    total = 0.0
+    for loop in loops:
+        a = loop - point
+        b = np.roll(a, -1, axis=0)
+        total += np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.sum(a * b, axis=1)).sum()
+    return total / (2 * np.pi)
+
+
+def rotated_mean_stress(solution, loops: list[np.ndarray], angle: float) -> np.ndarray:
+    """Mean of ``solution``'s stress over a polygon, by area-weighted sampling of its triangles, turned by ``angle``."""
+    import shapely
+
+    from ..conventions import rotate_stress
+
+    polygon = shapely.Polygon(loops[0], loops[1:])
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
+    corners = np.array([shapely.get_coordinates(t)[:3] for t in triangles])
+    for _ in range(4):  # quartered four times: the means of the quarters of a triangle are exact for linear stress
+        middle = (corners + np.roll(corners, -1, axis=1)) / 2
+        corners = np.concatenate(
+            [np.stack([corners[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)] + [middle]
+        )
+    d, e = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = np.abs(d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0])
+    stress = solution.stress(corners.mean(axis=1))
+    return rotate_stress(area @ stress / area.sum(), angle)

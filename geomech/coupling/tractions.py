@@ -1,0 +1,307 @@
+"""Contact forces of a block made into one boundary load of its elastic body, with the same force and moment.
+
+The contacts of one joint face (two edges that lie against each other) are one distribution: the linear pressure with
+the resultant and moment of its contact forces; where that would pull although the resultant pushes, the triangle on
+the shorter, fully compressed length. Shear follows the pressure, so that it breaks Coulomb's law nowhere unless it
+breaks it as a whole. A lone vertex pressed into an edge spreads over a short piece of that edge; a lone force on a
+block's own corner is resolved along the corner's two edges and enters there as shear, which keeps both force and
+moment exactly.
+
+All of it lives in the block's reference frame: points are mapped back by the block's affine motion, forces turned
+back by its rotation. What the forces then leave out of balance is the block's inertia (d'Alembert): it is put on as
+a body force, linear in x, so that the elastic problem is in equilibrium to round-off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Blocks, Motion
+
+#: Two edges belong to one joint face when their directions differ by less than this.
+FACE_ANGLE = np.radians(10.0)
+
+#: A lone contact spreads over this part of its edge (of the corner's shorter edge).
+LONE_SPREAD = 1.0 / 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryLoad:
+    """Load of one block's elastic body, reference frame.
+
+    segments (m, 2, 2) pieces of the outline, directed along it; tractions (m, 2, 2) at their two ends, linear between;
+    body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
+    resultant that inertia had to balance beyond the solver's own acceleration, relative to the forces' size.
+    """
+
+    segments: np.ndarray
+    tractions: np.ndarray
+    body_force: np.ndarray
+    body_force_gradient: np.ndarray
+    about: np.ndarray
+    imbalance: float
+
+
+def linear_pressure(length: float, force: float, moment: float) -> tuple[float, float, float, float]:
+    """(start, end, p_start, p_end) of the distribution on [0, length] with resultant ``force`` and ``moment`` about 0.
+
+    Linear over the whole length; where a pushing resultant (force > 0) would need a pull at one end, the triangle with
+    the same resultant on the shorter length. A resultant outside [0, length] cannot be carried without pull: it stays
+    linear, pull and all, since force and moment come first.
+    """
+    p_start = (4 * force * length - 6 * moment) / length**2
+    p_end = (6 * moment - 2 * force * length) / length**2
+    if force > 0 and min(p_start, p_end) < 0:
+        arm = moment / force
+        if 0 < arm < length / 3:
+            return 0.0, 3 * arm, 2 * force / (3 * arm), 0.0
+        if 0 < length - arm < length / 3:
+            reach = 3 * (length - arm)
+            return length - reach, length, 0.0, 2 * force / reach
+    return 0.0, length, p_start, p_end
+
+
+def boundary_load(
+    block: int,
+    blocks: Blocks,
+    vertices: np.ndarray,
+    motion: Motion,
+    rotation: float,
+    contacts: np.ndarray,
+    edge_tractions: list[tuple[int, np.ndarray]],
+    point_loads: list[tuple[np.ndarray, np.ndarray]],
+    density: float = 0.0,
+    gravity: np.ndarray | None = None,
+    acceleration: np.ndarray | None = None,
+    spin: float = 0.0,
+) -> BoundaryLoad:
+    """The load of ``block``.
+
+    ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
+    that geometry (any block's); ``edge_tractions`` (edge, traction per reference length) of this block;
+    ``point_loads`` (reference point, force); ``acceleration`` (6,) and ``spin`` (rad/s) the block's own.
+    """
+    turn_back = _rotation(-rotation)
+    pieces = _Pieces()
+    faces, lone = _faces_and_lone(block, blocks, vertices, contacts)
+    for (edge, _), rows in faces.items():
+        _add_face(pieces, blocks, motion, block, edge, rows, turn_back)
+    for row in lone:
+        _add_lone(pieces, blocks, motion, block, row, turn_back)
+    for edge, traction in edge_tractions:
+        a, b = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
+        pieces.add(a, b, turn_back @ traction, turn_back @ traction)
+    for point, force in point_loads:
+        _add_point_load(pieces, blocks, block, np.asarray(point, dtype=float), turn_back @ np.asarray(force, dtype=float))
+    segments, tractions = pieces.arrays()
+    return _balanced(block, blocks, segments, tractions, density, gravity, acceleration, spin, turn_back)
+
+
+class _Pieces:
+    """Loaded pieces of the outline as they are found."""
+
+    def __init__(self) -> None:
+        self.segments: list[tuple[np.ndarray, np.ndarray]] = []
+        self.tractions: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def add(self, a: np.ndarray, b: np.ndarray, t_a: np.ndarray, t_b: np.ndarray) -> None:
+        if np.any(t_a) or np.any(t_b):
+            self.segments.append((a, b))
+            self.tractions.append((t_a, t_b))
+
+    def arrays(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.segments).reshape(-1, 2, 2), np.array(self.tractions).reshape(-1, 2, 2)
+
+
+def _rotation(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: np.ndarray) -> tuple[int, float]:
+    """Which of the two edges at ``vertex`` lies against an edge with outward ``normal``, and the angle between."""
+    best = (-1, np.inf)
+    for edge in (int(vertex), int(blocks.previous_vertex[vertex])):
+        along = vertices[blocks.next_vertex[edge]] - vertices[edge]
+        outward = np.array([along[1], -along[0]]) / np.hypot(*along)
+        angle = float(np.arctan2(abs(outward[0] * normal[1] - outward[1] * normal[0]), -(outward @ normal)))
+        if angle < best[1]:
+            best = (edge, angle)
+    return best
+
+
+def _faces_and_lone(
+    block: int, blocks: Blocks, vertices: np.ndarray, contacts: np.ndarray
+) -> tuple[dict[tuple[int, int], list], list]:
+    """The acting contacts of ``block``: joint faces with at least two distinct points, (own edge, other's edge) →
+    rows, and the rows left alone."""
+    acting = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
+    faces: dict[tuple[int, int], list] = {}
+    lone = []
+    for row in acting[(acting["block"] == block) | (acting["other"] == block)]:
+        edge, angle = _touching_edge(blocks, vertices, row["vertex"], row["normal"])
+        if angle > FACE_ANGLE:
+            lone.append(row)
+        elif row["block"] == block:
+            faces.setdefault((edge, int(row["edge"])), []).append(row)
+        else:
+            faces.setdefault((int(row["edge"]), edge), []).append(row)
+    for face in [face for face, rows in faces.items() if not _spread(rows, vertices, blocks, face[0])]:
+        lone.extend(faces.pop(face))
+    return faces, lone
+
+
+def _spread(rows: list, vertices: np.ndarray, blocks: Blocks, edge: int) -> float:
+    """Distance between the outermost contact points along ``edge``, 0 when it is round-off of the edge's length."""
+    along = vertices[blocks.next_vertex[edge]] - vertices[edge]
+    length = np.hypot(*along)
+    places = [(row["point"] - vertices[edge]) @ along / length for row in rows]
+    reach = max(places) - min(places)
+    return reach if reach > 1e-6 * length else 0.0
+
+
+def _force_on(block: int, row: np.ndarray) -> np.ndarray:
+    along = np.array([-row["normal"][1], row["normal"][0]])  # the edge's direction: its outward normal turned by +90°
+    force = row["normal_force"] * row["normal"] + row["shear_force"] * along
+    return force if row["block"] == block else -force
+
+
+def _add_face(pieces, blocks, motion, block, edge, rows, turn_back) -> None:
+    start, end = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
+    length = np.hypot(*(end - start))
+    along = (end - start) / length
+    inward = np.array([-along[1], along[0]])
+    places = np.array([(motion.reference(block, row["point"]) - start) @ along for row in rows])
+    forces = np.array([turn_back @ _force_on(block, row) for row in rows])
+    first, last = max(places.min(), 0.0), min(places.max(), length)
+    push, shear = forces @ inward, forces @ along
+    total, moment = push.sum(), push @ (places - first)
+    a, b, p_a, p_b = linear_pressure(last - first, total, moment)
+    # Shear in proportion to the pressure, or evenly where there is none to go by.
+    if abs(total) > 1e-9 * np.abs(forces).sum():
+        q_a, q_b = shear.sum() / total * p_a, shear.sum() / total * p_b
+    else:
+        q_a = q_b = shear.sum() / (b - a)
+    pieces.add(
+        start + (first + a) * along,
+        start + (first + b) * along,
+        p_a * inward + q_a * along,
+        p_b * inward + q_b * along,
+    )
+
+
+def _add_lone(pieces, blocks, motion, block, row, turn_back) -> None:
+    force = turn_back @ _force_on(block, row)
+    if row["block"] == block:
+        _add_corner_force(pieces, blocks, int(row["vertex"]), force)
+    else:
+        _add_edge_force(pieces, blocks, int(row["edge"]), motion.reference(block, row["point"]), force)
+
+
+def _add_corner_force(pieces, blocks, vertex: int, force: np.ndarray) -> None:
+    corner = blocks.vertices[vertex]
+    after = blocks.vertices[blocks.next_vertex[vertex]] - corner
+    before = corner - blocks.vertices[blocks.previous_vertex[vertex]]
+    reach = LONE_SPREAD * min(np.hypot(*after), np.hypot(*before))
+    after, before = after / np.hypot(*after), before / np.hypot(*before)
+    turn = before[0] * after[1] - before[1] * after[0]
+    if abs(turn) < np.sin(FACE_ANGLE):
+        # The corner is as good as flat: its two edges cannot resolve a force across them; treat it as one edge.
+        t = force / (2 * reach)
+        pieces.add(corner - reach * before, corner, t, t)
+        pieces.add(corner, corner + reach * after, t, t)
+        return
+    along_before, along_after = np.linalg.solve(np.column_stack([before, after]), force) / reach
+    pieces.add(corner - reach * before, corner, along_before * before, along_before * before)
+    pieces.add(corner, corner + reach * after, along_after * after, along_after * after)
+
+
+def _add_edge_force(pieces, blocks, edge: int, point: np.ndarray, force: np.ndarray) -> None:
+    start, end = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
+    length = np.hypot(*(end - start))
+    along = (end - start) / length
+    place = float(np.clip((point - start) @ along, 0.0, length))
+    # Centred on the point, hence narrower near an end of the edge; at the very end it is a corner force.
+    half = min(LONE_SPREAD * length / 2, place, length - place)
+    if half < 1e-6 * length:
+        corner = edge if place < length / 2 else int(blocks.next_vertex[edge])
+        _add_corner_force(pieces, blocks, corner, force)
+        return
+    t = force / (2 * half)
+    pieces.add(start + (place - half) * along, start + (place + half) * along, t, t)
+
+
+def _add_point_load(pieces, blocks, block: int, point: np.ndarray, force: np.ndarray) -> None:
+    """A point load enters on the edge nearest to it, where the scene puts such loads."""
+    first, last = blocks.vertex_start[block], blocks.vertex_start[block + 1]
+    edges = np.arange(first, last)
+    start, end = blocks.vertices[edges], blocks.vertices[blocks.next_vertex[edges]]
+    along = end - start
+    place = np.clip(np.sum((point - start) * along, axis=1) / np.sum(along**2, axis=1), 0, 1)
+    nearest = int(np.argmin(np.hypot(*(start + place[:, None] * along - point).T)))
+    _add_edge_force(pieces, blocks, int(edges[nearest]), point, force)
+
+
+def _balanced(block, blocks, segments, tractions, density, gravity, acceleration, spin, turn_back) -> BoundaryLoad:
+    area, centroid, second = area_moments(blocks.loops(block))
+    gradient = np.zeros((2, 2))
+    if density and acceleration is not None:
+        strain_rate = np.array([[acceleration[3], acceleration[5] / 2], [acceleration[5] / 2, acceleration[4]]])
+        gradient -= density * (turn_back @ strain_rate @ turn_back.T)
+    if density and spin:
+        gradient += density * spin**2 * np.eye(2)
+    force, moment, size = resultants(segments, tractions, centroid)
+    # ∫ (x b_y − y b_x) dA of b = B x, second = [[∫x², ∫xy], [∫xy, ∫y²]]
+    moment += (gradient @ second)[1, 0] - (gradient @ second)[0, 1]
+    polar = second[0, 0] + second[1, 1]
+    body_force, torque = -force / area, moment / polar
+    gradient = gradient + torque * np.array([[0.0, 1.0], [-1.0, 0.0]])
+    imbalance = 0.0
+    if size > 0:
+        carried = np.zeros(2)
+        angular = 0.0
+        if density:
+            g = np.zeros(2) if gravity is None else np.asarray(gravity, dtype=float)
+            a = np.zeros(6) if acceleration is None else acceleration
+            carried, angular = turn_back @ (density * (g - a[:2])), density * a[2]
+        missed = np.hypot(*(body_force - carried)) * area + abs(torque - angular) * polar / np.sqrt(area)
+        imbalance = float(missed / size)
+    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance)
+
+
+def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """(force (2,), moment about ``about``, sum of the sizes of all forces) of linear tractions on ``segments``."""
+    if not len(segments):
+        return np.zeros(2), 0.0, 0.0
+    a, b = segments[:, 0] - about, segments[:, 1] - about
+    t_a, t_b = tractions[:, 0], tractions[:, 1]
+    length = np.hypot(*(b - a).T)
+    forces = length[:, None] * (t_a + t_b) / 2
+    # ∫ x × t of two linear functions: Simpson's rule is exact.
+    middle, t_middle = (a + b) / 2, (t_a + t_b) / 2
+
+    def cross(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+
+    moments = length / 6 * (cross(a, t_a) + 4 * cross(middle, t_middle) + cross(b, t_b))
+    size = float(np.sum(length * (np.hypot(*t_a.T) + np.hypot(*t_b.T)) / 2))
+    return forces.sum(axis=0), float(moments.sum()), size
+
+
+def area_moments(loops: list[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray]:
+    """(area, centroid (2,), second moments about the centroid (2, 2): [[∫x², ∫xy], [∫xy, ∫y²]]) of a polygon with
+    holes, by closed boundary sums."""
+    origin = loops[0][0]
+    area, first, second = 0.0, np.zeros(2), np.zeros((2, 2))
+    for loop in loops:
+        p = loop - origin
+        q = np.roll(p, -1, axis=0)
+        w = p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]
+        area += w.sum() / 2
+        first += ((p + q) * w[:, None]).sum(axis=0) / 6
+        outer = np.einsum("e,ei,ej->ij", w, p + q, p + q)
+        second += (outer + np.einsum("e,ei,ej->ij", w, p, p) + np.einsum("e,ei,ej->ij", w, q, q)) / 24
+    centroid = first / area
+    return float(area), origin + centroid, second - area * np.outer(centroid, centroid)
