@@ -2,17 +2,70 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
-from .model import Cycle
+from .model import Cycle, Problem
 
 
 def cycles(scene) -> Iterator[Cycle]:
-    """The coupling cycles of ``scene`` (a loaded scene, or a path to one), nothing written."""
+    """The coupling cycles of ``scene`` (a loaded scene, or a path to one); nothing is written."""
     from .coupling import cycles as run_problem
 
     return run_problem(_loaded(scene).problem())
+
+
+def run(scene, out: str | Path | None = None, observers: Iterable[Any] | None = None) -> dict[str, Any]:
+    """Run ``scene`` to its end and return the summary that ``summary.json`` holds.
+
+    ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are told of every cycle, by default
+    the writers that the scene's ``[output]`` table asks for. Whatever ends the run, what was written stays readable
+    and every observer is ended; the exception is raised again. Raises SceneError on bad input,
+    `geomech.dda.NotConverged` when the blocks find no consistent contact state.
+    """
+    scene = _loaded(scene)
+    problem = scene.problem()
+    folder = Path(out) if out is not None else Path("outputs") / scene.name
+    if observers is None:
+        from .output import standard_observers
+
+        observers = standard_observers(scene)
+    return run_problem(problem, folder, observers)
+
+
+def run_problem(problem: Problem, folder: Path, observers: Iterable[Any]) -> dict[str, Any]:
+    """The same for a problem built in Python."""
+    from .coupling import cycles as coupled
+    from .output.observer import Group
+
+    began = time.perf_counter()
+    group = Group(observers)
+    summary: dict[str, Any] = {"title": problem.title}
+    last: Cycle | None = None
+    error: BaseException | None = None
+    try:
+        group.on_start(problem, folder)
+        for last in coupled(problem):
+            group.on_cycle(last)
+    except BaseException as failure:
+        error = failure
+        raise
+    finally:
+        summary["end"] = _end_reason(problem, last, error)
+        summary["wall_s"] = time.perf_counter() - began
+        group.on_end(summary, error)
+    return summary
+
+
+def _end_reason(problem: Problem, last: Cycle | None, error: BaseException | None) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted"
+    if error is not None:
+        return f"failed: {error}"
+    stopping = [event.kind for event in last.events if event.kind in problem.run.stop_at]
+    return stopping[0] if stopping else "end of the scene"
 
 
 def _loaded(scene):

@@ -1,0 +1,7 @@
+"""`python -m geomech` is the command `geomech`."""
+
+import sys
+
+from .cli import main
+
+sys.exit(main())

@@ -1,0 +1,14 @@
+"""Benchmarks: what a run costs and how right it is, in one table a topic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+
+#: Topic → module with ``measure(quick: bool) -> str``, the printed table.
+TOPICS = {"startup": "geomech.bench.startup", "ddm": "geomech.bench.crack_accuracy"}
+
+
+def topic(name: str) -> Callable[[bool], str]:
+    """The measuring function of a topic, imported only now."""
+    return import_module(TOPICS[name]).measure

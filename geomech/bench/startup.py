@@ -1,0 +1,51 @@
+"""Whole-process times of the things a user waits for: imports, `check`, a specimen run to its end, the first run.
+
+Wall time from launch to exit of a fresh Python, medians of repeated runs. The first run compiles the kernels into an
+empty cache; all others find them compiled.
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+PIPELINE = Path("pipelines/two_cracks")
+
+
+def measure(quick: bool = False) -> str:
+    """The table. Runs in the project's folder (it needs ``pipelines/two_cracks``); FileNotFoundError elsewhere."""
+    if not PIPELINE.is_dir():
+        raise FileNotFoundError(f"{PIPELINE} is not here: run this benchmark from the project's folder")
+    repeats = 3 if quick else 7
+    rows = []
+    with tempfile.TemporaryDirectory() as scratch:
+        geomech = [sys.executable, "-m", "geomech"]
+        run = [*geomech, "run", str(PIPELINE / "scene.toml"), "--variant", "phi_0", "--quiet", "--out"]
+        first = {**os.environ, "NUMBA_CACHE_DIR": str(Path(scratch) / "cache")}
+        if not quick:
+            rows.append(("first run of a specimen, compiling", _seconds([*run, f"{scratch}/first"], first)))
+        _seconds([*run, f"{scratch}/warm-up"])
+        python = [sys.executable, "-c"]
+        for label, command in (
+            ("python, nothing imported", [*python, "pass"]),
+            ("import geomech", [*python, "import geomech"]),
+            ("import geomech.ddm, first use of a body", [*python, "from geomech.ddm import Body"]),
+            ("import geomech.dda, first use of a block system", [*python, "from geomech.dda import BlockSystem"]),
+            ("geomech check pipelines/two_cracks", [*geomech, "check", str(PIPELINE)]),
+            ("one specimen to coalescence, everything written", [*run, f"{scratch}/run"]),
+        ):
+            rows.append((label, statistics.median(_seconds(command) for _ in range(repeats))))
+    width = max(len(label) for label, _ in rows)
+    lines = [f"whole processes, wall time, median of {repeats} (the first run once)"]
+    return "\n".join(lines + [f"  {label:<{width}}  {seconds:7.2f} s" for label, seconds in rows])
+
+
+def _seconds(command: list[str], environment: dict[str, str] | None = None) -> float:
+    start = time.perf_counter()
+    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return time.perf_counter() - start

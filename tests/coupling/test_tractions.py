@@ -1,0 +1,165 @@
+"""Boundary loads made from contact forces: held against the forces and moments of the contacts themselves."""
+
+import numpy as np
+import pytest
+
+from geomech.coupling.tractions import area_moments, boundary_load, linear_pressure, resultants
+from geomech.model import CONTACT, SLIP, Blocks, Motion
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def contact(vertex, edge, block, other, point, normal, push, shear=0.0):
+    row = np.zeros(1, CONTACT)
+    for name, value in {
+        "vertex": vertex,
+        "edge": edge,
+        "block": block,
+        "other": other,
+        "state": SLIP,
+        "point": point,
+        "normal": normal,
+        "normal_force": push,
+        "shear_force": shear,
+    }.items():
+        row[name] = value
+    return row[0]
+
+
+def two_squares(offset=0.0):
+    """One square on another, the upper one moved sideways by ``offset``."""
+    return Blocks.from_polygons([SQUARE, SQUARE + [offset, 1.0]])
+
+
+def load_of(block, blocks, contacts, **options):
+    contacts = np.array(contacts, CONTACT)
+    motion = Motion.of(blocks, blocks.vertices)
+    return boundary_load(block, blocks, blocks.vertices, motion, 0.0, contacts, [], [], **options)
+
+
+def vertex_at(blocks, block, point):
+    inside = np.flatnonzero(blocks.vertex_block == block)
+    return int(inside[np.argmin(np.hypot(*(blocks.vertices[inside] - point).T))])
+
+
+def edge_between(blocks, block, start, end):
+    edge = vertex_at(blocks, block, start)
+    assert np.allclose(blocks.vertices[blocks.next_vertex[edge]], end)
+    return edge
+
+
+@pytest.mark.parametrize("moment", [0.05, 0.2, 0.3, 0.5, 0.66, 0.8, 0.97])
+def test_pressure_keeps_force_and_moment_and_does_not_pull(moment):
+    """∫p = F and ∫p s = M to round-off; a push whose resultant lies inside the face needs no pull anywhere."""
+    start, end, p_start, p_end = linear_pressure(1.0, 1.0, moment)
+    length = end - start
+    assert p_start >= 0 and p_end >= 0
+    assert length * (p_start + p_end) / 2 == pytest.approx(1.0, abs=1e-14)
+    about_start = length**2 * (p_start + 2 * p_end) / 6
+    assert about_start + start * 1.0 == pytest.approx(moment, abs=1e-14)
+
+
+def test_end_forces_become_the_linear_pressure_of_their_resultant():
+    """Two end forces F0, F1 on a length ℓ: p0 = (4F0 − 2F1)/ℓ, p1 = (4F1 − 2F0)/ℓ (statics of a linear pressure)."""
+    f0, f1, length = 3.0, 2.0, 0.5
+    _, _, p_start, p_end = linear_pressure(length, f0 + f1, f1 * length)
+    assert p_start == pytest.approx((4 * f0 - 2 * f1) / length, rel=1e-14)
+    assert p_end == pytest.approx((4 * f1 - 2 * f0) / length, rel=1e-14)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.3, -0.7])
+@pytest.mark.parametrize("pushes", [(1.0, 1.0), (1.0, 0.2), (0.1, 2.0)])
+def test_face_contacts_keep_force_and_moment_on_both_blocks(offset, pushes):
+    blocks = two_squares(offset)
+    left, right = max(0.0, offset), min(1.0, 1.0 + offset)
+    lower_top = edge_between(blocks, 0, [1.0, 1.0], [0.0, 1.0])
+    upper_bottom = edge_between(blocks, 1, [offset, 1.0], [1.0 + offset, 1.0])
+    rows = []
+    for x, push, shear in ((left, pushes[0], 0.3), (right, pushes[1], 0.1)):
+        if x in (offset, 1.0 + offset):  # the upper block's corner on the lower's top
+            rows.append(contact(vertex_at(blocks, 1, [x, 1.0]), lower_top, 1, 0, [x, 1.0], [0, 1], push, shear))
+        else:
+            rows.append(contact(vertex_at(blocks, 0, [x, 1.0]), upper_bottom, 0, 1, [x, 1.0], [0, -1], push, shear))
+    for block in (0, 1):
+        load = load_of(block, blocks, rows)
+        centre = blocks.loops(block)[0].mean(axis=0)
+        force, moment, _ = resultants(load.segments, load.tractions, centre)
+        expected, expected_moment = np.zeros(2), 0.0
+        for row in rows:
+            along = np.array([-row["normal"][1], row["normal"][0]])
+            f = row["normal_force"] * row["normal"] + row["shear_force"] * along
+            f = f if row["block"] == block else -f
+            arm = row["point"] - centre
+            expected += f
+            expected_moment += arm[0] * f[1] - arm[1] * f[0]
+        assert force == pytest.approx(expected, abs=1e-13)
+        assert moment == pytest.approx(expected_moment, abs=1e-13)
+        # No pull: the pressure on the face (normal component towards the block) is nowhere negative.
+        inward = np.array([0.0, -1.0]) if block == 0 else np.array([0.0, 1.0])
+        assert (load.tractions @ inward >= -1e-13).all()
+
+
+@pytest.mark.parametrize("place", [0.5, 0.02, 0.0])
+def test_lone_vertex_keeps_force_and_moment_on_both_blocks(place):
+    """A tilted block stands with one corner on another's face: in the middle, near its end, at its very corner."""
+    tilted = SQUARE @ np.array([[np.cos(0.6), np.sin(0.6)], [-np.sin(0.6), np.cos(0.6)]])
+    blocks = Blocks.from_polygons([SQUARE, tilted - tilted[0] + [place, 1.0]])
+    top = edge_between(blocks, 0, [1.0, 1.0], [0.0, 1.0])
+    row = contact(vertex_at(blocks, 1, [place, 1.0]), top, 1, 0, [place, 1.0], [0, 1], 2.0, 0.7)
+    for block, sign in ((0, -1), (1, 1)):
+        load = load_of(block, blocks, [row])
+        centre = blocks.loops(block)[0].mean(axis=0)
+        force, moment, _ = resultants(load.segments, load.tractions, centre)
+        f = sign * np.array([-0.7, 2.0])
+        arm = np.array([place, 1.0]) - centre
+        assert force == pytest.approx(f, abs=1e-13)
+        assert moment == pytest.approx(arm[0] * f[1] - arm[1] * f[0], abs=1e-13)
+
+
+def test_inertia_balances_what_contacts_leave():
+    """A block pushed on one side accelerates: the body force must cancel force and moment of the tractions."""
+    blocks = two_squares(0.3)
+    lower_top = edge_between(blocks, 0, [1.0, 1.0], [0.0, 1.0])
+    row = contact(vertex_at(blocks, 1, [0.3, 1.0]), lower_top, 1, 0, [0.3, 1.0], [0, 1], 2.0, 0.7)
+    load = load_of(1, blocks, [row])
+    area, centroid, second = area_moments(blocks.loops(1))
+    force, moment, _ = resultants(load.segments, load.tractions, centroid)
+    of_body = load.body_force_gradient @ second
+    assert force + area * load.body_force == pytest.approx([0, 0], abs=1e-14)
+    assert moment + of_body[1, 0] - of_body[0, 1] == pytest.approx(0, abs=1e-14)
+
+
+def test_turned_block_sees_its_forces_in_its_own_frame():
+    """The same block and forces, all turned by 30°: the load in the reference frame must not change."""
+    blocks = two_squares(0.0)
+    lower_top = edge_between(blocks, 0, [1.0, 1.0], [0.0, 1.0])
+    points = np.array([[0.0, 1.0], [1.0, 1.0]])
+    upright = [
+        contact(vertex_at(blocks, 1, p), lower_top, 1, 0, p, [0, 1], push, 0.2) for p, push in zip(points, (1.0, 2.0))
+    ]
+    angle = np.radians(30)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    turned_vertices = blocks.vertices @ turn.T
+    turned = np.array(upright, CONTACT)
+    turned["point"], turned["normal"] = points @ turn.T, [turn @ [0, 1]] * 2
+    motion = Motion.of(blocks, turned_vertices)
+    there = boundary_load(0, blocks, turned_vertices, motion, angle, turned, [], [])
+    here = load_of(0, blocks, upright)
+    assert there.segments == pytest.approx(here.segments, abs=1e-13)
+    assert there.tractions == pytest.approx(here.tractions, abs=1e-13)
+
+
+def test_area_moments_of_a_rectangle_with_a_hole_far_from_the_origin():
+    """Against bh, bh³/12 and the hole's own, at 10⁶ m from the origin."""
+    outline = np.array([[0, 0], [4, 0], [4, 2], [0, 2.0]])
+    hole = np.array([[1, 0.5], [1, 1.5], [2, 1.5], [2, 0.5]])
+    shift = np.array([1e6, -1e6])
+    area, centroid, second = area_moments([outline + shift, hole + shift])
+    assert area == pytest.approx(7.0, rel=1e-12)
+    centre = (8 * np.array([2, 1]) - np.array([1.5, 1.0])) / 7
+    assert centroid - shift == pytest.approx(centre, abs=1e-9)
+    def about(b, h, at):
+        own = np.diag([b**3 * h / 12, b * h**3 / 12])
+        return own + b * h * np.outer(np.array(at) - centre, np.array(at) - centre)
+
+    assert second == pytest.approx(about(4, 2, [2, 1]) - about(1, 1, [1.5, 1.0]), rel=1e-9, abs=1e-9)
