@@ -1,0 +1,39 @@
+"""What a run leaves behind: ParaView series, histories, a summary, a log; and how to read it back.
+
+Everything here watches the cycles of a run from outside (`Observer`) and knows the solvers only by `geomech.model.Cycle`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .histories import Histories
+from .observer import Group, Observer
+from .progress import Progress
+from .reading import Run
+from .record import RunLog, SceneCopy
+from .series import Series
+from .summary import Summary
+
+__all__ = ["Group", "Histories", "Observer", "Progress", "Run", "RunLog", "SceneCopy", "Series", "Summary", "standard"]
+
+
+def standard(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
+    """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
+    (``every``, ``interior``, ``interior_every``, ``configuration``) and its ``resolved()`` form."""
+    output = getattr(scene, "output", None)
+    watchers: list[Observer] = [RunLog()]
+    if scene is not None:
+        watchers.append(SceneCopy(scene.resolved()))
+    interior_every = getattr(output, "interior_every", 10) if getattr(output, "interior", True) else 0
+    return [
+        *watchers,
+        Histories(),
+        Series(
+            every=getattr(output, "every", 1),
+            interior_every=interior_every,
+            configuration=getattr(output, "configuration", "reference"),
+        ),
+        Summary(),  # after the writers, whose times it takes in
+        Progress(quiet=quiet),
+    ]

@@ -1,0 +1,156 @@
+"""Every field that lands in a file: its name, components, unit, place and meaning, declared once.
+
+Writers refuse an array that is not declared here, and a declared one that is missing, so this table *is* the format.
+All stresses are tension positive; see `geomech.conventions` for the signs of contacts and cracks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from geomech.conventions import VTK_STRESS
+
+
+@dataclass(frozen=True)
+class Field:
+    """One array of a file. ``place`` is "point" or "cell"; ``components`` are the names VTK shows, () for a scalar."""
+
+    name: str
+    place: str
+    unit: str
+    doc: str
+    components: tuple[str, ...] = ()
+    dtype: str = "float64"
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The trailing shape of the array."""
+        return (len(self.components),) if self.components else ()
+
+
+_XYZ = ("X", "Y", "Z")
+_DISPLACEMENT = Field("displacement", "point", "m", "current minus reference position", _XYZ)
+_STRESS = ("stress", "Pa", "Cauchy stress on current axes; ZZ is ν(XX + YY) in plane strain, 0 in plane stress")
+_PRINCIPAL = ("principal_stress", "Pa", "principal stresses of the full tensor, S1 ≥ S2 ≥ S3")
+_PRINCIPAL_NAMES = ("S1", "S2", "S3")
+_STATE = "0 open, 1 stick, 2 slip"
+
+#: Series name → its fields. The series is written as ``<name>.pvd`` with its files under ``vtk/``.
+SERIES: dict[str, tuple[Field, ...]] = {
+    "blocks": (
+        _DISPLACEMENT,
+        Field("velocity", "point", "m/s", "velocity of the material point", _XYZ),
+        Field(_STRESS[0], "cell", *_STRESS[1:], VTK_STRESS),
+        Field(_PRINCIPAL[0], "cell", *_PRINCIPAL[1:], _PRINCIPAL_NAMES),
+        Field("block_id", "cell", "-", "index of the block", dtype="int32"),
+        Field("material", "cell", "-", "index of the block's material", dtype="int32"),
+        Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
+    ),
+    "outlines": (
+        _DISPLACEMENT,
+        Field("block_id", "cell", "-", "index of the block", dtype="int32"),
+        Field("loop", "cell", "-", "0 the outer boundary, 1 … holes", dtype="int32"),
+    ),
+    "cracks": (
+        _DISPLACEMENT,
+        Field("opening", "point", "m", "normal jump between the faces, positive when they part; nan: not solved for"),
+        Field("slip", "point", "m", "tangential jump, positive when the upper face moves along the tangent"),
+        Field("normal_traction", "point", "Pa", "on the faces, negative when they press"),
+        Field("shear_traction", "point", "Pa", "on the faces, along the crack"),
+        Field("state", "point", "-", _STATE, dtype="int32"),
+        Field("crack_id", "cell", "-", "index of the crack", dtype="int32"),
+        Field("block_id", "cell", "-", "index of the block it lies in", dtype="int32"),
+        Field("birth_cycle", "cell", "-", "0 for what the scene drew, else the cycle in which it grew", dtype="int32"),
+    ),
+    "tips": (
+        _DISPLACEMENT,
+        Field("K_I", "point", "Pa √m", "mode I stress intensity factor; negative at an open slot that is pressed"),
+        Field("K_II", "point", "Pa √m", "mode II stress intensity factor; positive turns the crack clockwise"),
+        Field("K_eq", "point", "Pa √m", "equivalent factor of the growth criterion, grows at K_Ic"),
+        Field("growth_angle", "point", "deg", "from the crack's direction to the growth direction, counter-clockwise"),
+        Field("growth_direction", "point", "-", "unit vector the criterion points to", _XYZ),
+        Field("grown", "point", "m", "advance in this cycle"),
+        Field("crack_id", "point", "-", "index of the crack", dtype="int32"),
+        Field("block_id", "point", "-", "index of the block it lies in", dtype="int32"),
+    ),
+    "contacts": (
+        _DISPLACEMENT,
+        Field("force", "point", "N/m", "on the block that owns the vertex", _XYZ),
+        Field("normal_force", "point", "N/m", "positive in compression"),
+        Field("shear_force", "point", "N/m", "along the edge that is touched"),
+        Field("gap", "point", "m", "negative when penetrating"),
+        Field("slip", "point", "m", "accumulated sliding"),
+        Field("state", "point", "-", _STATE, dtype="int32"),
+        Field("block_id", "point", "-", "owner of the vertex", dtype="int32"),
+        Field("other_block_id", "point", "-", "owner of the edge", dtype="int32"),
+    ),
+    # Interior fields are large and smooth, so single precision: seven digits are more than the mesh resolves.
+    "interior": (
+        Field("displacement", "point", "m", "of the cracked body: block motion plus its own deformation", _XYZ),
+        Field(_STRESS[0], "point", *_STRESS[1:], VTK_STRESS, "float32"),
+        Field(_PRINCIPAL[0], "point", *_PRINCIPAL[1:], _PRINCIPAL_NAMES, "float32"),
+        Field("von_mises", "point", "Pa", "√(3 J₂) of the full tensor", dtype="float32"),
+        Field("block_id", "cell", "-", "index of the block", dtype="int32"),
+    ),
+}
+
+#: Columns every ``history.csv`` begins with, and their units; the step's statistics and the monitors follow.
+HISTORY: dict[str, str] = {
+    "cycle": "-",
+    "time": "s",
+    "load_step": "-",
+    "growth_pass": "-",
+    "load": "Pa, positive in compression",
+    "strain": "-, positive when shortening",
+    "crack_length": "m, all cracks",
+    "tips": "number of crack tips",
+    "growing": "number of tips that grew in this cycle",
+    "max_k_eq": "Pa √m, largest over the tips",
+    "closed_contacts": "number of contacts that carry force",
+}
+
+#: Columns of ``tips.csv``: a row a tip and cycle.
+TIPS: dict[str, str] = {
+    "cycle": "-",
+    "time": "s",
+    "load": "Pa",
+    "crack": "-",
+    "tip": "node of the crack network",
+    "x": "m, reference",
+    "y": "m, reference",
+    "K_I": "Pa √m",
+    "K_II": "Pa √m",
+    "K_eq": "Pa √m",
+    "angle_deg": "°, from the crack's direction, counter-clockwise",
+    "grown_m": "m, in this cycle",
+}
+
+#: Columns of ``events.csv``.
+EVENTS: dict[str, str] = {
+    "kind": "initiation, coalescence, daylighting, split, arrest, failure …",
+    "cycle": "-",
+    "time": "s",
+    "load": "Pa",
+    "x": "m",
+    "y": "m",
+    "detail": "-",
+}
+
+
+def conform(series: str, place: str, count: int, arrays: dict[str, np.ndarray]) -> dict[str, tuple[Field, np.ndarray]]:
+    """``arrays`` as declared: name → (field, contiguous array of the declared dtype and ``count`` rows).
+
+    Raises ValueError naming a missing, an undeclared or a wrongly shaped array."""
+    declared = {f.name: f for f in SERIES[series] if f.place == place}
+    if arrays.keys() != declared.keys():
+        missing, extra = sorted(declared.keys() - arrays.keys()), sorted(arrays.keys() - declared.keys())
+        raise ValueError(f"{series}: {place} arrays missing {missing}, undeclared {extra}")
+    out = {}
+    for name, field in declared.items():
+        array = np.ascontiguousarray(arrays[name], dtype=field.dtype)
+        if array.shape != (count, *field.shape):
+            raise ValueError(f"{series}: {name} has shape {array.shape}, declared {(count, *field.shape)}")
+        out[name] = (field, array)
+    return out

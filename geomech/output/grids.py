@@ -1,0 +1,201 @@
+"""A cycle as grids of points, cells and fields: blocks, outlines, cracks, tips and contacts.
+
+``configuration`` is "reference" (coordinates of the reference, ``displacement`` beside them) or "current" (coordinates
+as they are now; ``displacement`` is written all the same). All grids of a run share it, so they lie on one another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from geomech.conventions import normal_of
+from geomech.model import CrackFaces, Cracks, Cycle, Material
+from geomech.model.motion import Motion
+
+from .motion import carried, displacement, vertex_velocity
+from .triangulate import Triangles
+from .vtu import LINE, TRIANGLE, VERTEX, Grid, with_z
+
+CONFIGURATIONS = ("reference", "current")
+
+
+def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str, triangles: Triangles) -> Grid:
+    """Every block as triangles on its own vertices, so that Warp By Vector opens the joints."""
+    blocks, state = cycle.blocks, cycle.state
+    cells, owner = triangles.of(blocks)
+    stress = six_components(state.stress, blocks.material, materials)
+    return Grid(
+        points=blocks.vertices if configuration == "reference" else state.vertices,
+        connectivity=cells.ravel(),
+        offsets=np.arange(3, 3 * len(cells) + 1, 3),
+        types=np.full(len(cells), TRIANGLE),
+        point_data={
+            "displacement": with_z(state.vertices - blocks.vertices),
+            "velocity": with_z(vertex_velocity(blocks, state)),
+        },
+        cell_data={
+            "stress": stress[owner],
+            "principal_stress": principal_stresses(stress)[owner],
+            "block_id": owner,
+            "material": blocks.material[owner],
+            "fixed": blocks.fixed[owner],
+        },
+    )
+
+
+def outlines_grid(cycle: Cycle, configuration: str) -> Grid:
+    """The edges of all blocks, as lines."""
+    blocks, state = cycle.blocks, cycle.state
+    n = blocks.n_vertices
+    loop = np.repeat(np.arange(len(blocks.loop_start) - 1), np.diff(blocks.loop_start))
+    return Grid(
+        points=blocks.vertices if configuration == "reference" else state.vertices,
+        connectivity=np.stack([np.arange(n), blocks.next_vertex], axis=1).ravel(),
+        offsets=np.arange(2, 2 * n + 1, 2),
+        types=np.full(n, LINE),
+        point_data={"displacement": with_z(state.vertices - blocks.vertices)},
+        cell_data={"block_id": blocks.vertex_block, "loop": loop - blocks.block_loop[blocks.vertex_block]},
+    )
+
+
+def cracks_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
+    """Every element's sampling points joined by lines. Elements do not share points, since opening and slip jump
+    between them; segments that nobody solved for are drawn with nan."""
+    faces, cracks = cycle.faces, cycle.cracks
+    pieces = [] if faces is None else [_element_columns(faces)]
+    solved = np.zeros(cracks.n_segments, bool)
+    if faces is not None:
+        solved[faces.segment] = True
+    if not solved.all():
+        pieces.append(_unsolved_columns(cracks, np.flatnonzero(~solved)))
+    lines, at = [], 0
+    for piece in pieces:
+        n_elements, n = piece["opening"].shape
+        start = at + np.arange(n_elements)[:, None] * n + np.arange(n - 1)
+        lines.append(np.stack([start, start + 1], axis=-1).reshape(-1, 2))
+        at += n_elements * n
+
+    def joined(name: str, tail: tuple[int, ...] = ()) -> np.ndarray:
+        parts = [piece[name].reshape(-1, *tail) for piece in pieces]
+        return np.concatenate(parts) if parts else np.empty((0, *tail))
+
+    points, segment = joined("points", (2,)), joined("segment").astype(int)
+    lines = np.concatenate(lines) if lines else np.empty((0, 2), int)
+    of_line = segment[lines[:, 0]]
+    moved = displacement(motion, cracks.block[segment], points)
+    return Grid(
+        points=points if configuration == "reference" else points + moved,
+        connectivity=lines.ravel(),
+        offsets=np.arange(2, 2 * len(lines) + 1, 2),
+        types=np.full(len(lines), LINE),
+        point_data={
+            "displacement": with_z(moved),
+            **{name: joined(name) for name in ("opening", "slip", "normal_traction", "shear_traction", "state")},
+        },
+        cell_data={
+            "crack_id": cracks.crack[of_line],
+            "block_id": cracks.block[of_line],
+            "birth_cycle": cracks.birth_cycle[of_line],
+        },
+    )
+
+
+def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
+    """Every crack tip as a point."""
+    tips = cycle.tips
+    moved = displacement(motion, tips["block"], tips["point"])
+    c, s = np.cos(tips["angle"])[:, None], np.sin(tips["angle"])[:, None]
+    growth = c * tips["direction"] + s * normal_of(tips["direction"])
+    if configuration == "current":
+        growth = carried(motion, tips["block"], growth)
+    return _cloud(
+        tips["point"] if configuration == "reference" else tips["point"] + moved,
+        {
+            "displacement": with_z(moved),
+            "K_I": tips["k_i"],
+            "K_II": tips["k_ii"],
+            "K_eq": tips["k_eq"],
+            "growth_angle": np.degrees(tips["angle"]),
+            "growth_direction": with_z(growth),
+            "grown": tips["grown"],
+            "crack_id": tips["crack"],
+            "block_id": tips["block"],
+        },
+    )
+
+
+def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
+    """Every contact as a point: its vertex in the reference, its foot on the edge in the current configuration."""
+    contacts = cycle.state.contacts
+    along = normal_of(contacts["normal"])  # the edge's direction, given its outward normal
+    force = contacts["normal_force"][:, None] * contacts["normal"] + contacts["shear_force"][:, None] * along
+    reference = cycle.blocks.vertices[contacts["vertex"]]
+    return _cloud(
+        reference if configuration == "reference" else contacts["point"],
+        {
+            "displacement": with_z(cycle.state.vertices[contacts["vertex"]] - reference),
+            "force": with_z(force),
+            "normal_force": contacts["normal_force"],
+            "shear_force": contacts["shear_force"],
+            "gap": contacts["gap"],
+            "slip": contacts["slip"],
+            "state": contacts["state"],
+            "block_id": contacts["block"],
+            "other_block_id": contacts["other"],
+        },
+    )
+
+
+def six_components(stress: np.ndarray, material: np.ndarray, materials: Sequence[Material]) -> np.ndarray:
+    """(n, 6) Pa in VTK's order from in-plane ``stress`` (n, 3), row i in ``materials[material[i]]``."""
+    out = np.zeros((len(stress), 6))
+    out[:, 0], out[:, 1], out[:, 3] = stress.T
+    for k, kind in enumerate(materials):
+        rows = material == k
+        out[rows, 2] = kind.out_of_plane_stress(stress[rows])
+    return out
+
+
+def principal_stresses(stress: np.ndarray) -> np.ndarray:
+    """(n, 3) Pa, S1 ≥ S2 ≥ S3, of six-component ``stress`` (n, 6) without YZ and XZ shear."""
+    mean, half = 0.5 * (stress[:, 0] + stress[:, 1]), 0.5 * (stress[:, 0] - stress[:, 1])
+    radius = np.hypot(half, stress[:, 3])
+    return np.sort(np.stack([mean + radius, stress[:, 2], mean - radius], axis=1), axis=1)[:, ::-1]
+
+
+def von_mises(principal: np.ndarray) -> np.ndarray:
+    """(n,) Pa from ``principal`` stresses (n, 3)."""
+    a, b, c = principal.T
+    return np.sqrt(0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2))
+
+
+def _cloud(points: np.ndarray, point_data: dict[str, np.ndarray]) -> Grid:
+    n = np.arange(len(points))
+    return Grid(points, n, n + 1, np.full(len(n), VERTEX), point_data)
+
+
+def _element_columns(faces: CrackFaces) -> dict[str, np.ndarray]:
+    return {
+        "points": faces.points,
+        "segment": np.repeat(faces.segment[:, None], faces.opening.shape[1], axis=1),
+        "opening": faces.opening,
+        "slip": faces.slip,
+        "normal_traction": faces.traction[..., 0],
+        "shear_traction": faces.traction[..., 1],
+        "state": faces.state,
+    }
+
+
+def _unsolved_columns(cracks: Cracks, rows: np.ndarray) -> dict[str, np.ndarray]:
+    nothing = np.full((len(rows), 2), np.nan)
+    return {
+        "points": cracks.nodes[cracks.segments[rows]],
+        "segment": np.repeat(rows[:, None], 2, axis=1),
+        "opening": nothing,
+        "slip": nothing,
+        "normal_traction": nothing,
+        "shear_traction": nothing,
+        "state": np.zeros((len(rows), 2), int),
+    }

@@ -1,0 +1,57 @@
+"""What watches a run: objects that are told of its start, of every cycle and of its end."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+from geomech.model import Cycle, Problem
+
+_log = logging.getLogger(__name__)
+
+
+@runtime_checkable
+class Observer(Protocol):
+    """A run calls `on_start` once, `on_cycle` for every cycle in order, and `on_end` once, also after a failure.
+
+    ``summary`` is one mapping that all observers share: whoever runs the cycles puts in what it knows (``end``, the
+    reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if one did.
+    """
+
+    def on_start(self, problem: Problem, folder: Path) -> None: ...
+
+    def on_cycle(self, cycle: Cycle) -> None: ...
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None: ...
+
+
+class Group:
+    """Several observers as one. Ends every one of them that was started, even when another fails in its `on_end`;
+    the first such failure is raised after all have ended."""
+
+    def __init__(self, observers: Iterable[Observer]) -> None:
+        self.observers = list(observers)
+        self._started: list[Observer] = []
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        for observer in self.observers:
+            self._started.append(observer)
+            observer.on_start(problem, folder)
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        for observer in self.observers:
+            observer.on_cycle(cycle)
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        first: Exception | None = None
+        for observer in self._started:
+            try:
+                observer.on_end(summary, error)
+            except Exception as failure:  # noqa: BLE001 (raised below, once all have ended)
+                _log.exception("%s failed at the end of the run", type(observer).__name__)
+                first = first or failure
+        self._started = []
+        if first is not None and error is None:
+            raise first

@@ -1,0 +1,106 @@
+"""A run folder read back: summary, histories, events and the grids of any cycle."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .fields import HISTORY, SERIES, TIPS
+from .vtu import read_collection
+
+if TYPE_CHECKING:
+    import pyvista
+
+#: Columns that hold text; every other one holds numbers, nan where a cell is empty.
+_TEXT = ("kind", "detail")
+
+
+class Run:
+    """A run in ``folder``; nothing is read before it is asked for. A run that is still going, or that failed, reads as
+    far as it has come. Raises FileNotFoundError when there is no run in ``folder``."""
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        if not (self.folder / "history.csv").is_file():
+            raise FileNotFoundError(f"{self.folder} holds no run: history.csv is missing")
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """``summary.json``; empty while the run lasts."""
+        path = self.folder / "summary.json"
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+    @cached_property
+    def scene(self) -> dict[str, Any]:
+        """``scene.toml``, the resolved scene; empty where it was not written."""
+        path = self.folder / "scene.toml"
+        return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+    @cached_property
+    def history(self) -> np.ndarray:
+        """Structured array, a row a cycle; columns of `fields.HISTORY`, statistics and monitors."""
+        return read_table(self.folder / "history.csv", HISTORY)
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        """Structured array, a row a tip and cycle; columns of `fields.TIPS`."""
+        return read_table(self.folder / "tips.csv", TIPS)
+
+    @cached_property
+    def events(self) -> np.ndarray:
+        """Structured array, a row an event; columns of `fields.EVENTS`."""
+        return read_table(self.folder / "events.csv", ())
+
+    @property
+    def title(self) -> str:
+        return self.summary.get("title") or self.scene.get("title") or self.folder.name
+
+    def series(self, name: str) -> list[tuple[float, Path]]:
+        """(time, file) of every written cycle of the series ``name``; empty where it was not written."""
+        if name not in SERIES:
+            raise KeyError(f"no series {name!r}; there are {', '.join(SERIES)}")
+        path = self.folder / f"{name}.pvd"
+        return read_collection(path) if path.is_file() else []
+
+    def grids(self, name: str) -> dict[int, Path]:
+        """cycle number → file of the series ``name``, in order."""
+        return {int(file.stem.rpartition("_")[2]): file for _, file in self.series(name)}
+
+    def grid(self, name: str, cycle: int) -> pyvista.UnstructuredGrid:
+        """The series ``name`` at ``cycle``, or at the last cycle written before it. Raises KeyError without one."""
+        import pyvista
+
+        files = self.grids(name)
+        before = [number for number in files if number <= cycle]
+        if not before:
+            raise KeyError(f"{self.folder}: no {name} up to cycle {cycle}")
+        return pyvista.read(files[max(before)])
+
+    def at(self, cycle: int) -> np.void:
+        """The row of `history` for ``cycle``."""
+        return self.history[np.searchsorted(self.history["cycle"], cycle)]
+
+
+def read_table(path: Path, numeric: Any) -> np.ndarray:
+    """A CSV file with a header as a structured array: float columns (nan for empty cells), text for ``kind`` and
+    ``detail``. A last line that a crash cut short is left out. Missing files read as no rows of ``numeric`` columns."""
+    if not path.is_file():
+        return np.empty(0, [(name, float) for name in numeric])
+    with open(path, newline="", encoding="utf-8") as file:
+        text = file.read()
+    complete = text[: text.rfind("\n") + 1]
+    header, *rows = list(csv.reader(complete.splitlines()))
+    rows = [row for row in rows if len(row) == len(header)]
+    columns = {}
+    for name, values in zip(header, zip(*rows) if rows else [()] * len(header)):
+        columns[name] = np.array(values, dtype=str) if name in _TEXT else np.array([float(v or "nan") for v in values])
+    table = np.empty(len(rows), [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        table[name] = column
+    return table

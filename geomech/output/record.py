@@ -1,0 +1,83 @@
+"""What a run folder says about its origin: the log and the scene as it was understood."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from geomech.model import Cycle, Problem
+
+_log = logging.getLogger("geomech.run")
+
+
+class RunLog:
+    """Observer that keeps ``run.log``: everything geomech logs while the run lasts, its events and its end."""
+
+    def __init__(self, level: int = logging.INFO) -> None:
+        self.level = level
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        self._handler = logging.FileHandler(folder / "run.log", mode="w", encoding="utf-8")
+        self._handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s"))
+        self._handler.setLevel(self.level)
+        logger = logging.getLogger("geomech")
+        self._level_before = logger.level
+        logger.addHandler(self._handler)
+        if logger.getEffectiveLevel() > self.level:
+            logger.setLevel(self.level)
+        _log.info(
+            "%s: %d blocks, %d cracks, %d materials",
+            problem.title, problem.blocks.n_blocks, problem.cracks.n_cracks, len(problem.materials),
+        )  # fmt: skip
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        for event in cycle.events:
+            _log.info(
+                "cycle %d, t = %g s, load %.4g MPa: %s at (%.6g, %.6g) %s",
+                event.cycle, event.time, event.load / 1e6, event.kind, *event.point, event.detail,
+            )  # fmt: skip
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        if error is not None:
+            _log.error("the run failed", exc_info=error)
+        else:
+            _log.info("ended: %s", summary.get("end", "done"))
+        logger = logging.getLogger("geomech")
+        logger.removeHandler(self._handler)
+        logger.setLevel(self._level_before)
+        self._handler.close()
+
+
+class SceneCopy:
+    """Observer that writes ``scene.toml``, the scene with its variant and overrides applied, before the first cycle.
+    ``resolved`` is a mapping as a TOML file holds it; absent values (None) are left out, since TOML has no null."""
+
+    def __init__(self, resolved: Mapping[str, Any]) -> None:
+        self.resolved = resolved
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        import tomli_w
+
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "scene.toml").write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        pass
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        pass
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _without_none(item) for key, item in value.items() if item is not None}
+    if isinstance(value, (list, tuple)):
+        return [_without_none(item) for item in value if item is not None]
+    if isinstance(value, Path):
+        return str(value)
+    return value

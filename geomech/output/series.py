@@ -1,0 +1,126 @@
+"""The ParaView series of a run: one PVD a kind of thing, its files under ``vtk/``, readable after every cycle."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+from geomech.model import Cycle, Problem
+from geomech.model.motion import Motion
+
+from . import grids
+from .fields import SERIES
+from .interior import InteriorMeshes
+from .triangulate import Triangles
+from .vtu import Collection, Grid, write_grid
+
+#: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
+PASS_OFFSET = 1e-6
+
+
+class Series:
+    """Observer that writes ``blocks``, ``outlines``, ``cracks``, ``tips``, ``contacts`` and ``interior``.
+
+    ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
+    last are always written. ``interior_every`` counts cycles between interior fields, which also come with every event
+    and at the end; 0 leaves them out. Raises ValueError for an unknown ``configuration``.
+    """
+
+    def __init__(self, *, every: int = 1, interior_every: int = 10, configuration: str = "reference") -> None:
+        if configuration not in grids.CONFIGURATIONS:
+            raise ValueError(f"configuration must be one of {grids.CONFIGURATIONS}, got {configuration!r}")
+        if every < 1 or interior_every < 0:
+            raise ValueError("every counts from 1, interior_every from 0")
+        self.every, self.interior_every, self.configuration = every, interior_every, configuration
+        self.seconds = 0.0
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        self._materials = problem.materials
+        self._folder = Path(folder)
+        (self._folder / "vtk").mkdir(parents=True, exist_ok=True)
+        # A longer run before this one in the same folder must not leave its last files among ours.
+        for name in SERIES:
+            (self._folder / f"{name}.pvd").unlink(missing_ok=True)
+            for old in (self._folder / "vtk").glob(f"{name}_[0-9]*.vtu"):
+                old.unlink()
+        names = ["blocks", "outlines", "cracks", "tips", "contacts"] + ["interior"] * bool(self.interior_every)
+        self._collections = {name: Collection(self._folder / f"{name}.pvd") for name in names}
+        self._triangles, self._meshes = Triangles(), InteriorMeshes()
+        self._time = SeriesTime()
+        self._pending: tuple[Cycle, float, bool] | None = None
+        self._last_interior = -1
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        began = time.perf_counter()
+        # Every cycle takes its time, written or not, so that the times do not depend on what is left out.
+        at = self._time.of(cycle)
+        happened = bool(cycle.events) or bool((cycle.tips["grown"] > 0).any())
+        wanted = cycle.number == 0 or cycle.number % self.every == 0 or happened
+        interior = bool(cycle.bodies) and self._interior_wanted(cycle)
+        if wanted:
+            self._write(cycle, at)
+        if interior:
+            self._write_interior(cycle, at)
+        self._pending = (cycle, at, wanted)
+        self.seconds += time.perf_counter() - began
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        began = time.perf_counter()
+        if self._pending is not None:
+            cycle, at, written = self._pending
+            if not written:
+                self._write(cycle, at)
+            if self.interior_every and cycle.bodies and cycle.number != self._last_interior:
+                self._write_interior(cycle, at)
+        self.seconds += time.perf_counter() - began
+        summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
+
+    def _interior_wanted(self, cycle: Cycle) -> bool:
+        if not self.interior_every:
+            return False
+        return bool(cycle.events) or cycle.number - max(self._last_interior, 0) >= self.interior_every
+
+    def _write(self, cycle: Cycle, at: float) -> None:
+        motion = Motion.of(cycle.blocks, cycle.state.vertices)
+        shape = self.configuration
+        self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles))
+        self._save("outlines", cycle, at, grids.outlines_grid(cycle, shape))
+        self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape))
+        self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
+        self._save("contacts", cycle, at, grids.contacts_grid(cycle, shape))
+
+    def _write_interior(self, cycle: Cycle, at: float) -> None:
+        motion = Motion.of(cycle.blocks, cycle.state.vertices)
+        self._save("interior", cycle, at, self._meshes.grid(cycle, self._materials, motion, self.configuration))
+        self._last_interior = cycle.number
+
+    def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
+        file = f"vtk/{name}_{cycle.number:06d}.vtu"
+        numbers = {"CYCLE": cycle.number, "TIME": float(cycle.state.time), "LOAD": float(cycle.load)}
+        write_grid(self._folder / file, name, grid, numbers)
+        self._collections[name].add(at, file)
+
+
+class SeriesTime:
+    """Strictly increasing times for a PVD: the cycle's time, plus `PASS_OFFSET` load steps for each growth pass."""
+
+    def __init__(self) -> None:
+        self._last = -float("inf")
+        self._physical = -float("inf")
+        self._step = 1.0
+
+    def of(self, cycle: Cycle) -> float:
+        """The time to list ``cycle`` under; call once a cycle, in order."""
+        now = float(cycle.state.time)
+        advance = now - self._physical
+        if 0 < advance < float("inf"):
+            self._step = advance
+        self._physical = now
+        at = now + cycle.growth_pass * PASS_OFFSET * self._step
+        if not at > self._last:
+            at = max(self._last + PASS_OFFSET * self._step, math.nextafter(self._last, math.inf))
+        self._last = at
+        return at
+

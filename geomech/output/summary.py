@@ -1,0 +1,138 @@
+"""``summary.json``: what a run came to, in numbers a table can be made of."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import math
+import os
+import platform
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geomech.model import Cycle, Event, Problem
+
+#: Statistics of a cycle that begin so are wall times and are summed into ``seconds``.
+SECONDS = "seconds_"
+
+
+class Summary:
+    """Observer that counts, and at the end completes the run's ``summary`` and writes it as ``summary.json``.
+
+    Loads are given in Pa and, where the problem has cracks and a toughness, as σ√(πb)/K_Ic with b half the longest
+    crack of the scene, which is how strengths of different rocks compare.
+    """
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        self._problem, self._path = problem, Path(folder) / "summary.json"
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        self._path.unlink(missing_ok=True)
+        self._began = time.perf_counter()
+        self._last: Cycle | None = None
+        self._events: list[Event] = []
+        self._peak, self._load_steps, self._growth_passes, self._grown = -math.inf, -1, 0, 0.0
+        self._seconds: dict[str, float] = {}
+        self._scale = normalisation(problem)
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        self._last = cycle
+        self._events += cycle.events
+        self._peak = max(self._peak, cycle.load)
+        self._load_steps = max(self._load_steps, cycle.load_step)
+        grown = float(cycle.tips["grown"].sum())
+        self._growth_passes += grown > 0
+        self._grown += grown
+        for name, value in cycle.statistics.items():
+            if name.startswith(SECONDS):
+                phase = name.removeprefix(SECONDS).replace("_", " ")
+                self._seconds[phase] = self._seconds.get(phase, 0.0) + value
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        last = self._last
+        summary.setdefault("title", self._problem.title)
+        summary.setdefault("end", "failed" if error is not None else "end of time")
+        if error is not None:
+            summary["error"] = f"{type(error).__name__}: {error}"
+        summary.setdefault("wall_s", round(time.perf_counter() - self._began, 4))
+        seconds = summary.setdefault("seconds", {})
+        seconds.update({phase: round(value, 4) for phase, value in self._seconds.items() if phase not in seconds})
+        first: dict[str, dict[str, Any]] = {}
+        counts: dict[str, int] = {}
+        for event in self._events:
+            counts[event.kind] = counts.get(event.kind, 0) + 1
+            first.setdefault(event.kind, self._told(event))
+        summary["first"] = first
+        summary["events"] = counts
+        if last is not None:
+            summary["cycles"] = last.number + 1
+            summary["load_steps"] = self._load_steps + 1
+            summary["growing_cycles"] = int(self._growth_passes)
+            summary["time_s"] = float(last.state.time)
+            summary["peak_load_pa"] = float(self._peak)
+            summary["last_load_pa"] = float(last.load)
+            summary["last_strain"] = _finite(last.strain)
+            summary["crack_growth_m"] = self._grown
+            summary["crack_length_m"] = float(last.cracks.lengths.sum())
+            summary["blocks"] = last.blocks.n_blocks
+            summary["tips"] = len(last.tips)
+        if self._scale is not None:
+            half_length, toughness = self._scale
+            summary["normalisation"] = {"half_length_m": half_length, "k_ic_pa_sqrt_m": toughness}
+        summary["versions"] = versions()
+        write_json(self._path, summary)
+
+    def _told(self, event: Event) -> dict[str, Any]:
+        told = {"load_pa": _finite(event.load), "time_s": event.time, "cycle": event.cycle, "point": list(event.point)}
+        if self._scale is not None:
+            half_length, toughness = self._scale
+            told["load_normalised"] = _finite(event.load * math.sqrt(math.pi * half_length) / toughness)
+        if event.detail:
+            told["detail"] = event.detail
+        return told
+
+
+def normalisation(problem: Problem) -> tuple[float, float] | None:
+    """(b, K_Ic) that make loads dimensionless, σ√(πb)/K_Ic: half the longest crack of the scene, along it, and the
+    toughness of its block; None without cracks or with an infinite toughness."""
+    cracks = problem.cracks
+    if not cracks.n_segments:
+        return None
+    length = np.bincount(cracks.crack, weights=cracks.lengths)
+    longest = int(np.argmax(length))
+    block = int(cracks.block[np.flatnonzero(cracks.crack == longest)[0]])
+    toughness = problem.materials[int(problem.blocks.material[block])].k_ic
+    return (0.5 * float(length[longest]), toughness) if math.isfinite(toughness) else None
+
+
+def versions() -> dict[str, str]:
+    """Versions of what computed the run."""
+    found = {"python": platform.python_version(), "machine": f"{platform.machine()}, {os.cpu_count()} cores"}
+    for package in ("geomech", "numpy", "scipy", "numba", "shapely", "gmsh"):
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write ``value`` as JSON, whole or not at all; NumPy numbers become plain ones."""
+    beside = path.with_name(path.name + ".part")
+    beside.write_text(json.dumps(value, indent=2, default=_plain, ensure_ascii=False) + "\n", encoding="utf-8")
+    os.replace(beside, path)
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no nan."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    return str(value)
