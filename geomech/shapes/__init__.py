@@ -1,0 +1,30 @@
+"""Drawings: outlines, cracks and named edges from TOML or Gmsh, assembled into the model; meshes for pictures."""
+
+from importlib import import_module
+
+# Resolved on first use: Shapely and Gmsh are loaded by those who draw.
+_PUBLIC = {
+    "EdgeLine": "parts",
+    "Flaw": "parts",
+    "GmshDrawing": "gmsh_model",
+    "GmshModelError": "gmsh_model",
+    "GmshUnavailable": "gmsh_session",
+    "InteriorMesh": "meshing",
+    "ShapeError": "parts",
+    "Trace": "parts",
+    "Zone": "parts",
+    "assemble": "assembly",
+    "block_names": "assembly",
+    "mesh_interior": "meshing",
+    "read_gmsh_model": "gmsh_model",
+    "rectangle": "outlines",
+    "straight_crack": "outlines",
+}
+
+__all__ = list(_PUBLIC)
+
+
+def __getattr__(name: str):
+    if name in _PUBLIC:
+        return getattr(import_module(f"{__name__}.{_PUBLIC[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

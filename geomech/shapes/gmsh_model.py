@@ -1,0 +1,295 @@
+"""Parametric Gmsh models (.geo) read as drawings: named surfaces are zones, named curves are cracks and edges."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from .gmsh_session import gmsh_session
+from .parts import Trace, Zone
+
+#: Curved edges become chords that leave the curve by at most this, in units of the model's largest side.
+CHORD = 1e-4
+
+#: Physical curves whose name starts so are cracks; every other name belongs to edges of blocks.
+CRACK = "crack:"
+
+
+class GmshModelError(ValueError):
+    """A model that cannot be read. ``parameter`` names the parameter at fault, if one is; ``way_out`` says what to do."""
+
+    def __init__(self, message: str, way_out: str, parameter: str | None = None) -> None:
+        super().__init__(f"{message}: {way_out}")
+        self.message, self.way_out, self.parameter = message, way_out, parameter
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A DefineConstant that the model shows in Gmsh's side panel: its path there, value, range and choices."""
+
+    path: str
+    value: float | str
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class GmshDrawing:
+    """What a model holds: ``zones`` (with named edges), ``traces``, its ``parameters`` by short name as used, and
+    ``warnings`` as (message, way out)."""
+
+    zones: tuple[Zone, ...]
+    traces: tuple[Trace, ...]
+    parameters: dict[str, Parameter]
+    warnings: tuple[tuple[str, str], ...] = ()
+
+
+def read_gmsh_model(
+    path: str | Path, parameters: Mapping[str, float | str] | None = None, chord_tolerance: float | None = None
+) -> GmshDrawing:
+    """Read a .geo (or .brep, .step) model with ``parameters`` set.
+
+    A parameter is known by the last part of its name in the side panel ("Parameters/Cracks/phi_deg" is ``phi_deg``)
+    or by the whole; where the model offers named choices the name may be given. Physical surfaces are zones, one
+    block a surface; physical curves called "crack:NAME" are cracks; all other physical curves name the block edges on
+    them. Curved edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side).
+
+    Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
+    named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
+    """
+    path = Path(path)
+    if not path.is_file():
+        near = [p.name for p in path.parent.glob("*" + path.suffix)] if path.parent.is_dir() else []
+        close = difflib.get_close_matches(path.name, near, 1)
+        raise GmshModelError(
+            f"there is no file {path}",
+            f"did you mean {close[0]}?" if close else "paths are relative to the scene file",
+        )
+    with gmsh_session() as gmsh:
+        known = _open(gmsh, path)
+        if parameters:
+            known = _with_parameters(gmsh, path, dict(parameters), known)
+        return _drawing(gmsh, path, known, chord_tolerance)
+
+
+def _open(gmsh, path: Path) -> dict[str, Parameter]:
+    """(Re)read the file into the current model; its parameters by short name."""
+    gmsh.clear()
+    gmsh.logger.start()
+    try:
+        gmsh.merge(str(path))
+        gmsh.model.occ.synchronize()
+        error = None
+    except Exception as raised:  # gmsh raises bare Exception
+        error = str(raised)
+    errors = [line[len("Error: ") :] for line in gmsh.logger.get() if line.startswith("Error: ")]
+    gmsh.logger.stop()
+    if error or errors:
+        text = (errors or [error])[0].replace(f"'{path}', ", "")
+        raise GmshModelError(f"Gmsh cannot read {path}: {text}", "open it in Gmsh and correct it there")
+    found = {}
+    for name in gmsh.onelab.getNames():
+        about = json.loads(gmsh.onelab.get(name))
+        if about.get("readOnly") or name.split("/")[0] in ("Gmsh", "ONELAB") or not about.get("values"):
+            continue
+        low, high = about.get("min", -1e200), about.get("max", 1e200)
+        entry = Parameter(
+            path=name,
+            value=about["values"][0],
+            minimum=low if low > -1e199 else None,
+            maximum=high if high < 1e199 else None,
+            choices=about.get("valueLabels", {}),
+        )
+        short = name.rsplit("/", 1)[-1]
+        found[name if short in found else short] = entry
+    return found
+
+
+def _with_parameters(gmsh, path: Path, wanted: dict[str, float | str], known: dict[str, Parameter]) -> dict[str, Parameter]:
+    """Set what is known and read again, until the rest is known too (a parameter may appear with another's value)."""
+    waiting = dict(wanted)
+    while waiting:
+        ready = {name: _entry(name, known) for name in waiting if _entry(name, known) is not None}
+        if not ready:
+            name = next(iter(waiting))
+            close = difflib.get_close_matches(name, known, 1)
+            listed = ", ".join(known) or "none"
+            raise GmshModelError(
+                f"{path.name} has no parameter {name!r}",
+                (f"did you mean {close[0]!r}? " if close else "") + f"its parameters are {listed}",
+                parameter=name,
+            )
+        for name, entry in ready.items():
+            value = _value(path, name, waiting.pop(name), entry)
+            if isinstance(value, str):
+                gmsh.onelab.setString(entry.path, [value])
+            else:
+                gmsh.onelab.setNumber(entry.path, [value])
+        known = _open(gmsh, path)
+    return known
+
+
+def _entry(name: str, known: dict[str, Parameter]) -> Parameter | None:
+    return known.get(name) or next((entry for entry in known.values() if entry.path == name), None)
+
+
+def _value(path: Path, name: str, value: float | str, entry: Parameter) -> float | str:
+    """``value`` as the model takes it: choices by name, the right type, inside the range."""
+
+    def refuse(message: str, way_out: str):
+        raise GmshModelError(f"parameter {name!r} of {path.name}: {message}", way_out, parameter=name)
+
+    if isinstance(entry.value, str):
+        return value if isinstance(value, str) else refuse(f"{value!r} is not a text", "put it in quotes")
+    if isinstance(value, bool):
+        value = float(value)
+    if isinstance(value, str):
+        if value in entry.choices:
+            return float(entry.choices[value])
+        listed = ", ".join(f'"{c}"' for c in entry.choices)
+        return refuse(f"{value!r} is not a number", f"choose one of {listed}" if listed else "give a number")
+    if entry.choices and value not in entry.choices.values():
+        listed = ", ".join(f'{v:g} ("{c}")' for c, v in entry.choices.items())
+        return refuse(f"{value:g} is not among its choices", f"choose one of {listed}")
+    low, high = entry.minimum, entry.maximum
+    if (low is not None and value < low) or (high is not None and value > high):
+        span = f"[{'-inf' if low is None else format(low, 'g')}, {'inf' if high is None else format(high, 'g')}]"
+        return refuse(f"{value:g} is outside its range {span}", "choose a value inside")
+    return float(value)
+
+
+def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | None) -> GmshDrawing:
+    box = gmsh.model.getBoundingBox(-1, -1) if gmsh.model.getEntities(2) else (0.0,) * 6
+    chord = CHORD * max(box[3] - box[0], box[4] - box[1]) if chord is None else chord
+    curves = _Curves(gmsh, chord)
+    warnings: list[tuple[str, str]] = []
+
+    edge_name: dict[int, str] = {}
+    traces = []
+    for dim, group in gmsh.model.getPhysicalGroups(1):
+        name = gmsh.model.getPhysicalName(dim, group)
+        tags = [int(tag) for tag in gmsh.model.getEntitiesForPhysicalGroup(dim, group)]
+        if not name:
+            warnings.append((f"{path.name}: physical curve {group} has no name", 'name it: Physical Curve("NAME") = {…}'))
+        elif name.startswith(CRACK):
+            traces.append(Trace(name[len(CRACK) :], tuple(curves.chained(tags))))
+        else:
+            for tag in tags:
+                if edge_name.setdefault(tag, name) != name:
+                    raise GmshModelError(
+                        f"{path.name}: curve {tag} is called both {edge_name[tag]!r} and {name!r}",
+                        "give each edge one physical name",
+                    )
+
+    zones, named, used = [], set(), set()
+    for dim, group in gmsh.model.getPhysicalGroups(2):
+        name = gmsh.model.getPhysicalName(dim, group) or f"zone {group}"
+        for tag in gmsh.model.getEntitiesForPhysicalGroup(dim, group):
+            signed = gmsh.model.getBoundary([(2, int(tag))], combined=False, oriented=True)
+            used.update(abs(t) for _, t in signed)
+            zones.append(curves.zone(name, [int(t) for _, t in signed], edge_name))
+            named.add(int(tag))
+    if not zones:
+        raise GmshModelError(
+            f"{path.name} has no physical surface", 'name its surfaces: Physical Surface("rock") = {1}; they become zones'
+        )
+    for _, tag in gmsh.model.getEntities(2):
+        if tag not in named:
+            warnings.append((f"{path.name}: surface {tag} has no physical name and is left out", "name it, or remove it"))
+    for name in dict.fromkeys(edge_name.values()):
+        if not used & {tag for tag, its in edge_name.items() if its == name}:
+            warnings.append(
+                (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
+            )
+    return GmshDrawing(tuple(zones), tuple(traces), parameters, tuple(warnings))
+
+
+class _Curves:
+    """Curves of the current model as polylines, each with the tags of the points it joins."""
+
+    def __init__(self, gmsh, chord: float) -> None:
+        self.gmsh, self.chord, self.known = gmsh, chord, {}
+
+    def polyline(self, tag: int) -> tuple[np.ndarray, int, int]:
+        """(n, 2) points along the curve ``tag``, reversed for a negative one, and the tags of its end points."""
+        if abs(tag) not in self.known:
+            points, ends = self._sampled(abs(tag)), self.gmsh.model.getBoundary([(1, abs(tag))], False, True)
+            first, last = (ends[0][1], ends[-1][1]) if ends else (-abs(tag), -abs(tag))
+            if len(ends) == 2 and len(points) == 2:
+                at = [self.gmsh.model.getValue(0, t, [])[:2] for t in (first, last)]
+                points = np.array(at)
+            self.known[abs(tag)] = points, abs(first) if ends else first, abs(last) if ends else last
+        points, first, last = self.known[abs(tag)]
+        return (points, first, last) if tag > 0 else (points[::-1], last, first)
+
+    def _sampled(self, tag: int) -> np.ndarray:
+        model = self.gmsh.model
+        (low,), (high,) = model.getParametrizationBounds(1, tag)
+        if model.getType(1, tag) == "Line":
+            return model.getValue(1, tag, [low, high]).reshape(-1, 3)[:, :2]
+        # Halve the pieces until the curve's mid-points leave the chords by less than the tolerance; a closed curve
+        # needs a few pieces before its chords mean anything.
+        for pieces in (4, 8, 16, 32, 64, 128, 256, 512, 1024):
+            t = np.linspace(low, high, 2 * pieces + 1)
+            fine = model.getValue(1, tag, t.tolist()).reshape(-1, 3)[:, :2]
+            points = fine[::2]
+            if np.hypot(*(fine[1::2] - 0.5 * (points[1:] + points[:-1])).T).max() <= self.chord:
+                break
+        return points
+
+    def chained(self, tags: list[int]) -> list[np.ndarray]:
+        """Curves that follow one another joined into polylines; one starts anew where they branch."""
+        pieces = [self.polyline(tag) for tag in tags]
+        lines = []
+        while pieces:
+            points, first, last = pieces.pop(0)
+            grown = True
+            while grown:
+                grown = False
+                for end in (last, first):
+                    meeting = [k for k, p in enumerate(pieces) if end in p[1:]]
+                    if len(meeting) != 1 or first == last:
+                        continue
+                    other, a, b = pieces.pop(meeting[0])
+                    if end == last:
+                        other, b = (other, b) if a == end else (other[::-1], a)
+                        points, last = np.concatenate([points, other[1:]]), b
+                    else:
+                        other, a = (other, a) if b == end else (other[::-1], b)
+                        points, first = np.concatenate([other, points[1:]]), a
+                    grown = True
+                    break
+            lines.append(points)
+        return lines
+
+    def zone(self, name: str, signed: list[int], edge_name: dict[int, str]) -> Zone:
+        """The loops that the ``signed`` boundary curves of a surface form, the widest one first."""
+        waiting = list(signed)
+        loops = []
+        while waiting:
+            tag = waiting.pop(0)
+            points, first, last = self.polyline(tag)
+            loop, label = [points[:-1]], [edge_name.get(abs(tag), "")] * (len(points) - 1)
+            while last != first:
+                following = next((t for t in waiting if self.polyline(t)[1] == last), None)
+                if following is None:
+                    # A curve listed against the loop's sense.
+                    following = next((t for t in waiting if self.polyline(t)[2] == last), None)
+                    if following is None:
+                        raise GmshModelError(f"the outline of zone {name!r} is not closed", "close its Curve Loop")
+                    waiting.remove(following)
+                    points, _, last = self.polyline(-following)
+                else:
+                    waiting.remove(following)
+                    points, _, last = self.polyline(following)
+                loop.append(points[:-1])
+                label += [edge_name.get(abs(following), "")] * (len(points) - 1)
+            loops.append((np.concatenate(loop), tuple(label)))
+        loops.sort(key=lambda pair: -np.prod(np.ptp(pair[0], axis=0)))
+        return Zone(name, tuple(pair[0] for pair in loops), tuple(pair[1] for pair in loops))

@@ -1,0 +1,76 @@
+"""What a drawing is made of: zones of rock, traces of cracks, names on edges, and what is wrong with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """One polygon of rock: ``loops`` are (n, 2) arrays without the closing repetition, the outline first, then holes,
+    in either sense. ``edge_names[loop][edge]`` names the edge that leaves each vertex; None: nothing named yet.
+    Several zones of one name are several blocks of one kind."""
+
+    name: str
+    loops: tuple[np.ndarray, ...]
+    edge_names: tuple[tuple[str, ...], ...] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A crack as drawn: ``lines`` are polylines (n, 2), one, or several where the crack branches."""
+
+    name: str
+    lines: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeLine:
+    """A name for all block edges that lie on the straight piece from ``start`` to ``end`` (of ``zone`` alone, if
+    given)."""
+
+    name: str
+    start: tuple[float, float]
+    end: tuple[float, float]
+    zone: str | None = None
+
+
+class Flaw(NamedTuple):
+    """One thing wrong with a drawing: ``part`` is "zones", "cracks" or "edges", ``index`` its place in that list."""
+
+    part: str
+    index: int
+    message: str
+    way_out: str
+
+
+class ShapeError(ValueError):
+    """Everything wrong with a drawing, as ``flaws``."""
+
+    def __init__(self, flaws: list[Flaw]) -> None:
+        self.flaws = list(flaws)
+        super().__init__("\n".join(f"{flaw.message}: {flaw.way_out}" for flaw in self.flaws))
+
+
+def extent_of(arrays) -> float:
+    """Largest side of the box around all ``arrays`` (n, 2), m; 0 for none."""
+    arrays = [np.asarray(a, dtype=float) for a in arrays if len(a)]
+    if not arrays:
+        return 0.0
+    low = np.min([a.min(axis=0) for a in arrays], axis=0)
+    high = np.max([a.max(axis=0) for a in arrays], axis=0)
+    return float((high - low).max())
+
+
+def grid_decimals(arrays) -> int:
+    """Decimals that keep twelve significant digits of the largest coordinate.
+
+    All coordinates of a drawing are rounded to that many decimals, once. A cosine taken by Gmsh and one taken by
+    Python then give the same number, and decimal input (0.03) stays the very number that was typed.
+    """
+    arrays = [np.asarray(a, dtype=float) for a in arrays if len(a)]
+    largest = max((float(np.abs(a).max()) for a in arrays), default=1.0)
+    return 12 - int(np.ceil(np.log10(largest))) if largest > 0 else 12

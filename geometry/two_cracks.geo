@@ -1,0 +1,114 @@
+// A rectangular specimen with two cracks on its axis, between two platens.
+//
+// Open this file in Gmsh: the parameters stand in the side panel and the drawing follows them. A scene sets them with
+//     [geometry]
+//     model = "two_cracks.geo"
+//     parameters = { phi_deg = 30 }
+// using the last part of each name. Metres; the origin is the centre of the specimen.
+//
+// What geomech reads: physical surfaces are blocks ("rock", "platen_bottom", "platen_top"); physical curves called
+// "crack:…" are cracks; all other physical curves name edges of blocks, for loads and joints.
+//
+// Specimen of Haeri et al. (2014): 60 x 120 mm, two cracks of 10 mm, their centres 20 mm apart on the axis.
+
+DefineConstant[
+  width_m  = {0.060, Min 0.001, Max 10, Step 0.005, Name "Parameters/1Specimen/width_m",  Label "Width [m]"},
+  height_m = {0.120, Min 0.001, Max 10, Step 0.005, Name "Parameters/1Specimen/height_m", Label "Height [m]"},
+  crack_length_m = {0.010, Min 0.0001, Max 10, Step 0.001, Name "Parameters/2Cracks/crack_length_m",
+                    Label "Length of each crack [m]"},
+  spacing_m = {0.020, Min 0.0001, Max 10, Step 0.001, Name "Parameters/2Cracks/spacing_m",
+               Label "Distance of the centres [m]"},
+  alpha_deg = {45, Min -180, Max 180, Step 5, Name "Parameters/2Cracks/alpha_deg",
+               Label "Crack 1 (upper), from the horizontal [deg]"},
+  phi_deg = {0, Min -180, Max 180, Step 5, Name "Parameters/2Cracks/phi_deg", Label "Crack 2 (lower) [deg]"},
+  // The angle of crack 2 is read from crack 1 (then crack 2 stands at alpha + phi) or from the horizontal (at phi).
+  phi_from = {0, Choices{0="crack1", 1="horizontal"}, Name "Parameters/2Cracks/phi_from", Label "phi is counted from"},
+  platens = {1, Choices{0="no", 1="yes"}, Name "Parameters/3Platens/platens", Label "Platens"},
+  platen_height_m = {0.010, Min 0.0001, Max 10, Step 0.005, Name "Parameters/3Platens/platen_height_m",
+                     Label "Height [m]", Visible platens},
+  platen_overhang_m = {0.005, Min 0, Max 10, Step 0.005, Name "Parameters/3Platens/platen_overhang_m",
+                       Label "Overhang on each side [m]", Visible platens}
+];
+
+w = width_m / 2;
+h = height_m / 2;
+size = width_m / 20;   // of the mesh that Gmsh shows; geomech meshes by itself
+
+// Specimen, counter-clockwise from its lower left corner
+Point(1) = {-w, -h, 0, size};
+Point(2) = { w, -h, 0, size};
+Point(3) = { w,  h, 0, size};
+Point(4) = {-w,  h, 0, size};
+Line(1) = {1, 2};
+Line(2) = {2, 3};
+Line(3) = {3, 4};
+Line(4) = {4, 1};
+Curve Loop(1) = {1, 2, 3, 4};
+Plane Surface(1) = {1};
+
+// Cracks, each from its far end to the end its angle points to
+a1 = alpha_deg * Pi / 180;
+If (phi_from == 0)
+  a2 = (alpha_deg + phi_deg) * Pi / 180;
+Else
+  a2 = phi_deg * Pi / 180;
+EndIf
+b = crack_length_m / 2;
+s = spacing_m / 2;
+Point(11) = {-b * Cos(a1),  s - b * Sin(a1), 0, size / 5};
+Point(12) = { b * Cos(a1),  s + b * Sin(a1), 0, size / 5};
+Point(13) = {-b * Cos(a2), -s - b * Sin(a2), 0, size / 5};
+Point(14) = { b * Cos(a2), -s + b * Sin(a2), 0, size / 5};
+Line(11) = {11, 12};
+Line(12) = {13, 14};
+Line{11, 12} In Surface{1};
+
+Physical Surface("rock") = {1};
+If (platens)
+  // Platens own their points: they touch the specimen and may part from it. Each overhangs the specimen, so that no
+  // corner of the specimen slides off as it widens; the load stands on the middle part of the upper platen, as wide
+  // as the specimen, so that the traction there is the specimen's own axial stress.
+  p = platen_height_m;
+  o = w + platen_overhang_m;
+  Point(21) = {-o, -h - p, 0, size};
+  Point(22) = { o, -h - p, 0, size};
+  Point(23) = { o, -h,     0, size};
+  Point(24) = {-o, -h,     0, size};
+  Line(21) = {21, 22};
+  Line(22) = {22, 23};
+  Line(23) = {23, 24};
+  Line(24) = {24, 21};
+  Curve Loop(2) = {21, 22, 23, 24};
+  Plane Surface(2) = {2};
+
+  Point(31) = {-o, h,     0, size};
+  Point(32) = { o, h,     0, size};
+  Point(33) = { o, h + p, 0, size};
+  Point(36) = {-o, h + p, 0, size};
+  Line(31) = {31, 32};
+  Line(32) = {32, 33};
+  Line(36) = {36, 31};
+  If (platen_overhang_m > 0)
+    Point(34) = { w, h + p, 0, size};
+    Point(35) = {-w, h + p, 0, size};
+    Line(33) = {33, 34};
+    Line(34) = {34, 35};
+    Line(35) = {35, 36};
+    Curve Loop(3) = {31, 32, 33, 34, 35, 36};
+  Else
+    Line(34) = {33, 36};
+    Curve Loop(3) = {31, 32, 34, 36};
+  EndIf
+  Plane Surface(3) = {3};
+
+  Physical Surface("platen_bottom") = {2};
+  Physical Surface("platen_top") = {3};
+  Physical Curve("load:top") = {34};
+  Physical Curve("contact:bottom") = {1, 23};
+  Physical Curve("contact:top") = {3, 31};
+Else
+  Physical Curve("load:bottom") = {1};
+  Physical Curve("load:top") = {3};
+EndIf
+Physical Curve("crack:crack1") = {11};
+Physical Curve("crack:crack2") = {12};
