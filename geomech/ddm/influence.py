@@ -1,0 +1,226 @@
+"""Matrices between sets of elements, in nodal unknowns, and their reuse when only some elements are new."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from . import kernels, shapes
+
+#: Element–point pairs below which a second thread does not pay for itself.
+PAIRS_PER_THREAD = 6000
+_THREADS = 2
+_pool: ThreadPoolExecutor | None = None
+
+
+def _spread(n: int, pairs: int, work: Callable[[int, int], None]) -> None:
+    """Run ``work(first, last)`` over range(n), in chunks on threads when there is enough of it."""
+    global _pool
+    chunks = min(_THREADS, pairs // PAIRS_PER_THREAD)
+    if chunks < 2:
+        work(0, n)
+        return
+    if _pool is None:
+        _pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="geomech-ddm")
+    bounds = np.linspace(0, n, chunks + 1).astype(int)
+    # list() hands on what a thread raised.
+    list(_pool.map(work, bounds[:-1].tolist(), bounds[1:].tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class ElementSet:
+    """Straight elements of one order and node family.
+
+        start, end   (n, 2)   m
+        kind         (n,)     see `shapes`
+        source       (n,)     the outline edge or crack segment each lies on
+
+    Unknowns run element, component (along the tangent, along the normal left of it), node: 2(p+1) an element; so do
+    the rows of tractions collocated on them.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    kind: np.ndarray
+    source: np.ndarray
+    order: int
+    family: str
+
+    @property
+    def n(self) -> int:
+        return len(self.start)
+
+    @property
+    def per(self) -> int:
+        """Nodes of an element."""
+        return self.order + 1
+
+    @property
+    def n_unknowns(self) -> int:
+        return 2 * self.per * self.n
+
+    @cached_property
+    def length(self) -> np.ndarray:
+        return np.hypot(*(self.end - self.start).T)
+
+    @cached_property
+    def tangent(self) -> np.ndarray:
+        return (self.end - self.start) / self.length[:, None]
+
+    @cached_property
+    def normal(self) -> np.ndarray:
+        return np.column_stack([-self.tangent[:, 1], self.tangent[:, 0]])
+
+    @cached_property
+    def nodes(self) -> np.ndarray:
+        """(n, p+1, 2) collocation points."""
+        return self.at(shapes.nodes(self.family, self.order))
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """(n, len(t), 2) points at t ∈ [−1, 1] of every element, the ends exactly."""
+        s = 0.5 * (1 + np.asarray(t))[None, :, None]
+        return (1 - s) * self.start[:, None] + s * self.end[:, None]
+
+    @cached_property
+    def keys(self) -> list[bytes]:
+        """What an element is, to the bit."""
+        rows = np.column_stack([self.start, self.end, self.kind.astype(float)])
+        return [row.tobytes() for row in np.ascontiguousarray(rows)]
+
+    @cached_property
+    def index_of(self) -> dict[bytes, int]:
+        return {key: k for k, key in enumerate(self.keys)}
+
+    def found_in(self, other: "ElementSet | None") -> np.ndarray:
+        """(n,) the same element's number in ``other``, −1 where it is new."""
+        if other is None or (other.order, other.family) != (self.order, self.family):
+            return np.full(self.n, -1)
+        if other is self:
+            return np.arange(self.n)
+        return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
+
+    def take(self, which: np.ndarray) -> "ElementSet":
+        return ElementSet(
+            self.start[which], self.end[which], self.kind[which], self.source[which], self.order, self.family
+        )
+
+    def unknowns(self, elements: np.ndarray) -> np.ndarray:
+        """Indices of the unknowns (and rows) of ``elements``."""
+        width = 2 * self.per
+        return (np.asarray(elements)[:, None] * width + np.arange(width)).ravel()
+
+    @cached_property
+    def _by_kind(self) -> list[tuple[int, np.ndarray]]:
+        return [(int(kind), np.flatnonzero(self.kind == kind)) for kind in np.unique(self.kind)]
+
+    @cached_property
+    def _inverse_weight(self) -> np.ndarray:
+        """(n, p+1) one over the tip weight at the nodes."""
+        t = shapes.nodes(self.family, self.order)
+        table = 1.0 / np.array([shapes.weight(kind, t) for kind in range(4)])
+        return table[self.kind]
+
+    def densities(self, values: np.ndarray) -> np.ndarray:
+        """(n, 2, p+1) monomial coefficients of nodal ``values`` (n_unknowns,)."""
+        scaled = values.reshape(self.n, 2, self.per) * self._inverse_weight[:, None, :]
+        return np.ascontiguousarray(scaled @ shapes.to_monomials(self.family, self.order, shapes.ORDINARY).T)
+
+    def evaluate(self, values: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """(n, 2, len(t)) local components at ``t`` of nodal ``values`` (n_unknowns,)."""
+        rows = values.reshape(self.n, 2, self.per)
+        out = np.empty((self.n, 2, len(t)))
+        for kind, which in self._by_kind:
+            out[which] = rows[which] @ shapes.at(self.family, self.order, kind, t).T
+        return out
+
+    @cached_property
+    def quadrature(self) -> np.ndarray:
+        """(n, p+1) integrals of the nodal shape functions, m."""
+        table = np.array([shapes.integrals(self.family, self.order, kind) for kind in range(4)])
+        return 0.5 * self.length[:, None] * table[self.kind]
+
+    def nodal_matrix(self, monomial: np.ndarray) -> np.ndarray:
+        """Columns in monomials turned into columns in nodal values."""
+        rows = len(monomial)
+        full = monomial.reshape(-1, self.per) @ shapes.to_monomials(self.family, self.order, shapes.ORDINARY)
+        if (self.kind != shapes.ORDINARY).any():
+            full = full.reshape(rows, self.n, 2, self.per)
+            full *= self._inverse_weight[:, None, :]
+        return full.reshape(rows, self.n_unknowns)
+
+
+def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
+    """(targets.n_unknowns, sources.n_unknowns): traction (along, normal, left of the target) at the collocation points
+    from unit nodal jumps times 2μ."""
+    out = np.empty((targets.n_unknowns, sources.n_unknowns))
+    if out.size:
+        _tractions(targets, sources.start, sources.end, sources.kind, sources.order, nu, tol, 1.0, False, out)
+        out = sources.nodal_matrix(out)
+    return out
+
+
+def line_forces(
+    targets: ElementSet, start: np.ndarray, end: np.ndarray, degree: int, nu: float, tol: float, side: float
+) -> np.ndarray:
+    """(targets.n_unknowns, m, 2, degree+1) traction from line forces t^k along (component 0) and across (1) straight
+    segments, Kelvin's solution integrated in closed form; points on a segment are seen from ``side`` of it."""
+    out = np.empty((targets.n_unknowns, len(start) * 2 * (degree + 1)))
+    if out.size:
+        _tractions(targets, start, end, np.zeros(len(start), np.int64), degree, nu, tol, side, True, out)
+    return out.reshape(targets.n_unknowns, len(start), 2, degree + 1)
+
+
+def _tractions(targets, start, end, kind, order, nu, tol, side, force, out):
+    points = np.ascontiguousarray(targets.nodes.reshape(-1, 2))
+    tangents = np.repeat(targets.tangent, targets.per, axis=0)
+    start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
+    kind = np.ascontiguousarray(kind, dtype=np.int64)
+    table = shapes.moments()
+
+    def work(first, last):
+        kernels.tractions(
+            points, tangents, targets.per, first, last, start, end, kind, order, nu, tol, side, force, table, out
+        )
+
+    _spread(len(points), len(points) * len(start), work)
+
+
+def add_fields(points, start, end, kind, density, nu, tol, side, force, stress, shift) -> None:
+    """Add the stress (n, 3) and 2μ times the displacement (n, 2) of elements with monomial ``density`` (m, 2, p+1)."""
+    if not len(points) or not len(start):
+        return
+    start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
+    kind = np.ascontiguousarray(kind, dtype=np.int64)
+    density = np.ascontiguousarray(density)
+    table = shapes.moments()
+
+    def work(first, last):
+        kernels.fields(
+            points, first, last, start, end, kind, density.shape[2] - 1, density, nu, tol, side, force, table, stress, shift
+        )  # fmt: skip
+
+    _spread(len(points), len(points) * len(start), work)
+
+
+def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set, column_set, compute) -> np.ndarray:
+    """A matrix of which some is known: ``rows`` and ``columns`` (per element of ``row_set`` and ``column_set``) are the
+    old element numbers or −1, ``compute(row_elements, column_elements)`` makes blocks of it."""
+    if old is None or (rows < 0).all() or (columns < 0).all():
+        return compute(np.arange(row_set.n), np.arange(column_set.n))
+    if len(old) == row_set.n_unknowns and old.shape[1] == column_set.n_unknowns:
+        if np.array_equal(rows, np.arange(row_set.n)) and np.array_equal(columns, np.arange(column_set.n)):
+            return old
+    kept_r, new_r = np.flatnonzero(rows >= 0), np.flatnonzero(rows < 0)
+    kept_c, new_c = np.flatnonzero(columns >= 0), np.flatnonzero(columns < 0)
+    out = np.empty((row_set.n_unknowns, column_set.n_unknowns))
+    at_r, at_c = row_set.unknowns(kept_r), column_set.unknowns(kept_c)
+    out[np.ix_(at_r, at_c)] = old[np.ix_(row_set.unknowns(rows[kept_r]), column_set.unknowns(columns[kept_c]))]
+    if len(new_r):
+        out[row_set.unknowns(new_r)] = compute(new_r, np.arange(column_set.n))
+    if len(new_c):
+        out[np.ix_(at_r, column_set.unknowns(new_c))] = compute(kept_r, new_c)
+    return out
