@@ -1,0 +1,30 @@
+"""Discontinuous deformation analysis: blocks that move, deform and slide along joints.
+
+`BlockSystem.step` moves a `State` by one time step; `run` does it until an end time. Stands alone::
+
+    rock, joint = Material("rock", 10e9, 0.25, density=2600.0), JointLaw("joint", friction_angle=0.6)
+    loads = Loads(gravity=History.constant([0.0, -9.81]))
+    for state in dda.run(blocks, [rock], [joint], loads, DdaSettings(time_step=1e-3, dynamic_factor=1.0), end_time=1.0):
+        ...
+"""
+
+from .basis import displacement_matrix
+from .loads import EDGE_FORCE, POINT_FORCE, AppliedForces
+from .moments import block_moments, mass_matrix
+from .step import CrackResponse, NotConverged, StepResult, contact_resultants
+from .system import BlockSystem, run
+
+__all__ = [
+    "EDGE_FORCE",
+    "POINT_FORCE",
+    "AppliedForces",
+    "BlockSystem",
+    "CrackResponse",
+    "NotConverged",
+    "StepResult",
+    "block_moments",
+    "contact_resultants",
+    "displacement_matrix",
+    "mass_matrix",
+    "run",
+]

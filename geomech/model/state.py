@@ -30,6 +30,7 @@ CONTACT = np.dtype(
         ("slip", np.float64),  # m, accumulated sliding along the edge's direction
         ("length", np.float64),  # tributary length, m
         ("law", np.int64),  # index of the joint law
+        ("bonded", np.int64),  # 1 while cohesion and tensile strength hold, 0 once either has failed
     ]
 )
 

@@ -1,0 +1,285 @@
+"""Which vertices may touch which edges: broad phase by sorted boxes, narrow phase by the entrance-edge rule.
+
+A vertex meets the interior of an edge when its corner points away from the edge. Where two corners meet, the lines
+through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
+entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
+within the other's edge. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
+smaller penetration carries the contact; each is stored as the other's *partner*.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+# Corners and edges that interpenetrate by less than this angle (sine, about 3°) still count as touching face to face.
+_ANGLE = 0.05
+# Two entrance lines nearer in direction than this are the same line.
+_PARALLEL = 0.0025
+# cos of the angle between edges that count as mating faces, for tributary lengths.
+_MATING = 0.9986
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _dot_to(vertices, origin, target, nx, ny):
+    """Component along (nx, ny) of the unit vector from one vertex to another."""
+    dx, dy = vertices[target, 0] - vertices[origin, 0], vertices[target, 1] - vertices[origin, 1]
+    return (dx * nx + dy * ny) / np.sqrt(dx * dx + dy * dy)
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _against(vertices, next_vertex, previous_vertex, vertex, edge):
+    """Vertex against edge: (may touch, outward normal x, y, gap, distance along, length)."""
+    a, b = edge, next_vertex[edge]
+    dx, dy = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1]
+    length = np.sqrt(dx * dx + dy * dy)
+    tx, ty = dx / length, dy / length
+    px, py = vertices[vertex, 0] - vertices[a, 0], vertices[vertex, 1] - vertices[a, 1]
+    feasible = (
+        _dot_to(vertices, vertex, next_vertex[vertex], ty, -tx) >= -_ANGLE
+        and _dot_to(vertices, vertex, previous_vertex[vertex], ty, -tx) >= -_ANGLE
+    )
+    return feasible, ty, -tx, px * ty - py * tx, px * tx + py * ty, length
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _known(keys, key):
+    """True when ``key`` is in the sorted ``keys``."""
+    at = np.searchsorted(keys, key)
+    return at < keys.shape[0] and keys[at] == key
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _add(table, count, first, vertex, edge):
+    """Row of (vertex, edge) among the rows from ``first`` on, appended if new: (table, count, row)."""
+    for row in range(first, count):
+        if table[row, 0] == vertex and table[row, 1] == edge:
+            return table, count, row
+    if count == table.shape[0]:
+        wider = np.full((2 * count, 4), -1, np.int64)
+        wider[:count] = table
+        table = wider
+    table[count, 0], table[count, 1], table[count, 2], table[count, 3] = vertex, edge, -1, -1
+    return table, count + 1, count
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _join_partners(table, row, other):
+    for column in (2, 3):
+        if table[row, column] == other:
+            return
+        if table[row, column] < 0:
+            table[row, column] = other
+            return
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, window, old_keys):
+    """(n_contacts, 4): vertex, edge, and up to two partner rows (−1: none), for all pairs nearer than ``window`` (m).
+
+    ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
+    representations of a corner on a corner is kept, so that contacts do not change names on round-off.
+    """
+    n_blocks = vertex_start.shape[0] - 1
+    n_vertices = vertices.shape[0]
+    box = np.empty((n_blocks, 4))
+    convex = np.empty(n_vertices, np.bool_)
+    for b in range(n_blocks):
+        box[b, 0] = box[b, 1] = np.inf
+        box[b, 2] = box[b, 3] = -np.inf
+        for i in range(vertex_start[b], vertex_start[b + 1]):
+            x, y = vertices[i, 0], vertices[i, 1]
+            box[b, 0], box[b, 1] = min(box[b, 0], x), min(box[b, 1], y)
+            box[b, 2], box[b, 3] = max(box[b, 2], x), max(box[b, 3], y)
+            k, j = previous_vertex[i], next_vertex[i]
+            ax, ay = x - vertices[k, 0], y - vertices[k, 1]
+            bx, by = vertices[j, 0] - x, vertices[j, 1] - y
+            # A flat vertex counts as convex: faces that were split at a node still touch there.
+            convex[i] = ax * by - ay * bx >= -1e-9 * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
+    order = np.argsort(box[:, 0])
+    table = np.full((64, 4), -1, np.int64)
+    count = 0
+    pick_vertex = np.empty(4, np.int64)
+    pick_edge = np.empty(4, np.int64)
+    pick = np.empty((4, 5))  # normal that pushes block i (2), gap, distance outside the edge, edge length
+    for p in range(n_blocks):
+        for q in range(p + 1, n_blocks):
+            a, b = min(order[p], order[q]), max(order[p], order[q])
+            if box[order[q], 0] > box[order[p], 2] + window:
+                break
+            if fixed[a] and fixed[b]:
+                continue
+            if box[a, 1] > box[b, 3] + window or box[b, 1] > box[a, 3] + window:
+                continue
+            first = count
+            # The strip both boxes share, widened: nothing outside it can be in reach.
+            x_lo, x_hi = max(box[a, 0], box[b, 0]) - window, min(box[a, 2], box[b, 2]) + window
+            y_lo, y_hi = max(box[a, 1], box[b, 1]) - window, min(box[a, 3], box[b, 3]) + window
+            # 1. Corner to corner.
+            for v in range(vertex_start[a], vertex_start[a + 1]):
+                if not convex[v] or not (x_lo <= vertices[v, 0] <= x_hi and y_lo <= vertices[v, 1] <= y_hi):
+                    continue
+                for w in range(vertex_start[b], vertex_start[b + 1]):
+                    dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
+                    if dx * dx + dy * dy > 2.25 * window * window or not convex[w]:
+                        continue
+                    n_lines = 0
+                    for c in range(4):
+                        # Vertices of the later block stand first: at an exact tie they own the contact.
+                        if c < 2:
+                            vertex, edge, sign = w, (v if c == 0 else previous_vertex[v]), -1.0
+                        else:
+                            vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
+                        feasible, nx, ny, gap, along, length = _against(
+                            vertices, next_vertex, previous_vertex, vertex, edge
+                        )
+                        if not feasible:
+                            continue
+                        nx, ny = sign * nx, sign * ny
+                        outside = max(0.0, -along, along - length)
+                        same = -1
+                        for k in range(n_lines):
+                            if pick[k, 0] * nx + pick[k, 1] * ny > 1.0 - _PARALLEL:
+                                same = k
+                        if same >= 0:
+                            near = 1e-9 * max(length, pick[same, 4])
+                            better = outside < pick[same, 3] - near
+                            if abs(outside - pick[same, 3]) <= near:
+                                better = _known(old_keys, vertex * n_vertices + edge) and not _known(
+                                    old_keys, pick_vertex[same] * n_vertices + pick_edge[same]
+                                )
+                            if not better:
+                                continue
+                            k = same
+                        else:
+                            k = n_lines
+                            n_lines += 1
+                        pick_vertex[k], pick_edge[k] = vertex, edge
+                        pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
+                    widest = -np.inf
+                    for k in range(n_lines):
+                        widest = max(widest, pick[k, 2])
+                    if widest > window:
+                        continue
+                    before = -1
+                    for k in range(n_lines):
+                        if pick[k, 2] < -window:
+                            continue
+                        table, count, row = _add(table, count, first, pick_vertex[k], pick_edge[k])
+                        if before >= 0:
+                            _join_partners(table, row, before)
+                            _join_partners(table, before, row)
+                        before = row
+            # 2. Corner to edge, and corner into a re-entrant corner.
+            for role in range(2):
+                i, j = (a, b) if role == 0 else (b, a)
+                for v in range(vertex_start[i], vertex_start[i + 1]):
+                    x, y = vertices[v, 0], vertices[v, 1]
+                    if not convex[v] or not (x_lo <= x <= x_hi and y_lo <= y <= y_hi):
+                        continue
+                    for edge in range(vertex_start[j], vertex_start[j + 1]):
+                        end = next_vertex[edge]
+                        if (
+                            min(vertices[edge, 0], vertices[end, 0]) > x + window
+                            or max(vertices[edge, 0], vertices[end, 0]) < x - window
+                            or min(vertices[edge, 1], vertices[end, 1]) > y + window
+                            or max(vertices[edge, 1], vertices[end, 1]) < y - window
+                        ):
+                            continue
+                        feasible, nx, ny, gap, along, length = _against(
+                            vertices, next_vertex, previous_vertex, v, edge
+                        )
+                        if not feasible or abs(gap) > window or along < -window or along > length + window:
+                            continue
+                        if (along <= window and convex[edge]) or (along >= length - window and convex[end]):
+                            continue  # corner to corner, done above
+                        table, count, _ = _add(table, count, first, v, edge)
+    return table[:count].copy()
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def describe_contacts(table, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order):
+    """Geometry of the rows of `find_contacts` and what they inherit.
+
+    Returns (geometry, mate, parent): geometry (n, 7) = position, normal x, y, gap, tributary length, vertex x, y; mate
+    (n,) the edge of the vertex's own block that faces the touched edge; parent (n,) the row of the last step's contacts
+    whose force and slip it continues, −1 if new.
+    The tributary length is half the overlap of the faces that meet there, 0 for a lone corner.
+    """
+    n, n_vertices = table.shape[0], vertices.shape[0]
+    geometry = np.empty((n, 7))
+    mate = np.empty(n, np.int64)
+    parent = np.full(n, -1, np.int64)
+    taken = np.zeros(old_vertex.shape[0], np.bool_)
+    keys = np.empty(old_vertex.shape[0], np.int64)
+    for k in range(keys.shape[0]):
+        keys[k] = old_vertex[old_order[k]] * n_vertices + old_edge[old_order[k]]
+    for row in range(n):
+        vertex, edge = table[row, 0], table[row, 1]
+        _, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, vertex, edge)
+        geometry[row, 0] = along / length
+        geometry[row, 1], geometry[row, 2], geometry[row, 3] = nx, ny, gap
+        geometry[row, 5], geometry[row, 6] = vertices[vertex, 0], vertices[vertex, 1]
+        tributary, facing = 0.0, np.inf
+        mate[row] = vertex
+        for own in (vertex, previous_vertex[vertex]):
+            head = next_vertex[own]
+            sx, sy = vertices[head, 0] - vertices[own, 0], vertices[head, 1] - vertices[own, 1]
+            own_length = np.sqrt(sx * sx + sy * sy)
+            cosine = (sy * nx - sx * ny) / own_length
+            if cosine < facing:
+                facing = cosine
+                mate[row] = own
+            for turn in range(3):
+                # A corner on a flat node faces the edges on both sides of that node.
+                face = edge
+                if turn == 1:
+                    if along > 1e-6 * length:
+                        continue
+                    face = previous_vertex[edge]
+                elif turn == 2:
+                    if along < (1.0 - 1e-6) * length:
+                        continue
+                    face = next_vertex[edge]
+                far = next_vertex[face]
+                tx, ty = vertices[far, 0] - vertices[face, 0], vertices[far, 1] - vertices[face, 1]
+                face_length = np.sqrt(tx * tx + ty * ty)
+                tx, ty = tx / face_length, ty / face_length
+                if (sx * tx + sy * ty) / own_length > -_MATING or -ny * tx + nx * ty < _MATING:
+                    continue
+                s0 = (vertices[own, 0] - vertices[face, 0]) * tx + (vertices[own, 1] - vertices[face, 1]) * ty
+                s1 = (vertices[head, 0] - vertices[face, 0]) * tx + (vertices[head, 1] - vertices[face, 1]) * ty
+                tributary += 0.5 * max(0.0, min(face_length, max(s0, s1)) - max(0.0, min(s0, s1)))
+        geometry[row, 4] = tributary
+        key = vertex * n_vertices + edge
+        at = np.searchsorted(keys, key)
+        if at < keys.shape[0] and keys[at] == key:
+            parent[row] = old_order[at]
+            taken[old_order[at]] = True
+    for row in range(n):
+        if parent[row] >= 0 or keys.shape[0] == 0:
+            continue
+        vertex, edge = table[row, 0], table[row, 1]
+        nx, ny = geometry[row, 1], geometry[row, 2]
+        for corner in (edge, next_vertex[edge]):
+            dx, dy = vertices[vertex, 0] - vertices[corner, 0], vertices[vertex, 1] - vertices[corner, 1]
+            if dx * dx + dy * dy > 2.25 * window * window:
+                continue
+            for c in range(4):
+                # The same meeting under another name: the next edge round the corner, or the roles exchanged.
+                if c == 0:
+                    key, sign = vertex * n_vertices + corner, 1.0
+                elif c == 1:
+                    key, sign = vertex * n_vertices + previous_vertex[corner], 1.0
+                elif c == 2:
+                    key, sign = corner * n_vertices + vertex, -1.0
+                else:
+                    key, sign = corner * n_vertices + previous_vertex[vertex], -1.0
+                at = np.searchsorted(keys, key)
+                if at == keys.shape[0] or keys[at] != key or parent[row] >= 0:
+                    continue
+                old = old_order[at]
+                if not taken[old] and sign * (old_normal[old, 0] * nx + old_normal[old, 1] * ny) > 0.99:
+                    parent[row] = old
+                    taken[old] = True
+    return geometry, mate, parent

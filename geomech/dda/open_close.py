@@ -1,0 +1,190 @@
+"""Open–close iterations: contact states that agree with the motion they produce.
+
+A set of states makes the step linear; its solution is checked against them. A closed contact must not pull beyond its
+tensile strength, an open one must not penetrate, a sticking one must hold less than its strength μN + cℓ, and a sliding
+one must slide against its friction. Every contact that fails is switched and the step solved again. If a combination of
+states returns, only the worst half of the violations is switched, and if it still returns, only the first (the
+least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..model import OPEN, SLIP, STICK
+from . import assembly
+from .contact_springs import Springs
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`."""
+
+    unknowns: np.ndarray
+    state: np.ndarray
+    direction: np.ndarray
+    bonded: np.ndarray
+    normal_force: np.ndarray
+    shear_force: np.ndarray
+    gap: np.ndarray
+    sliding: np.ndarray
+    iterations: int
+
+
+class Unsettled(Exception):
+    """The open–close iterations found no consistent states; ``contact`` is the row that still disagrees (or −1)."""
+
+    def __init__(self, reason: str, contact: int = -1) -> None:
+        super().__init__(reason)
+        self.contact = contact
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _move(unknowns, block, other, order, vectors, c, k):
+    total = 0.0
+    i, j = order[block[c]], order[other[c]]
+    if i >= 0:
+        for a in range(6):
+            total += vectors[c, k, a] * unknowns[6 * i + a]
+    if j >= 0:
+        for a in range(6):
+            total += vectors[c, k, 6 + a] * unknowns[6 * j + a]
+    return total
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def check_states(unknowns, block, other, order, vectors, partner, state, direction, bonded, gap0, normal, shear,
+                 friction, cohesion, tension, shear0, slack):
+    """Forces of the present states and the states they call for.
+
+    Returns (forces (n, 4): N, S, new gap, sliding in the step; new state; new direction; new bonded; violation (n,) N, 0
+    where the state stands). ``slack`` (m) is the round-off of coordinates: gaps and slips below it decide nothing.
+    """
+    n = block.shape[0]
+    forces = np.zeros((n, 4))
+    new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
+    violation = np.zeros(n)
+    for c in range(n):
+        forces[c, 2] = gap0[c] + _move(unknowns, block, other, order, vectors, c, 0)
+        forces[c, 3] = _move(unknowns, block, other, order, vectors, c, 1)
+        if state[c] != OPEN:
+            forces[c, 0] = -normal[c] * forces[c, 2]
+            if state[c] == STICK:
+                forces[c, 1] = shear0[c] - shear[c] * forces[c, 3]
+            else:
+                forces[c, 1] = direction[c] * friction[c] * forces[c, 0]
+    for c in range(n):
+        gap, slide = forces[c, 2], forces[c, 3]
+        if state[c] == OPEN:
+            if gap >= -slack:
+                continue
+            inside = True
+            for k in range(2):
+                p = partner[c, k]
+                # Corners overlap only where both lines are crossed; the lesser penetration, or the first of equals, acts.
+                if p >= 0 and (
+                    forces[p, 2] >= -slack or state[p] != OPEN or forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
+                ):
+                    inside = False
+            if inside:
+                violation[c] = -normal[c] * gap
+                if friction[c] == 0.0 and bonded[c] == 0:
+                    new_state[c], new_direction[c] = SLIP, 0.0
+                else:
+                    new_state[c] = STICK
+            continue
+        pull = tension[c] if bonded[c] else 0.0
+        out = False
+        for k in range(2):
+            p = partner[c, k]
+            out = out or (p >= 0 and forces[p, 2] > slack and gap < 0.0)
+        if -forces[c, 0] > pull * (1.0 + 1e-9) + normal[c] * slack or out:
+            new_state[c], new_bonded[c] = OPEN, 0
+            violation[c] = normal[c] * abs(gap)
+        elif state[c] == STICK:
+            strength = max(0.0, friction[c] * forces[c, 0] + (cohesion[c] if bonded[c] else 0.0))
+            excess = abs(forces[c, 1]) - strength
+            if excess > 1e-9 * strength + shear[c] * slack:
+                new_state[c], new_bonded[c] = SLIP, 0
+                new_direction[c] = np.sign(forces[c, 1])
+                violation[c] = excess
+        elif friction[c] > 0.0 and direction[c] * slide > slack:
+            new_state[c] = STICK
+            violation[c] = shear[c] * abs(slide)
+    return forces, new_state, new_direction, new_bonded, violation
+
+
+def settle(
+    pattern: assembly.Pattern,
+    matrix: np.ndarray,
+    right: np.ndarray,
+    *,
+    block: np.ndarray,
+    other: np.ndarray,
+    vectors: np.ndarray,
+    partner: np.ndarray,
+    gap: np.ndarray,
+    springs: Springs,
+    state: np.ndarray,
+    direction: np.ndarray,
+    bonded: np.ndarray,
+    shear_force: np.ndarray,
+    slack: float,
+    max_iterations: int,
+) -> Settled:
+    """Iterate from the given states to consistent ones. Raises `Unsettled` when ``max_iterations`` do not suffice."""
+    data = np.empty(pattern.size)
+    side = np.empty(6 * pattern.n)
+    seen: set[bytes] = set()
+    patience = 0
+    worst = -1
+    for iteration in range(1, max_iterations + 1):
+        symmetric = assembly.assemble_contacts(
+            data, side, matrix, right, pattern.stride, pattern.diagonal, pattern.upper, pattern.lower, block, other,
+            pattern.order, vectors, state, direction, gap, springs.normal, springs.shear, springs.friction, shear_force,
+        )  # fmt: skip
+        try:
+            unknowns = assembly.solve(pattern, data, side, symmetric)
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        if not np.isfinite(unknowns).all():
+            raise Unsettled("the step's matrix is singular")
+        forces, new_state, new_direction, new_bonded, violation = check_states(
+            unknowns, block, other, pattern.order, vectors, partner, state, direction, bonded, gap, springs.normal,
+            springs.shear, springs.friction, springs.cohesion, springs.tension, shear_force, slack,
+        )  # fmt: skip
+        wrong = violation > 0
+        if not wrong.any():
+            return Settled(
+                unknowns=unknowns.reshape(-1, 6),
+                state=state,
+                direction=direction,
+                bonded=bonded,
+                normal_force=forces[:, 0],
+                shear_force=forces[:, 1],
+                gap=forces[:, 2],
+                sliding=forces[:, 3],
+                iterations=iteration,
+            )
+        worst = int(violation.argmax())
+        mark = state.tobytes() + direction.tobytes() + bonded.tobytes()
+        if mark in seen and patience < 2:
+            patience += 1
+            seen.clear()
+        seen.add(mark)
+        if patience == 1:
+            wrong &= violation >= 0.5 * violation[worst]
+        elif patience == 2:
+            wrong[int(wrong.argmax()) + 1 :] = False
+        state = np.where(wrong, new_state, state)
+        direction = np.where(wrong, new_direction, direction)
+        bonded = np.where(wrong, new_bonded, bonded)
+    name = ("open", "sticking", "sliding")
+    raise Unsettled(
+        f"contact states did not settle in {max_iterations} open-close iterations; a contact that was {name[state[worst]]} "
+        "still disagrees with its motion",
+        worst,
+    )

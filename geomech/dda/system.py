@@ -1,0 +1,364 @@
+"""A system of blocks in contact, and the step that moves it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
+from . import assembly
+from .basis import advance
+from .contact_search import describe_contacts, find_contacts
+from .contact_springs import PENALTY_RATIO, JointTable, contact_springs
+from .loads import AppliedForces, LoadMap, body_forces, generalised
+from .moments import block_moments
+from .open_close import Settled, Unsettled, settle
+from .step import CrackResponse, NotConverged, StepResult
+
+log = logging.getLogger(__name__)
+
+#: Contacts are sought within this many times the largest displacement of a step: two blocks may approach each other.
+_WINDOW = 2.2
+#: No step moves a vertex by more than this part of the smallest block's size, √area, whatever the settings allow.
+_BLOCK_SHARE = 0.1
+#: Gaps below this many times the largest coordinate are round-off and decide nothing.
+_SLACK = 1e-14
+#: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
+_TOUCH = 1e-7
+_UNKNOWN = -2
+_NEVER = -1
+
+
+class BlockSystem:
+    """Blocks that move, deform and touch: first-order discontinuous deformation analysis (Shi 1988).
+
+    ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
+    means that such edges do not touch; without it the first law holds everywhere. Contact springs are
+    ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default 40 times the stiffer block's E', both equal.
+
+    Raises ValueError when materials or joints are missing or a block has no area.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        materials: Sequence[Material],
+        joints: Sequence[JointLaw] = (),
+        joint_index: Callable[[str, str], int | None] | None = None,
+        settings: DdaSettings | None = None,
+    ) -> None:
+        if blocks.n_blocks and int(np.max(blocks.material)) >= len(materials):
+            raise ValueError(f"a block names material {int(np.max(blocks.material))}, but there are {len(materials)}")
+        self.blocks = blocks
+        self.materials = tuple(materials)
+        self.joints = tuple(joints) or (JointLaw("frictionless"),)
+        self.settings = settings or DdaSettings()
+        self._joint_index = joint_index or (lambda edge_name, other_name: 0)
+        self._table = JointTable.of(self.joints)
+        self._load_map = LoadMap(blocks)
+        self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
+        self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
+
+        of = np.asarray(blocks.material, dtype=int)
+        self.density = np.array([m.density for m in self.materials])[of]
+        self._stiffness = np.ascontiguousarray(np.array([m.stiffness() for m in self.materials])[of])
+        self._compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
+        self._modulus = np.array([m.plane_modulus for m in self.materials])[of]
+        self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
+        self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
+        self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
+        self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
+        self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
+        self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
+        self._no_compliance = np.zeros((blocks.n_blocks, 3, 3))
+        self._no_offset = np.zeros((blocks.n_blocks, 3))
+        self._sparse: tuple[bytes, assembly.Pattern] | None = None
+
+        vertices = blocks.vertices
+        areas = blocks.areas()
+        if (areas <= 0).any():
+            raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
+        self._size = float(np.ptp(vertices, axis=0).max())
+        self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
+        self._slack = _SLACK * float(np.abs(vertices).max())
+        self._limit = min(
+            self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
+        )
+
+    def step(
+        self, state: State, loads: Loads, dt: float | None = None, crack: CrackResponse | None = None
+    ) -> StepResult:
+        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the end of the step.
+
+        A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun again
+        from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
+        ``settings.max_step_cuts`` cuts.
+        """
+        dt = self.settings.time_step if dt is None else float(dt)
+        if not dt > 0:
+            raise ValueError(f"a time step must be positive, got {dt!r} s")
+        vertices = np.ascontiguousarray(state.vertices)
+        carried = self.settings.dynamic_factor * state.velocity
+        carried[self._fixed] = 0.0
+        moments = block_moments(vertices, self._next, self._start)
+        limit = self._limit
+        dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
+        found = self._search(state, vertices, _WINDOW * limit)
+        reason, before = "", np.inf
+        cuts = 0
+        while True:
+            try:
+                result, largest = self._attempt(state, vertices, carried, moments, loads, dt, crack, found, cuts)
+            except Unsettled as failure:
+                reason = f"{failure}{self._where(found, failure.contact)}"
+                shorter = 0.5 * dt
+            else:
+                if largest <= 1.0001 * limit:
+                    return result
+                reason = f"a vertex moves {largest:.3g} m, the limit is {limit:.3g} m"
+                if largest > 0.9 * before:
+                    # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
+                    log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
+                    limit = 1.1 * largest
+                    found = self._search(state, vertices, _WINDOW * limit)
+                    continue
+                before = largest
+                shorter = dt * min(0.8, max(0.05, 0.95 * limit / largest))
+            cuts += 1
+            if cuts > self.settings.max_step_cuts:
+                raise NotConverged(
+                    f"the block step at t = {state.time:g} s failed after {cuts - 1} cuts (dt = {dt:.3g} s): {reason}"
+                )
+            log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
+            dt = shorter
+
+    def _foreseen(self, vertices, carried, moments, loads, time, dt, limit) -> float:
+        """``dt`` shortened where the velocity alone would carry a vertex beyond the limit."""
+        if not carried.any():
+            return dt
+        v = carried[self._owner]
+        x, y = vertices[:, 0] - moments[self._owner, 1], vertices[:, 1] - moments[self._owner, 2]
+        vx = v[:, 0] - v[:, 2] * y + v[:, 3] * x + 0.5 * v[:, 5] * y
+        vy = v[:, 1] + v[:, 2] * x + v[:, 4] * y + 0.5 * v[:, 5] * x
+        speed = float(np.sqrt(np.max(vx * vx + vy * vy)))
+        g = float(np.hypot(*loads.gravity.at(time + dt)))
+        # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
+        return min(dt, 2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit)))
+
+    def _search(self, state: State, vertices: np.ndarray, window: float) -> dict[str, np.ndarray]:
+        old = state.contacts
+        keys = old["vertex"] * len(vertices) + old["edge"]
+        rank = np.argsort(keys, kind="stable")
+        table = find_contacts(vertices, self._next, self._previous, self._start, self._fixed, window, keys[rank])
+        geometry, mate, parent = describe_contacts(
+            table, vertices, self._next, self._previous, window,
+            np.ascontiguousarray(old["vertex"]), np.ascontiguousarray(old["edge"]),
+            np.ascontiguousarray(old["normal"]), rank,
+        )  # fmt: skip
+        law = self._laws(table[:, 1], mate)
+        partner = table[:, 2:]
+        if (law == _NEVER).any():
+            keep = law != _NEVER
+            renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
+            table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
+            partner = renumber[table[:, 2:]]
+        block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
+        stiffest = PENALTY_RATIO * np.maximum(self._modulus[block], self._modulus[other])
+        kn, ks = self.settings.normal_penalty, self.settings.shear_penalty
+        normal_penalty = stiffest if kn is None else np.full(len(block), float(kn))
+        springs = contact_springs(
+            self._table, law, geometry[:, 4], normal_penalty, normal_penalty if ks is None else np.full(len(block), float(ks))
+        )
+        contact_state = np.zeros(len(block), np.int64)
+        shear, slip = np.zeros(len(block)), np.zeros(len(block))
+        bonded = np.zeros(len(block), np.int64)
+        known = parent >= 0
+        if known.any():
+            rows = old[parent[known]]
+            contact_state[known], shear[known], slip[known] = rows["state"], rows["shear_force"], rows["slip"]
+            bonded[known] = rows["bonded"]
+        # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
+        fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
+        if len(old) == 0 and state.time == 0.0:
+            bonded[fresh & (geometry[:, 4] > 0)] = 1
+        bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
+        contact_state[fresh & (partner < 0).all(axis=1)] = STICK
+        direction = np.where(contact_state == SLIP, np.sign(shear), 0.0)
+        rough = (springs.friction > 0) | (bonded > 0)
+        contact_state[(contact_state == SLIP) & rough & (direction == 0)] = STICK
+        contact_state[(contact_state == STICK) & ~rough] = SLIP
+        return {
+            "vertex": table[:, 0].copy(), "edge": table[:, 1].copy(), "partner": np.ascontiguousarray(partner),
+            "block": block, "other": other, "geometry": np.ascontiguousarray(geometry), "law": law, "springs": springs,
+            "state": contact_state, "direction": direction, "bonded": bonded, "shear": shear, "slip": slip,
+        }  # fmt: skip
+
+    def _laws(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
+        a, b = self._edge_name[edge], self._edge_name[mate]
+        law = self._law_of[a, b]
+        if (law == _UNKNOWN).any():
+            names = self.blocks.edge_names
+            for i, j in {(int(i), int(j)) for i, j in zip(a, b, strict=True)}:
+                index = self._joint_index(names[i], names[j])
+                if index is not None and not 0 <= index < len(self.joints):
+                    raise ValueError(f"edges {names[i]!r} and {names[j]!r} have joint law {index}, out of {len(self.joints)}")
+                self._law_of[i, j] = _NEVER if index is None else index
+            law = self._law_of[a, b]
+        return law
+
+    def _pattern(self, block: np.ndarray, other: np.ndarray) -> assembly.Pattern:
+        if int(self._free.max()) + 1 <= assembly.DENSE_BLOCKS:
+            return assembly.dense_pattern(self._free, block, other)
+        key = block.tobytes() + other.tobytes()
+        if self._sparse is None or self._sparse[0] != key:
+            self._sparse = key, assembly.sparse_pattern(self._free, block, other)
+        return self._sparse[1]
+
+    def _attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts) -> tuple[StepResult, float]:
+        time = state.time + dt
+        gravity = loads.gravity.at(time)
+        points, edges = self._load_map.rows(loads, time, vertices)
+        centroid = np.ascontiguousarray(moments[:, 1:3])
+        load = generalised(points, edges, centroid)
+        given = crack is not None
+        compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
+        offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
+        stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
+        geometry, springs = found["geometry"], found["springs"]
+        n_free = int((~self._fixed).sum())
+        pattern = self._pattern(found["block"], found["other"]) if n_free else None
+        order = self._free if pattern is None else pattern.order
+        matrix, right, tangent, stress0 = assembly.assemble_blocks(
+            order, moments, self.density, self._stiffness, self._compliance, carried, stress, crack_strain, given,
+            compliance, offset, gravity, load, dt, n_free,
+        )  # fmt: skip
+        vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
+        n_contacts = len(found["block"])
+        if n_free:
+            settled = settle(
+                pattern, matrix, right, block=found["block"], other=found["other"], vectors=vectors,
+                partner=found["partner"], gap=np.ascontiguousarray(geometry[:, 3]), springs=springs, state=found["state"],
+                direction=found["direction"], bonded=found["bonded"], shear_force=found["shear"], slack=self._slack,
+                max_iterations=self.settings.max_open_close_iterations,
+            )  # fmt: skip
+        else:
+            zero = np.zeros(n_contacts)
+            settled = Settled(np.zeros((0, 6)), found["state"], zero, found["bonded"], zero, zero, zero, zero, 0)
+
+        increment = np.zeros((self.blocks.n_blocks, 6))
+        free = np.flatnonzero(~self._fixed)
+        increment[free] = settled.unknowns[order[free]]
+        increment[:, 2:] /= np.sqrt(moments[:, :1])
+        static = self.settings.dynamic_factor == 0.0
+        new_vertices, velocity, new_stress, new_crack, largest = advance(
+            increment, carried, dt, static, vertices, self._start, moments, tangent, stress0, compliance, offset, given,
+            crack_strain,
+        )  # fmt: skip
+        acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
+
+        rows = np.zeros(n_contacts, CONTACT)
+        for name in ("vertex", "edge", "block", "other", "law"):
+            rows[name] = found[name]
+        rows["state"], rows["bonded"] = settled.state, settled.bonded
+        rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
+        rows["gap"], rows["length"] = settled.gap, geometry[:, 4]
+        rows["normal_force"], rows["shear_force"] = settled.normal_force, settled.shear_force
+        rows["slip"] = found["slip"] + np.where(settled.state == SLIP, settled.sliding, 0.0)
+
+        body, gradient = body_forces(self.density, gravity, acceleration, carried[:, 2], self._fixed)
+        forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), body, gradient)
+        new_state = State(
+            time=time,
+            vertices=new_vertices,
+            velocity=velocity,
+            stress=new_stress,
+            rotation=state.rotation + increment[:, 2],
+            crack_strain=new_crack,
+            contacts=self._on(new_vertices, rows),
+        )
+        closed = settled.state != OPEN
+        statistics = {
+            "open_close_iterations": settled.iterations,
+            "dt": dt,
+            "step_cuts": cuts,
+            "kinetic_energy": self._kinetic_energy(velocity, moments),
+            "elastic_energy": 0.5
+            * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self._compliance, new_stress))),
+            "contact_energy": 0.5
+            * float(
+                np.sum(settled.normal_force[closed] ** 2 / springs.normal[closed])
+                + np.sum(settled.shear_force[closed] ** 2 / springs.shear[closed])
+            ),
+            "worst_penetration": float(max(0.0, -settled.gap.min())) if n_contacts else 0.0,
+            "max_displacement_ratio": largest / self.half_height,
+            "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),
+        }
+        return StepResult(new_state, dt, rows, forces, acceleration, statistics), largest
+
+    def _on(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """The contact rows carried to the new geometry (gap and forces as they are)."""
+        rows = rows.copy()
+        start, point = vertices[rows["edge"]], vertices[rows["vertex"]]
+        along = vertices[self._next[rows["edge"]]] - start
+        length = np.hypot(along[:, 0], along[:, 1])
+        rows["point"] = point
+        rows["position"] = np.einsum("ij,ij->i", point - start, along) / length**2
+        rows["normal"] = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
+        return rows
+
+    def _kinetic_energy(self, velocity, moments) -> float:
+        area, xx, yy, xy = moments[:, 0], moments[:, 3], moments[:, 4], moments[:, 5]
+        u, v, r, ex, ey, g = velocity.T
+        # ∫ |u̇|² of the linear field: ẋ = ex x + (g/2 − r) y, ẏ = (g/2 + r) x + ey y.
+        p, q = 0.5 * g - r, 0.5 * g + r
+        field = area * (u * u + v * v) + (ex * ex + q * q) * xx + (p * p + ey * ey) * yy + 2 * (ex * p + q * ey) * xy
+        return 0.5 * float(np.sum(np.where(self._fixed, 0.0, self.density * field)))
+
+    def _where(self, found: dict[str, np.ndarray], contact: int) -> str:
+        if contact < 0:
+            return ""
+        names = self.blocks.names or tuple(f"block {b}" for b in range(self.blocks.n_blocks))
+        x, y = found["geometry"][contact, 5:7]
+        a, b = names[found["block"][contact]], names[found["other"][contact]]
+        return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
+
+
+def _unbalanced(matrix, right, vectors, found, order, settled: Settled) -> float:
+    """Largest residual of the equations of motion, contact forces as reported, over the largest force among them."""
+    if len(right) == 0:
+        return 0.0
+    own = np.einsum("bij,bj->bi", matrix, settled.unknowns)
+    residual = np.vstack([right - own, np.zeros((1, 6))])
+    scale = max(float(np.abs(right).max()), float(np.abs(own).max()))
+    if len(found["block"]):
+        push = settled.normal_force[:, None] * vectors[:, 0] + settled.shear_force[:, None] * vectors[:, 1]
+        # Fixed blocks have order −1: their share lands in the spare last row.
+        np.add.at(residual, order[found["block"]], push[:, :6])
+        np.add.at(residual, order[found["other"]], push[:, 6:])
+        scale = max(scale, float(np.abs(push).max()))
+    return float(np.abs(residual[:-1]).max()) / scale if scale > 0 else 0.0
+
+
+def run(
+    blocks: Blocks,
+    materials: Sequence[Material],
+    joints: Sequence[JointLaw],
+    loads: Loads,
+    settings: DdaSettings,
+    end_time: float,
+    *,
+    joint_index: Callable[[str, str], int | None] | None = None,
+    state: State | None = None,
+) -> Iterator[State]:
+    """States of a block system from rest (or from ``state``) until ``end_time``, one a step.
+
+    ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
+    """
+    system = BlockSystem(blocks, materials, joints, joint_index, settings)
+    state = State.at_rest(blocks) if state is None else state
+    yield state
+    while state.time < end_time * (1 - 1e-12):
+        state = system.step(state, loads, min(settings.time_step, end_time - state.time)).state
+        yield state
