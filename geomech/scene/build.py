@@ -1,0 +1,174 @@
+"""A checked scene as the problem that the solvers take."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ..model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    DdmSettings,
+    EdgeTraction,
+    GrowthSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    PointLoad,
+    Problem,
+    RunSettings,
+)
+from .checks import Check, carrier, contact_names, gauge_carriers, joint_names, material_of
+from .drawing import Drawing
+from .tables import ForceTable, SceneTables, TractionTable
+
+
+def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Problem:
+    """The `Problem` of a scene without faults."""
+    names = list(tables.materials)
+    blocks = replace(
+        drawing.blocks,
+        material=np.array([names.index(material_of(tables, zone)) for zone in drawing.zones]),
+        fixed=np.array([zone in tables.zones and tables.zones[zone].fixed for zone in drawing.zones]),
+    )
+    cracks = replace(drawing.cracks, aperture=_apertures(tables, drawing.cracks))
+    joints, joint_of = _joints(tables, drawing)
+    carriers = gauge_carriers(check)
+    return Problem(
+        title=tables.title,
+        blocks=blocks,
+        cracks=cracks,
+        materials=tuple(
+            Material(
+                name=name,
+                youngs_modulus=m.youngs_modulus_pa,
+                poissons_ratio=m.poissons_ratio,
+                density=m.density_kg_m3,
+                k_ic=m.k_ic_pa_sqrt_m if m.k_ic_pa_sqrt_m is not None and tables.growth.enabled else math.inf,
+                plane=m.plane,
+            )
+            for name, m in tables.materials.items()
+        ),
+        joints=joints,
+        joint_of=joint_of,
+        loads=_loads(tables, check),
+        dda=_dda(tables),
+        ddm=DdmSettings(**tables.ddm.model_dump()),
+        growth=_growth(tables, cracks),
+        run=RunSettings(
+            end_time=tables.run.end_time_s, stop_at=tables.run.stop_at, boundary_stress=tables.run.boundary_stress
+        ),
+        load_edge=_leading_edge(tables),
+        gauge=None if carriers is None else ((carriers[0], tables.gauge.start), (carriers[1], tables.gauge.to)),
+        monitors={
+            m.name: (carrier(check, ("monitors", k, "at"), "monitor", m.at, m.zone), m.at)
+            for k, m in enumerate(tables.monitors)
+        },
+    )
+
+
+def _apertures(tables: SceneTables, cracks: Cracks) -> np.ndarray:
+    def metres(name: str) -> float:
+        entry = tables.cracks.get(name, tables.cracks.get("default"))
+        aperture = "closed" if entry is None else entry.aperture
+        return {"closed": 0.0, "slot": math.inf}[aperture] if isinstance(aperture, str) else float(aperture)
+
+    return np.array([metres(name) for name in cracks.names])[cracks.crack] if cracks.n_segments else np.empty(0)
+
+
+def _joints(tables: SceneTables, drawing: Drawing) -> tuple[tuple[JointLaw, ...], dict[tuple[str, str], int]]:
+    """Laws, the default first, and which contacts each rules."""
+    order = sorted(tables.joints, key=lambda name: name != "default")
+    laws = [JointLaw("default")] if "default" not in tables.joints else []
+    joint_of: dict[tuple[str, str], int] = {}
+    known = contact_names(drawing)
+    for name in order:
+        joint = tables.joints[name]
+        for pair in [("", found) for found in joint_names(joint.edges, known)] + [
+            tuple(sorted(pair)) for pair in joint.between
+        ]:
+            joint_of[pair] = len(laws)
+        laws.append(
+            JointLaw(
+                name,
+                friction_angle=math.radians(joint.friction_angle_deg),
+                cohesion=joint.cohesion_pa,
+                tensile_strength=joint.tensile_strength_pa,
+                normal_stiffness=joint.normal_stiffness_pa_per_m,
+                shear_stiffness=joint.shear_stiffness_pa_per_m,
+            )
+        )
+    return tuple(laws), joint_of
+
+
+def _loads(tables: SceneTables, check: Check) -> Loads:
+    gravity = History.constant(tables.loads.gravity_m_s2)
+    if tables.loads.gravity_ramp_s > 0:
+        gravity = History(
+            np.array([0.0, tables.loads.gravity_ramp_s]), np.array([[0.0, 0.0], tables.loads.gravity_m_s2])
+        )
+    return Loads(
+        gravity=gravity,
+        edge_tractions=tuple(EdgeTraction(t.edge, traction_history(t)) for t in tables.loads.tractions),
+        point_loads=tuple(
+            PointLoad(carrier(check, ("loads", "forces", k, "at"), "force", f.at, f.zone), f.at, force_history(f))
+            for k, f in enumerate(tables.loads.forces)
+        ),
+    )
+
+
+def traction_history(table: TractionTable) -> History:
+    return _history(table, table.value_pa, table.rate_pa_per_s, table.values_pa)
+
+
+def force_history(table: ForceTable) -> History:
+    return _history(table, table.value_n_per_m, table.rate_n_per_m_s, table.values_n_per_m)
+
+
+def _history(table, value, rate, values) -> History:
+    if value is not None:
+        return History.constant(value)
+    if rate is not None:
+        return History.ramp(rate, table.start_s)
+    return History(np.array(table.times_s, dtype=float), np.array(values, dtype=float))
+
+
+def _dda(tables: SceneTables) -> DdaSettings:
+    d = tables.dda
+    return DdaSettings(
+        time_step=d.time_step_s,
+        dynamic_factor=d.dynamic_factor,
+        max_displacement_ratio=d.max_displacement_ratio,
+        normal_penalty=d.normal_penalty_pa,
+        shear_penalty=d.shear_penalty_pa,
+        max_open_close_iterations=d.max_open_close_iterations,
+        max_step_cuts=d.max_step_cuts,
+    )
+
+
+def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
+    g = tables.growth
+    increment = g.increment_m
+    if increment is None:
+        # A tenth of the shortest crack resolves the turn of a wing crack in its first crack length.
+        lengths = np.bincount(cracks.crack, cracks.lengths) if cracks.n_segments else np.array([10e-3])
+        increment = 0.1 * float(lengths[lengths > 0].min())
+        if g.min_increment_m is not None:
+            increment = max(increment, g.min_increment_m)
+    return GrowthSettings(
+        criterion=g.criterion,
+        increment=increment,
+        min_increment=0.1 * increment if g.min_increment_m is None else g.min_increment_m,
+        join_distance=g.join_distance,
+        max_passes=g.max_passes,
+    )
+
+
+def _leading_edge(tables: SceneTables) -> str:
+    if tables.loads.leading_edge is not None:
+        return tables.loads.leading_edge
+    return tables.loads.tractions[0].edge if tables.loads.tractions else ""

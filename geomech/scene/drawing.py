@@ -1,0 +1,93 @@
+"""The geometry of a scene as blocks and cracks, from a Gmsh model or from the file itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from ..model import Blocks, Cracks
+from ..shapes import EdgeLine, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
+from .errors import Fault
+from .locator import Path
+from .tables import CrackShape, Geometry
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Blocks and cracks before materials and apertures are given. ``zones`` (n_blocks,) is the
+    name of the zone each block belongs to, ``cracks_drawn`` the names of the cracks, ``parameters`` those of a Gmsh
+    model, as used. ``blocks`` is None where the drawing cannot be assembled."""
+
+    zones: tuple[str, ...]
+    cracks_drawn: tuple[str, ...]
+    blocks: Blocks | None
+    cracks: Cracks | None
+    parameters: dict[str, float | str] = field(default_factory=dict)
+
+
+def draw(
+    geometry: Geometry,
+    folder: FilePath,
+    place: Callable[[Path], str],
+    faults: list[Fault],
+    warnings: list[Fault],
+) -> Drawing | None:
+    """Read or make the drawing; what is wrong goes to ``faults``. None where not even its names are known."""
+    parameters: dict[str, float | str] = {}
+    if geometry.model is not None:
+        # Imported here: a scene drawn in TOML needs no Gmsh.
+        from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
+
+        source = ("geometry", "model")
+        try:
+            read = read_gmsh_model(folder / geometry.model, geometry.parameters, geometry.chord_tolerance_m)
+        except GmshModelError as error:
+            at = ("geometry", "parameters", error.parameter) if error.parameter is not None else source
+            faults.append(Fault(place(at), error.message, error.way_out))
+            return None
+        except GmshUnavailable as error:
+            faults.append(Fault(place(source), str(error), "or draw the geometry in the scene, [[geometry.zones]]"))
+            return None
+        warnings += [Fault(place(source), message, way_out) for message, way_out in read.warnings]
+        parameters = {name: entry.value for name, entry in read.parameters.items()}
+        zones, traces, edges = read.zones, read.traces, ()
+    else:
+        zones = [Zone(z.name, _loops(z)) for z in geometry.zones]
+        traces = [Trace(c.name, (_line(c),)) for c in geometry.cracks]
+        edges = [EdgeLine(e.name, *e.line, e.zone) for e in geometry.edges]
+        seen: dict[str, int] = {}
+        for k, trace in enumerate(traces):
+            if seen.setdefault(trace.name, k) != k:
+                faults.append(
+                    Fault(
+                        place(("geometry", "cracks", k, "name")),
+                        f"there are two cracks called {trace.name!r}",
+                        "give each crack a name of its own",
+                    )
+                )
+    names = tuple(zone.name for zone in zones)
+    drawn = tuple(trace.name for trace in traces)
+    try:
+        blocks, cracks = assemble(zones, traces, edges, geometry.tolerance_m)
+    except ShapeError as error:
+        for flaw in error.flaws:
+            at = ("geometry", "model") if geometry.model is not None else ("geometry", flaw.part, flaw.index)
+            message = flaw.message if geometry.model is None else f"{FilePath(geometry.model).name}: {flaw.message}"
+            faults.append(Fault(place(at), message, flaw.way_out))
+        return Drawing(names, drawn, None, None, parameters)
+    return Drawing(names, drawn, blocks, cracks, parameters)
+
+
+def _loops(zone) -> tuple[np.ndarray, ...]:
+    outline = rectangle(*zone.rectangle) if zone.rectangle is not None else np.array(zone.polygon, dtype=float)
+    return tuple(loop.reshape(-1, 2) for loop in (outline, *(np.array(hole, dtype=float) for hole in zone.holes)))
+
+
+def _line(crack: CrackShape) -> np.ndarray:
+    if crack.points is not None:
+        return np.array(crack.points, dtype=float).reshape(-1, 2)
+    return straight_crack(crack.centre, crack.length_m, math.radians(crack.angle_deg))

@@ -1,0 +1,146 @@
+"""The keys of a scene: what each is, listed for people and looked up for error messages."""
+
+from __future__ import annotations
+
+import types
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from .tables import Finite, Four, NotNegative, Pair, Points, Positive, SceneTables
+
+_SHAPES = {
+    Pair: "[x, y]",
+    Four: "[x0, y0, x1, y1]",
+    Points: "[[x, y], …]",
+    Positive: "number > 0",
+    NotNegative: "number ≥ 0",
+    Finite: "number",
+}
+_SIMPLE = {float: "number", int: "whole number", str: "text", bool: "true or false", Any: "any value"}
+
+
+def bare(annotation: Any) -> Any:
+    """``annotation`` without Annotated and without "or None"."""
+    while True:
+        if get_origin(annotation) is Annotated:
+            annotation = get_args(annotation)[0]
+        elif get_origin(annotation) in (Union, types.UnionType) and type(None) in get_args(annotation):
+            (annotation,) = [a for a in get_args(annotation) if a is not type(None)][:1]
+        else:
+            return annotation
+
+
+def kind_of(annotation: Any) -> tuple[str, Any]:
+    """("table", its class), ("map", what its values are), ("list", what its items are) or ("value", the type)."""
+    inner = bare(annotation)
+    if isinstance(inner, type) and issubclass(inner, BaseModel):
+        return "table", inner
+    if get_origin(inner) is dict:
+        return "map", get_args(inner)[1]
+    if get_origin(inner) is tuple and get_args(inner)[-1] is Ellipsis:
+        return "list", get_args(inner)[0]
+    return "value", inner
+
+
+def table_at(path: tuple[str | int, ...]) -> type[BaseModel] | None:
+    """The table class at ``path`` of a scene; None where there is a value or nothing."""
+    kind, what = "table", SceneTables
+    for part in path:
+        if kind == "table":
+            field = field_of(what, part)
+            if field is None:
+                return None
+            kind, what = kind_of(field.annotation)
+        elif kind in ("map", "list"):
+            kind, what = kind_of(what)
+        else:
+            return None
+    return what if kind == "table" else None
+
+
+def keys_of(table: type[BaseModel]) -> list[str]:
+    """The keys of ``table`` as they are written."""
+    return [field.alias or name for name, field in table.model_fields.items()]
+
+
+def field_of(table: type[BaseModel], key: str | int) -> FieldInfo | None:
+    return next((f for name, f in table.model_fields.items() if key in (name, f.alias)), None)
+
+
+def description_at(path: tuple[str | int, ...]) -> str:
+    """What the key at ``path`` (or the nearest one above it that has a description) means."""
+    for n in range(len(path), 0, -1):
+        table = table_at(path[: n - 1])
+        field = field_of(table, path[n - 1]) if table else None
+        if field is not None and field.description:
+            return field.description
+    return ""
+
+
+def expected(annotation: Any) -> str:
+    """What may be written for a key of this type."""
+    if get_origin(annotation) in (Union, types.UnionType):
+        left = [a for a in get_args(annotation) if a is not type(None)]
+        return " or ".join(expected(a) for a in left)
+    for known, text in _SHAPES.items():
+        if annotation == known:
+            return text
+    inner = bare(annotation)
+    for known, text in _SHAPES.items():
+        # Field keeps the metadata of an Annotated type apart, so compare what is left as well.
+        if inner == bare(known) and inner not in _SIMPLE:
+            return text
+    if get_origin(inner) is Literal:
+        return " | ".join(f'"{choice}"' for choice in get_args(inner))
+    if get_origin(inner) is tuple:
+        items = get_args(inner)
+        if items[-1] is Ellipsis:
+            return f"[{expected(items[0])}, …]"
+        return f"[{', '.join(expected(item) for item in items)}]"
+    return _SIMPLE.get(inner, getattr(inner, "__name__", str(inner)))
+
+
+def describe_keys() -> str:
+    """Every key of a scene, one a line: its name, what may be written, its default, what it means."""
+    lines: list[str] = []
+    _describe(SceneTables, "", "", lines)
+    return "\n".join(lines).strip() + "\n"
+
+
+def _describe(table: type[BaseModel], prefix: str, header: str, lines: list[str]) -> None:
+    later = []
+    for name, field in table.model_fields.items():
+        key = field.alias or name
+        kind, what = kind_of(field.annotation)
+        inner_kind, inner = kind_of(what) if kind in ("map", "list") else (kind, what)
+        if inner_kind == "table":
+            path = f"{prefix}{key}"
+            shown = {"table": f"[{path}]", "list": f"[[{path}]]", "map": f"[{path}.NAME]"}[kind]
+            later.append((inner, path + (".NAME." if kind == "map" else "."), shown, field.description))
+            continue
+        if field.is_required():
+            default = "required"
+        elif field.default is None or field.default is PydanticUndefined:
+            default = "unset"
+        else:
+            default = f"default {_written(field.default)}"
+        what = expected(field.annotation) if kind != "map" else "table"
+        lines.append(f"  {key} = {what}  ({default})\n      {field.description}")
+    for inner, path, shown, description in later:
+        lines.append(f"\n{shown}  {description}")
+        _describe(inner, path, shown, lines)
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, tuple):
+        return f"[{', '.join(_written(v) for v in value)}]"
+    if isinstance(value, dict):
+        return "{}"
+    return f"{value:g}"

@@ -1,0 +1,219 @@
+"""Reading a scene: file, variant, changes, checks; everything that is wrong is said at once."""
+
+from __future__ import annotations
+
+import copy
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path as FilePath
+from typing import Any
+
+from ..model import Blocks, Cracks, Problem
+from .build import build_problem
+from .checks import Check, check
+from .drawing import Drawing, draw
+from .errors import Fault, SceneError
+from .keys import describe_keys
+from .locator import Path, dotted, locate
+from .overrides import OverrideError, assign, flattened, parse_override
+from .tables import OutputTable, RenderTable, SceneTables
+from .validation import nearest, validate
+
+#: The file that a pipeline folder holds.
+SCENE_FILE = "scene.toml"
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A scene that has passed every check. ``warnings`` are faults that do not keep it from running."""
+
+    path: FilePath
+    variant: str | None
+    tables: SceneTables
+    drawing: Drawing
+    variants: tuple[str, ...]
+    warnings: tuple[Fault, ...] = ()
+    _check: Check | None = field(default=None, repr=False)
+
+    @property
+    def title(self) -> str:
+        return self.tables.title or self.name
+
+    @property
+    def name(self) -> str:
+        """What run folders are called: the pipeline folder's name, or the file's."""
+        return self.path.parent.name if self.path.name == SCENE_FILE else self.path.stem
+
+    @property
+    def output(self) -> OutputTable:
+        return self.tables.output
+
+    @property
+    def render(self) -> RenderTable:
+        return self.tables.render
+
+    @property
+    def blocks(self) -> Blocks:
+        """The blocks as drawn, without materials."""
+        return self.drawing.blocks
+
+    @property
+    def cracks(self) -> Cracks:
+        """The cracks as drawn, without apertures."""
+        return self.drawing.cracks
+
+    def problem(self) -> Problem:
+        """The scene as the solvers take it."""
+        return build_problem(self.tables, self.drawing, self._check)
+
+    def resolved(self) -> dict[str, Any]:
+        """The scene with its variant and changes applied and all defaults written out, ready for ``tomli_w``: paths are
+        absolute, all parameters of a Gmsh model are given, variants are gone. Loading it gives the same problem."""
+        data = self.tables.model_dump(by_alias=True, exclude_none=True, exclude={"variants"})
+        if self.tables.geometry.model is not None:
+            data["geometry"]["model"] = str((self.path.parent / self.tables.geometry.model).resolve())
+            data["geometry"]["parameters"] = dict(self.drawing.parameters)
+        return data
+
+    @staticmethod
+    def describe_keys() -> str:
+        """Every key a scene may have, with its default and meaning."""
+        return describe_keys()
+
+
+class _Places:
+    """Says where a key stands: the file and line, or the change that set it."""
+
+    def __init__(self, shown: str, lines: dict[Path, int]) -> None:
+        self.shown, self.lines = shown, lines
+        self.changed: dict[Path, tuple[str, float]] = {}
+        self.order: dict[str, float] = {}
+
+    def changed_by(self, path: Path, place: str, order: float) -> None:
+        self.changed[path] = place, order
+
+    def __call__(self, path: Path) -> str:
+        for n in range(len(path), 0, -1):
+            if path[:n] in self.changed:
+                place, order = self.changed[path[:n]]
+                rest = "" if n == len(path) else f" → {dotted(path)}"
+                return self._kept(place + rest, order)
+            if path[:n] in self.lines:
+                return self._kept(f"{self.shown}:{self.lines[path[:n]]}: {dotted(path)}", self.lines[path[:n]])
+        return self._kept(f"{self.shown}: {dotted(path)}", 0)
+
+    def _kept(self, place: str, order: float) -> str:
+        self.order.setdefault(place, order)
+        return place
+
+    def sorted(self, faults: list[Fault]) -> list[Fault]:
+        return sorted(dict.fromkeys(faults), key=lambda fault: self.order.get(fault.place, 0))
+
+
+def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str | None = None) -> Scene:
+    """Load, change and check a scene.
+
+    ``path`` is a .toml file or a pipeline folder (then its scene.toml); ``variant`` one of the scene's [variants];
+    ``overrides`` are changes "section.key=value" on top, values in TOML's way or bare words. Raises SceneError with
+    every fault: place (file, line, key), message and way out.
+    """
+    path = _file(FilePath(path))
+    data, text = _parsed(path)
+    places = _Places(str(path), locate(text))
+    faults: list[Fault] = []
+    warnings: list[Fault] = []
+    variants = data.get("variants", {})
+    names = tuple(variants) if isinstance(variants, dict) else ()
+
+    plain = copy.deepcopy(data)
+    if variant is not None:
+        if variant not in names:
+            raise SceneError([Fault(str(path), f"the scene has no variant {variant!r}", nearest(variant, list(names)))])
+        _apply_variant(data, variant, places, faults)
+    for number, override in enumerate(overrides):
+        try:
+            key, value = parse_override(override)
+            # Changes on the command line are listed after the file's own faults.
+            places.changed_by(assign(data, key, value), f"--set {override}", 1e9 + number)
+        except OverrideError as error:
+            faults.append(Fault(f"--set {override}", error.message, error.way_out))
+
+    tables, found = validate(data, places)
+    faults += found
+    if not found:
+        _check_variants(plain, names, variant, path, places.lines, faults)
+    drawing = None
+    if tables.geometry is not None:
+        drawing = draw(tables.geometry, path.parent, places, faults, warnings)
+    check(tables, data, drawing, places, faults, warnings)
+    if faults:
+        raise SceneError(places.sorted(faults))
+    # Building asks the same questions as the checks did; whatever it would find has been found.
+    quiet = Check(tables, data, drawing, places, [], [])
+    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(warnings)), quiet)
+
+
+def _file(path: FilePath) -> FilePath:
+    if path.is_dir():
+        inside = path / SCENE_FILE
+        if not inside.is_file():
+            others = ", ".join(sorted(p.name for p in path.glob("*.toml")))
+            way = f"name one of {others}" if others else "name a scene file, or a folder that holds one"
+            raise SceneError([Fault(str(path), f"the folder holds no {SCENE_FILE}", way)])
+        return inside
+    if not path.is_file():
+        near = [str(path.parent / p.name) for p in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = [n for n in near if n.endswith(".toml") or FilePath(n, SCENE_FILE).is_file()]
+        raise SceneError([Fault(str(path), "there is no such scene", nearest(str(path), near) if near else "check the path")])
+    return path
+
+
+def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
+    try:
+        # Line ends as tomllib sees them, so that lines count alike.
+        text = path.read_bytes().decode("utf-8").replace("\r\n", "\n")
+        return tomllib.loads(text), text
+    except UnicodeDecodeError as error:
+        raise SceneError([Fault(str(path), f"the file is not UTF-8 text ({error})", "save it as UTF-8")]) from error
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"\(at (?:line (\d+), column (\d+)|end of document)\)", str(error))
+        message = str(error)[: found.start()].strip() if found else str(error)
+        line = found.group(1) if found and found.group(1) else str(text.count("\n") + 1)
+        column = f", column {found.group(2)}" if found and found.group(2) else ""
+        source = text.splitlines()[int(line) - 1].strip() if 0 < int(line) <= len(text.splitlines()) else ""
+        raise SceneError(
+            [
+                Fault(
+                    f"{path}:{line}{column}",
+                    f"not valid TOML: {message}" + (f", in `{source}`" if source else ""),
+                    "texts stand in double quotes, arrays in square brackets, each key once",
+                )
+            ]
+        ) from error
+
+
+def _apply_variant(data: dict[str, Any], name: str, places: _Places, faults: list[Fault]) -> None:
+    changes = data["variants"][name]
+    if not isinstance(changes, dict):
+        return  # the tables say so
+    for own, target, value in flattened(changes):
+        here = ("variants", name, *own)
+        line = places.lines.get(here, 0)
+        shown = f"{places.shown}:{line}: variants.{name} → {dotted(target)}"
+        try:
+            places.changed_by(assign(data, target, value), shown, line)
+        except OverrideError as error:
+            faults.append(Fault(places(here), error.message, error.way_out))
+
+
+def _check_variants(data, names, chosen, path: FilePath, lines, faults: list[Fault]) -> None:
+    """The tables of every variant that was not chosen: a typing error should not wait until its turn."""
+    for name in names:
+        if name == chosen:
+            continue
+        own = copy.deepcopy(data)
+        places = _Places(str(path), lines)
+        _apply_variant(own, name, places, faults)
+        faults += [f for f in validate(own, places)[1] if f"variants.{name} →" in f.place]

@@ -1,0 +1,313 @@
+"""The tables of a scene file. Every key is declared, bounded and described here, once."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+# TOML has arrays only; the numbers in them stay strict.
+Pair = Annotated[tuple[Finite, Finite], Strict(False)]
+Four = Annotated[tuple[Finite, Finite, Finite, Finite], Strict(False)]
+Points = Annotated[tuple[Pair, ...], Strict(False)]
+Names = Annotated[tuple[str, ...], Strict(False)]
+
+
+class Table(BaseModel):
+    """A table of the scene: no unknown keys, no silent conversions."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, populate_by_name=True)
+
+
+class ZoneShape(Table):
+    name: str = Field(description="name of the zone; several zones of one name are several blocks of one kind")
+    rectangle: Four | None = Field(None, description="two opposite corners, [x0, y0, x1, y1], m")
+    polygon: Points | None = Field(None, description="corners in order, [[x, y], …], m")
+    holes: Annotated[tuple[Points, ...], Strict(False)] = Field((), description="polygons cut out, [[[x, y], …], …], m")
+
+    @model_validator(mode="after")
+    def _one_outline(self):
+        if (self.rectangle is None) == (self.polygon is None):
+            raise ValueError("a zone has either `rectangle` or `polygon`")
+        return self
+
+
+class CrackShape(Table):
+    name: str = Field(description="name of the crack")
+    points: Points | None = Field(None, description="its polyline, [[x, y], …], m")
+    centre: Pair | None = Field(None, description="centre of a straight crack, [x, y], m")
+    length_m: Positive | None = Field(None, description="length of a straight crack, m")
+    angle_deg: Finite | None = Field(None, description="its angle from the horizontal, counter-clockwise, degrees")
+
+    @model_validator(mode="after")
+    def _one_line(self):
+        straight = [self.centre, self.length_m, self.angle_deg]
+        if self.points is not None and any(part is not None for part in straight):
+            raise ValueError("a crack has either `points` or `centre`, `length_m` and `angle_deg`, not both")
+        if self.points is None and any(part is None for part in straight):
+            raise ValueError("a crack needs `points`, or all of `centre`, `length_m` and `angle_deg`")
+        return self
+
+
+class EdgeShape(Table):
+    name: str = Field(description='name for block edges, used by loads and joints ("load:top", "joint:bedding")')
+    line: Annotated[tuple[Pair, Pair], Strict(False)] = Field(
+        description="a straight piece, [[x, y], [x, y]], m: all block edges on it get the name"
+    )
+    zone: str | None = Field(None, description="name only edges of this zone (unset: of all zones)")
+
+
+class Geometry(Table):
+    model: str | None = Field(None, description="Gmsh model (.geo), relative to the scene file")
+    parameters: dict[str, Finite | str] = Field({}, description="values for the model's parameters, by name")
+    zones: Annotated[tuple[ZoneShape, ...], Strict(False)] = Field((), description="zones drawn here instead of a model")
+    cracks: Annotated[tuple[CrackShape, ...], Strict(False)] = Field((), description="cracks drawn here")
+    edges: Annotated[tuple[EdgeShape, ...], Strict(False)] = Field((), description="names for block edges drawn here")
+    tolerance_m: Positive | None = Field(
+        None, description="nearer than this, crack ends touch outlines and cracks, m (unset: 1e-6 of the largest side)"
+    )
+    chord_tolerance_m: Positive | None = Field(
+        None, description="curved edges of a model become chords this near to it, m (unset: 1e-4 of the largest side)"
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self):
+        if self.model is None and not self.zones:
+            raise ValueError("no rock: give `model` (a Gmsh .geo file) or at least one [[geometry.zones]]")
+        if self.model is not None and (self.zones or self.cracks or self.edges):
+            raise ValueError("give either `model` or [[geometry.zones]], [[geometry.cracks]], [[geometry.edges]], not both")
+        if self.model is None and self.parameters:
+            raise ValueError("`parameters` belong to a Gmsh `model`; there is none")
+        return self
+
+
+class MaterialTable(Table):
+    youngs_modulus_pa: Positive = Field(description="Young's modulus, Pa")
+    poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
+    density_kg_m3: NotNegative = Field(description="density, kg/m³")
+    k_ic_pa_sqrt_m: Positive | None = Field(
+        None, description="fracture toughness in mode I, Pa √m; needed where cracks may grow"
+    )
+    plane: Literal["strain", "stress"] = Field("strain", description='"strain" or "stress" in the plane')
+
+
+class ZoneTable(Table):
+    material: str | None = Field(None, description="a name of [materials] (unset: the only one there is)")
+    fixed: bool = Field(False, description="true: its blocks do not move")
+
+
+class JointTable(Table):
+    friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(0.0, description="friction angle, degrees")
+    cohesion_pa: NotNegative = Field(0.0, description="cohesion, Pa")
+    tensile_strength_pa: NotNegative = Field(0.0, description="tensile strength, Pa")
+    normal_stiffness_pa_per_m: Positive | None = Field(
+        None, description="normal stiffness, Pa/m (unset: the solver's penalty springs)"
+    )
+    shear_stiffness_pa_per_m: Positive | None = Field(
+        None, description="shear stiffness, Pa/m (unset: the solver's penalty springs)"
+    )
+    edges: Names = Field(
+        (), description='contacts where either edge has one of these names; "*" matches anything, "crack:NAME" is a '
+        "face that a crack's growth has made"
+    )
+    between: Annotated[tuple[Annotated[tuple[str, str], Strict(False)], ...], Strict(False)] = Field(
+        (), description="contacts between these pairs of edge names, [[a, b], …]; goes before `edges`"
+    )
+
+
+class CrackTable(Table):
+    aperture: float | str = Field(
+        "closed", description='"closed", "slot" (its faces never meet) or the initial aperture in m'
+    )
+
+    @field_validator("aperture", mode="before")
+    @classmethod
+    def _known(cls, value: Any) -> Any:
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if value in ("closed", "slot") or (number and 0 <= value < float("inf")):
+            return value
+        raise ValueError(f'the aperture is "closed", "slot" or a length in m, not {value!r}')
+
+
+class _Timed(Table):
+    """A vector in time: exactly one of value, rate, or times with values."""
+
+    start_s: NotNegative = Field(0.0, description="the rate counts from this time, s")
+    times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="times of a piecewise linear history, s, ascending"
+    )
+
+    def _parts(self) -> tuple:
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _one_history(self):
+        value, rate, values, names = self._parts()
+        given = [value is not None, rate is not None, values is not None or self.times_s is not None]
+        if sum(given) != 1:
+            raise ValueError(f"give exactly one of `{names[0]}`, `{names[1]}`, or `times_s` with `{names[2]}`")
+        if given[2]:
+            if values is None or self.times_s is None or len(values) != len(self.times_s) or not values:
+                raise ValueError(f"`times_s` and `{names[2]}` need the same number of entries, at least one")
+            if any(b <= a for a, b in zip(self.times_s[:-1], self.times_s[1:])):
+                raise ValueError("`times_s` must ascend")
+        if self.start_s and rate is None:
+            raise ValueError(f"`start_s` belongs to `{names[1]}`")
+        return self
+
+
+class TractionTable(_Timed):
+    edge: str = Field(description="name of the edges it acts on")
+    value_pa: Pair | None = Field(None, description="constant traction [x, y], Pa")
+    rate_pa_per_s: Pair | None = Field(None, description="traction that grows from zero, [x, y], Pa/s")
+    values_pa: Points | None = Field(None, description="tractions [[x, y], …] at `times_s`, Pa")
+
+    def _parts(self):
+        return self.value_pa, self.rate_pa_per_s, self.values_pa, ("value_pa", "rate_pa_per_s", "values_pa")
+
+
+class ForceTable(_Timed):
+    at: Pair = Field(description="material point it acts on, [x, y], m")
+    zone: str | None = Field(None, description="zone of that point, where two zones touch")
+    value_n_per_m: Pair | None = Field(None, description="constant force [x, y] per metre of thickness, N/m")
+    rate_n_per_m_s: Pair | None = Field(None, description="force that grows from zero, [x, y], N/m per s")
+    values_n_per_m: Points | None = Field(None, description="forces [[x, y], …] at `times_s`, N/m")
+
+    def _parts(self):
+        names = ("value_n_per_m", "rate_n_per_m_s", "values_n_per_m")
+        return self.value_n_per_m, self.rate_n_per_m_s, self.values_n_per_m, names
+
+
+class LoadsTable(Table):
+    gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
+    gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
+    leading_edge: str | None = Field(
+        None, description="edges whose traction is *the* load of reports, positive in compression (unset: the first traction's)"
+    )
+    tractions: Annotated[tuple[TractionTable, ...], Strict(False)] = Field((), description="tractions on named edges")
+    forces: Annotated[tuple[ForceTable, ...], Strict(False)] = Field((), description="forces on points")
+
+
+class DdaTable(Table):
+    time_step_s: Positive = Field(1.0, description="longest time step, s")
+    dynamic_factor: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0, description="share of the velocity carried from step to step: 0 static, 1 dynamic"
+    )
+    max_displacement_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.001, description="largest displacement in a step, in units of half the height of the domain"
+    )
+    normal_penalty_pa: Positive | None = Field(
+        None, description="stiffness of normal contact springs, Pa (unset: from the blocks' stiffness)"
+    )
+    shear_penalty_pa: Positive | None = Field(
+        None, description="stiffness of shear contact springs, Pa (unset: from the normal one)"
+    )
+    max_open_close_iterations: Annotated[int, Field(ge=1)] = Field(
+        30, description="open–close iterations before the time step is cut"
+    )
+    max_step_cuts: Annotated[int, Field(ge=0)] = Field(12, description="how often a step is cut before the run fails")
+
+
+class DdmTable(Table):
+    order: Annotated[int, Field(ge=0, le=10)] = Field(4, description="polynomial order of the elements")
+    nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points of an element")
+    elements_per_crack: Annotated[int, Field(ge=1)] = Field(4, description="elements of a straight crack")
+    elements_per_side: Annotated[int, Field(ge=1)] = Field(6, description="elements of a block's side")
+    grading_ratio: Annotated[float, Field(gt=0, lt=1)] = Field(
+        0.3, description="ratio of neighbouring elements at kinks, junctions and mouths"
+    )
+    grading_layers: Annotated[int, Field(ge=0)] = Field(2, description="layers of that grading")
+
+
+class GrowthTable(Table):
+    enabled: bool = Field(True, description="false: cracks open and slide, none grows")
+    criterion: Literal["mts", "g", "s"] = Field(
+        "mts",
+        description='growth criterion: "mts" maximum tangential stress, "g" maximum energy release rate, "s" minimum '
+        "strain-energy density",
+    )
+    increment_m: Positive | None = Field(
+        None, description="longest advance of a tip in a cycle, m (unset: a tenth of the shortest crack)"
+    )
+    min_increment_m: Positive | None = Field(
+        None, description="shortest advance, m (unset: a tenth of the longest)"
+    )
+    join_distance: NotNegative = Field(
+        0.5, description="nearer than this to a crack or a surface a tip joins it, in units of the increment"
+    )
+    max_passes: Annotated[int, Field(ge=1)] = Field(200, description="growth passes at one load")
+
+
+class RunTable(Table):
+    end_time_s: Positive = Field(description="the run ends at this time, s")
+    stop_at: Annotated[
+        tuple[Literal["initiation", "coalescence", "daylighting", "split", "arrest", "failure"], ...], Strict(False)
+    ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
+    boundary_stress: Literal["contacts"] = Field(
+        "contacts", description='how contact forces become tractions on cracked blocks: "contacts", linear over each face'
+    )
+
+
+class GaugeTable(Table):
+    start: Pair = Field(alias="from", description="one end of the axial strain gauge, [x, y], m")
+    to: Pair = Field(description="its other end, [x, y], m")
+    zone: str | None = Field(None, description="zone that carries it, where zones touch")
+
+
+class MonitorTable(Table):
+    name: str = Field(description="name of the monitor point in history.csv")
+    at: Pair = Field(description="material point whose displacement is recorded, [x, y], m")
+    zone: str | None = Field(None, description="zone of that point, where two zones touch")
+
+
+class OutputTable(Table):
+    every: Annotated[int, Field(ge=1)] = Field(1, description="write every n-th cycle (cycles with events always)")
+    interior: bool = Field(True, description="write stress inside cracked blocks (interior.pvd)")
+    interior_every: Annotated[int, Field(ge=1)] = Field(10, description="write the interior every n-th written cycle")
+    configuration: Literal["reference", "current"] = Field(
+        "reference", description='coordinates in files: "reference" with displacement, or "current"'
+    )
+
+
+class RenderTable(Table):
+    component: Literal["xx", "yy", "zz", "xy", "principal_max", "principal_min", "von_mises"] = Field(
+        "yy", description="stress component that pictures show"
+    )
+    width_px: Annotated[int, Field(ge=64)] = Field(800, description="width of pictures, pixels")
+    deformation_scale: NotNegative | None = Field(
+        None, description="displacements are drawn this much larger (unset: so that they are seen)"
+    )
+    crack_colour: Literal["birth", "opening"] = Field("birth", description="what the colour of cracks means")
+    gif: bool = Field(True, description="also make a moving picture of the growth")
+    frames_per_second: Positive = Field(10.0, description="pace of the moving picture")
+
+
+class SceneTables(Table):
+    title: str = Field("", description="one line about the scene")
+    geometry: Geometry = Field(description="what is where")
+    materials: Annotated[dict[str, MaterialTable], Field(min_length=1)] = Field(description="materials by name")
+    zones: dict[str, ZoneTable] = Field({}, description="what each zone of the geometry is made of, by its name")
+    joints: dict[str, JointTable] = Field({}, description="laws of contacts by name; `default` rules where none is named")
+    cracks: dict[str, CrackTable] = Field({}, description="cracks by name; `default` rules where none is named")
+    loads: LoadsTable = Field(LoadsTable(), description="what acts on the blocks")
+    dda: DdaTable = Field(DdaTable(), description="motion of the blocks")
+    ddm: DdmTable = Field(DdmTable(), description="elements of cracked blocks")
+    growth: GrowthTable = Field(GrowthTable(), description="growth of cracks")
+    run: RunTable = Field(description="how long")
+    gauge: GaugeTable | None = Field(None, description="axial strain between two points")
+    monitors: Annotated[tuple[MonitorTable, ...], Strict(False)] = Field((), description="points that are recorded")
+    output: OutputTable = Field(OutputTable(), description="files of a run")
+    render: RenderTable = Field(RenderTable(), description="pictures of a run")
+    variants: dict[str, dict[str, Any]] = Field(
+        {}, description='named sets of changes: [variants.NAME] with "section.key" = value'
+    )
+
+    @field_validator("materials")
+    @classmethod
+    def _named(cls, value):
+        if not value:
+            raise ValueError("name at least one material: [materials.rock]")
+        return value

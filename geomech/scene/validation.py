@@ -1,0 +1,96 @@
+"""TOML data into tables; what pydantic says, in the scene's own words."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from .errors import Fault
+from .keys import description_at, expected, field_of, keys_of, table_at
+from .locator import Path
+from .tables import SceneTables
+
+_COMPARISON = {
+    "greater_than": ("gt", "greater than"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "less than"),
+    "less_than_equal": ("le", "at most"),
+}
+
+
+def validate(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SceneTables, list[Fault]]:
+    """The tables of a parsed scene and everything wrong with them.
+
+    Where something is wrong the sections that are right are filled in and the others are None, so that checks across
+    sections can still run on what there is.
+    """
+    try:
+        return SceneTables.model_validate(data), []
+    except ValidationError as error:
+        faults = [_fault(item, place) for item in error.errors(include_url=False)]
+    sections: dict[str, Any] = {}
+    for name, field in SceneTables.model_fields.items():
+        if name not in data:
+            sections[name] = None if field.is_required() else field.default
+            continue
+        kind = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        # A model brings its own configuration; only plain containers take it from here.
+        config = None if table_at((name,)) else ConfigDict(strict=True)
+        try:
+            sections[name] = TypeAdapter(kind, config=config).validate_python(data[name])
+        except ValidationError:
+            sections[name] = None
+    return SceneTables.model_construct(**sections), faults
+
+
+def nearest(name: str, known: list[str]) -> str:
+    """"did you mean …?" with the closest of ``known``, or a list of them."""
+    close = difflib.get_close_matches(name, known, 1, cutoff=0.6)
+    if close:
+        return f"did you mean {close[0]!r}?"
+    return f"there is {', '.join(known)}" if known else "there is none"
+
+
+def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
+    path: Path = tuple(item["loc"])
+    kind, given, context = item["type"], item.get("input"), item.get("ctx", {})
+    # Members of a union and keys of a map add parts that stand nowhere in the file.
+    while path and path[-1] in ("float", "str", "[key]") or (path and str(path[-1]).startswith("constrained-")):
+        path = path[:-1]
+    table = table_at(path[:-1]) if path else None
+    field = field_of(table, path[-1]) if table else None
+    what = expected(field.annotation) if field else ""
+    meaning = description_at(path)
+
+    if kind == "extra_forbidden":
+        known = keys_of(table) if table else []
+        close = difflib.get_close_matches(str(path[-1]), known, 1, cutoff=0.5)
+        way = (f"did you mean {close[0]!r}? " if close else "") + f"keys here are {', '.join(known)}"
+        return Fault(place(path), f"unknown key {path[-1]!r}", way)
+    if kind == "missing" and isinstance(path[-1], str):
+        shape = f"add `{path[-1]} = …`" if field is None or table_at(path) is None else f"add [{'.'.join(map(str, path))}]"
+        return Fault(place(path), f"{path[-1]!r} is missing", f"{shape}: {meaning}")
+    if kind in ("missing", "too_long", "too_short"):
+        whole = path[:-1] if isinstance(path[-1], int) else path
+        return Fault(place(whole), "the array has the wrong number of entries", description_at(whole))
+    if kind == "value_error":
+        return Fault(place(path), str(context.get("error", item["msg"])), meaning)
+    if kind == "literal_error":
+        choices = context["expected"].replace("'", '"')
+        return Fault(place(path), f"{given!r} is not one of {choices}", meaning)
+    if kind in _COMPARISON:
+        key, words = _COMPARISON[kind]
+        return Fault(place(path), f"{given!r} is out of range, it must be {words} {context[key]:g}", meaning)
+    if kind == "finite_number":
+        return Fault(place(path), f"{given!r} is not a finite number", meaning)
+    if kind.endswith("_type") or kind.endswith("_parsing"):
+        if isinstance(path[-1], int):
+            wanted = {"float": "a number", "string": "a text", "tuple": "an array", "model": "a table"}
+            what = wanted.get(kind.split("_")[0], "")
+        elif table_at(path) or not what:
+            what = {"model": "a table", "dict": "a table", "tuple": "an array"}.get(kind.split("_")[0], what)
+        return Fault(place(path), f"{given!r} is not what belongs here" + (f" ({what})" if what else ""), meaning)
+    return Fault(place(path), item["msg"], meaning)
