@@ -15,10 +15,10 @@ from .record import RunLog, SceneCopy
 from .series import Series
 from .summary import Summary
 
-__all__ = ["Group", "Histories", "Observer", "Progress", "Run", "RunLog", "SceneCopy", "Series", "Summary", "standard"]
+__all__ = ["Group", "Histories", "Observer", "Progress", "Run", "RunLog", "SceneCopy", "Series", "Summary", "standard_observers"]
 
 
-def standard(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
+def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
     """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
     (``every``, ``interior``, ``interior_every``, ``configuration``) and its ``resolved()`` form."""
     output = getattr(scene, "output", None)

@@ -48,11 +48,6 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("material", "cell", "-", "index of the block's material", dtype="int32"),
         Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
     ),
-    "outlines": (
-        _DISPLACEMENT,
-        Field("block_id", "cell", "-", "index of the block", dtype="int32"),
-        Field("loop", "cell", "-", "0 the outer boundary, 1 … holes", dtype="int32"),
-    ),
     "cracks": (
         _DISPLACEMENT,
         Field("opening", "point", "m", "normal jump between the faces, positive when they part; nan: not solved for"),
@@ -83,6 +78,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("gap", "point", "m", "negative when penetrating"),
         Field("slip", "point", "m", "accumulated sliding"),
         Field("state", "point", "-", _STATE, dtype="int32"),
+        Field("bonded", "point", "-", "1 while cohesion and tensile strength hold", dtype="int32"),
         Field("block_id", "point", "-", "owner of the vertex", dtype="int32"),
         Field("other_block_id", "point", "-", "owner of the edge", dtype="int32"),
     ),

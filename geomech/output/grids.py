@@ -1,4 +1,4 @@
-"""A cycle as grids of points, cells and fields: blocks, outlines, cracks, tips and contacts.
+"""A cycle as grids of points, cells and fields: blocks, cracks, tips and contacts.
 
 ``configuration`` is "reference" (coordinates of the reference, ``displacement`` beside them) or "current" (coordinates
 as they are now; ``displacement`` is written all the same). All grids of a run share it, so they lie on one another.
@@ -22,7 +22,8 @@ CONFIGURATIONS = ("reference", "current")
 
 
 def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str, triangles: Triangles) -> Grid:
-    """Every block as triangles on its own vertices, so that Warp By Vector opens the joints."""
+    """Every block as triangles on its own vertices, so that Warp By Vector opens the joints and Feature Edges draws
+    the outlines."""
     blocks, state = cycle.blocks, cycle.state
     cells, owner = triangles.of(blocks)
     stress = six_components(state.stress, blocks.material, materials)
@@ -42,21 +43,6 @@ def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str,
             "material": blocks.material[owner],
             "fixed": blocks.fixed[owner],
         },
-    )
-
-
-def outlines_grid(cycle: Cycle, configuration: str) -> Grid:
-    """The edges of all blocks, as lines."""
-    blocks, state = cycle.blocks, cycle.state
-    n = blocks.n_vertices
-    loop = np.repeat(np.arange(len(blocks.loop_start) - 1), np.diff(blocks.loop_start))
-    return Grid(
-        points=blocks.vertices if configuration == "reference" else state.vertices,
-        connectivity=np.stack([np.arange(n), blocks.next_vertex], axis=1).ravel(),
-        offsets=np.arange(2, 2 * n + 1, 2),
-        types=np.full(n, LINE),
-        point_data={"displacement": with_z(state.vertices - blocks.vertices)},
-        cell_data={"block_id": blocks.vertex_block, "loop": loop - blocks.block_loop[blocks.vertex_block]},
     )
 
 
@@ -142,6 +128,7 @@ def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
             "gap": contacts["gap"],
             "slip": contacts["slip"],
             "state": contacts["state"],
+            "bonded": contacts["bonded"],
             "block_id": contacts["block"],
             "other_block_id": contacts["other"],
         },

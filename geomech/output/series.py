@@ -21,7 +21,7 @@ PASS_OFFSET = 1e-6
 
 
 class Series:
-    """Observer that writes ``blocks``, ``outlines``, ``cracks``, ``tips``, ``contacts`` and ``interior``.
+    """Observer that writes ``blocks``, ``cracks``, ``tips``, ``contacts`` and ``interior``.
 
     ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
     last are always written. ``interior_every`` counts cycles between interior fields, which also come with every event
@@ -45,7 +45,7 @@ class Series:
             (self._folder / f"{name}.pvd").unlink(missing_ok=True)
             for old in (self._folder / "vtk").glob(f"{name}_[0-9]*.vtu"):
                 old.unlink()
-        names = ["blocks", "outlines", "cracks", "tips", "contacts"] + ["interior"] * bool(self.interior_every)
+        names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * bool(self.interior_every)
         self._collections = {name: Collection(self._folder / f"{name}.pvd") for name in names}
         self._triangles, self._meshes = Triangles(), InteriorMeshes()
         self._time = SeriesTime()
@@ -74,6 +74,8 @@ class Series:
                 self._write(cycle, at)
             if self.interior_every and cycle.bodies and cycle.number != self._last_interior:
                 self._write_interior(cycle, at)
+        for collection in self._collections.values():
+            collection.close()
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
 
@@ -86,7 +88,6 @@ class Series:
         motion = Motion.of(cycle.blocks, cycle.state.vertices)
         shape = self.configuration
         self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles))
-        self._save("outlines", cycle, at, grids.outlines_grid(cycle, shape))
         self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape))
         self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
         self._save("contacts", cycle, at, grids.contacts_grid(cycle, shape))
@@ -98,7 +99,12 @@ class Series:
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
         file = f"vtk/{name}_{cycle.number:06d}.vtu"
-        numbers = {"CYCLE": cycle.number, "TIME": float(cycle.state.time), "LOAD": float(cycle.load)}
+        numbers = {
+            "CYCLE": cycle.number,
+            "TIME": float(cycle.state.time),
+            "LOAD": float(cycle.load),
+            "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are the reference ones
+        }
         write_grid(self._folder / file, name, grid, numbers)
         self._collections[name].add(at, file)
 

@@ -15,9 +15,6 @@ import numpy as np
 
 from geomech.model import Cycle, Event, Problem
 
-#: Statistics of a cycle that begin so are wall times and are summed into ``seconds``.
-SECONDS = "seconds_"
-
 
 class Summary:
     """Observer that counts, and at the end completes the run's ``summary`` and writes it as ``summary.json``.
@@ -34,7 +31,6 @@ class Summary:
         self._last: Cycle | None = None
         self._events: list[Event] = []
         self._peak, self._load_steps, self._growth_passes, self._grown = -math.inf, -1, 0, 0.0
-        self._seconds: dict[str, float] = {}
         self._scale = normalisation(problem)
 
     def on_cycle(self, cycle: Cycle) -> None:
@@ -45,10 +41,6 @@ class Summary:
         grown = float(cycle.tips["grown"].sum())
         self._growth_passes += grown > 0
         self._grown += grown
-        for name, value in cycle.statistics.items():
-            if name.startswith(SECONDS):
-                phase = name.removeprefix(SECONDS).replace("_", " ")
-                self._seconds[phase] = self._seconds.get(phase, 0.0) + value
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         last = self._last
@@ -58,7 +50,8 @@ class Summary:
             summary["error"] = f"{type(error).__name__}: {error}"
         summary.setdefault("wall_s", round(time.perf_counter() - self._began, 4))
         seconds = summary.setdefault("seconds", {})
-        seconds.update({phase: round(value, 4) for phase, value in self._seconds.items() if phase not in seconds})
+        if last is not None:
+            seconds.update({phase: round(value, 4) for phase, value in last.seconds.items()})
         first: dict[str, dict[str, Any]] = {}
         counts: dict[str, int] = {}
         for event in self._events:

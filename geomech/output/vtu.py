@@ -7,10 +7,14 @@ thousand, and a run that writes files need not import VTK.
 
 from __future__ import annotations
 
+import math
 import os
+import struct
+import time
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -58,14 +62,11 @@ def write_grid(path: Path, series: str, grid: Grid, numbers: Mapping[str, float 
 
     def array(name: str, data: np.ndarray, components: tuple[str, ...] = ()) -> str:
         nonlocal at
-        attributes = f'type="{_TYPE[data.dtype.str[1:]]}" Name={quoteattr(name)} format="appended" offset="{at}"'
-        if data.ndim == 2:
-            attributes += f' NumberOfComponents="{data.shape[1]}"'
-        attributes += "".join(f' ComponentName{k}="{c}"' for k, c in enumerate(components))
         packed = _packed(data)
         body.append(packed)
+        tag = f'<DataArray {_attributes(name, data.dtype.str[1:], data.shape[1:], components)} offset="{at}"/>\n'
         at += len(packed)
-        return f"<DataArray {attributes}/>\n"
+        return tag
 
     xml = [_HEAD]
     for name, value in numbers.items():
@@ -88,10 +89,7 @@ def write_grid(path: Path, series: str, grid: Grid, numbers: Mapping[str, float 
     xml.append(array("offsets", np.ascontiguousarray(grid.offsets, dtype="<i8")))
     xml.append(array("types", np.ascontiguousarray(grid.types, dtype="u1")))
     xml.append('</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding="raw">\n_')
-    with open(path, "wb") as file:
-        file.write("".join(xml).encode())
-        file.writelines(body)
-        file.write(b"\n</AppendedData>\n</VTKFile>\n")
+    _put(path, b"".join(["".join(xml).encode(), *body, b"\n</AppendedData>\n</VTKFile>\n"]))
 
 
 def with_z(vectors: np.ndarray) -> np.ndarray:
@@ -104,6 +102,24 @@ def with_z(vectors: np.ndarray) -> np.ndarray:
     return out
 
 
+@lru_cache(maxsize=256)
+def _attributes(name: str, dtype: str, shape: tuple[int, ...], components: tuple[str, ...]) -> str:
+    text = f'type="{_TYPE[dtype]}" Name={quoteattr(name)} format="appended"'
+    text += f' NumberOfComponents="{shape[0]}"' if shape else ""
+    return text + "".join(f' ComponentName{k}="{c}"' for k, c in enumerate(components))
+
+
+def _put(path: Path, content: bytes) -> None:
+    """A file of ``content``: three system calls, half of what a buffered file object makes."""
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+    try:
+        view = memoryview(content)
+        while view:
+            view = view[os.write(handle, view) :]
+    finally:
+        os.close(handle)
+
+
 def _packed(data: np.ndarray) -> bytes:
     """One compressed array: (number of blocks, block size, size of a partial last block, compressed sizes), data."""
     raw = data.astype(data.dtype.newbyteorder("<"), copy=False).tobytes()
@@ -111,38 +127,44 @@ def _packed(data: np.ndarray) -> bytes:
     size = min(len(raw), _BLOCK)
     # "Partial" is zero when the last block is full; a single block is always full.
     partial = len(raw) % size if size else 0
-    header = np.array([len(pieces), size, partial, *map(len, pieces)], dtype="<u8")
-    return b"".join([header.tobytes(), *pieces])
+    header = struct.pack(f"<{3 + len(pieces)}Q", len(pieces), size, partial, *map(len, pieces))
+    return b"".join([header, *pieces])
 
 
 class Collection:
-    """A PVD file: a time series of .vtu files, complete on disk after every `add`.
+    """A PVD file: a time series of .vtu files.
 
-    Times are written with ``repr`` so that they read back as the same numbers. The file is replaced as a whole
-    (written beside itself, then renamed), so whoever reads it, also after a crash, sees every finished entry.
+    Times are written with ``repr`` so that they read back as the same numbers. The file is only ever replaced as a
+    whole (written beside itself, then renamed), so whoever reads it, also after a crash, finds a complete series. It is
+    renewed at most every ``interval`` s, since a run of quick steps would spend more time on that than on its files;
+    `close` brings it up to date.
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = Path(path)
-        self.times: list[float] = []
+    def __init__(self, path: Path, interval: float = 0.25) -> None:
+        self.path, self.interval = Path(path), interval
         self._entries: list[str] = []
+        self._last = -math.inf
         self._save()
 
-    def add(self, time: float, file: str) -> None:
-        """List ``file`` (relative to the PVD's folder) at ``time``, which must be later than all before it."""
-        if self.times and not time > self.times[-1]:
-            raise ValueError(f"{self.path.name}: time {time!r} does not follow {self.times[-1]!r}")
-        self.times.append(float(time))
-        self._entries.append(f'<DataSet timestep="{float(time)!r}" part="0" file={quoteattr(file)}/>\n')
+    def add(self, at: float, file: str) -> None:
+        """List ``file`` (relative to the PVD's folder) at time ``at``, which must be later than all before it."""
+        if not at > self._last:
+            raise ValueError(f"{self.path.name}: time {at!r} does not follow {self._last!r}")
+        self._last = at
+        self._entries.append(f'<DataSet timestep="{float(at)!r}" part="0" file={quoteattr(file)}/>\n')
+        if time.monotonic() - self._saved >= self.interval:
+            self._save()
+
+    def close(self) -> None:
+        """Bring the file up to date."""
         self._save()
 
     def _save(self) -> None:
         beside = self.path.with_name(self.path.name + ".part")
-        with open(beside, "w", encoding="utf-8") as file:
-            file.write('<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n')
-            file.writelines(self._entries)
-            file.write("</Collection></VTKFile>\n")
+        head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
+        _put(beside, "".join([head, *self._entries, "</Collection></VTKFile>\n"]).encode())
         os.replace(beside, self.path)
+        self._saved = time.monotonic()
 
 
 def read_collection(path: Path) -> list[tuple[float, Path]]:

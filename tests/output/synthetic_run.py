@@ -119,18 +119,19 @@ def cycle(number: int, load_step: int, growth_pass: int, grown: int, *, turn: fl
     touching = np.zeros(contacts, CONTACT)
     for k in range(contacts):
         first = shape.vertex_start[1] + k
-        touching[k] = (
-            first, 2, 1, 0, (STICK, SLIP)[k % 2], float(1 - k), vertices[first], (0.0, 1.0),
-            0.03 * load, (-1.0) ** k * 0.01 * load, -1e-9 * k, 1e-6 * k, 0.03, 0,
-        )  # fmt: skip
+        row = touching[k]
+        row["vertex"], row["edge"], row["block"], row["other"], row["state"] = first, 2, 1, 0, (STICK, SLIP)[k % 2]
+        row["position"], row["point"], row["normal"] = float(1 - k), vertices[first], (0.0, 1.0)
+        row["normal_force"], row["shear_force"] = 0.03 * load, (-1.0) ** k * 0.01 * load
+        row["gap"], row["slip"], row["length"] = -1e-9 * k, 1e-6 * k, 0.03
     tips = np.zeros(len(network.tips), TIP)
     for k, node in enumerate(network.tips):
         out = np.array([0.0, -1.0 if k == 0 else 1.0]) if grown else (1 if k else -1) * np.array([1.0, 1.0]) / math.sqrt(2)
         k_i, k_ii = -0.0626 * load, -0.0586 * load
-        tips[k] = (
-            node, 0, 1, network.nodes[node], out, k_i, k_ii, abs(k_ii) * 1.15, 1.0,
-            1e-3 if growth_pass else 0.0,
-        )  # fmt: skip
+        row = tips[k]
+        row["node"], row["block"], row["point"], row["direction"] = node, 1, network.nodes[node], out
+        row["k_i"], row["k_ii"], row["k_eq"], row["angle"] = k_i, k_ii, abs(k_ii) * 1.15, 1.0
+        row["grown"] = 1e-3 if growth_pass else 0.0
     at = np.linspace(0.0, 1.0, 5)
     ends = network.nodes[network.segments]
     points = ends[:, None, 0] + at[:, None] * (ends[:, None, 1] - ends[:, None, 0])
@@ -156,7 +157,8 @@ def cycle(number: int, load_step: int, growth_pass: int, grown: int, *, turn: fl
         bodies={1: UniformBody(load)},
         events=events,
         monitors={"top": np.array([0.0, -1e-9 * load])},
-        statistics={"open_close_iterations": 3 + load_step % 2, "dt": 1.0, "seconds_dda": 1e-3, "seconds_ddm": 2e-3},
+        statistics={"open_close_iterations": 3 + load_step % 2, "dt": 1.0},
+        seconds={"dda": 1e-3 * number, "ddm": 2e-3 * number},
     )
 
 

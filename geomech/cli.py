@@ -1,0 +1,250 @@
+"""The command line: ``geomech check | run | render | report | doctor``.
+
+Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input. Nothing heavy is imported before a
+verb asks for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import __version__
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code. ``arguments`` defaults to the process's own."""
+    options = _parser().parse_args(arguments)
+    verb: Callable[[argparse.Namespace], int] = options.verb
+    try:
+        return verb(options)
+    except KeyboardInterrupt:
+        _say("interrupted")
+        return FAILED
+    except Exception as error:
+        if _is_bad_input(error):
+            _say_errors(error)
+            return BAD_INPUT
+        if options.debug:
+            raise
+        _say(f"geomech: {type(error).__name__}: {error}\n(run it again with --debug before the verb for the traceback)")
+        return FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="geomech",
+        description="How a jointed, cracked rock mass comes apart: blocks that move (DDA), cracks that grow (DDM).",
+        epilog="exit codes: 0 done, 1 failed run, 2 bad input",
+    )
+    parser.add_argument("--version", action="version", version=f"geomech {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of a failure")
+    verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
+
+    def verb(name: str, does: Callable, what: str, example: str) -> argparse.ArgumentParser:
+        made = verbs.add_parser(
+            name,
+            help=what,
+            description=what[0].upper() + what[1:] + ".",
+            epilog="example:\n" + "\n".join(f"  {line}" for line in example.splitlines()),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        made.set_defaults(verb=does)
+        return made
+
+    check = verb(
+        "check", _check, "read a scene, build its geometry and say every error in it at once",
+        "geomech check pipelines/two_cracks\ngeomech check scene.toml --set growth.criterion=g",
+    )  # fmt: skip
+    _scene_arguments(check)
+    check.add_argument("--keys", action="store_true", help="list every key a scene may have, and what it means")
+
+    run = verb(
+        "run", _run, "run a scene, or a pipeline folder, and write its run folder",
+        "geomech run pipelines/two_cracks --variant phi_30\n"
+        "geomech run scene.toml --out outputs/soft --set materials.rock.youngs_modulus_pa=5e9",
+    )  # fmt: skip
+    _scene_arguments(run)
+    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default outputs/NAME, a sub-folder a variant)")
+    run.add_argument("--quiet", action="store_true", help="say nothing but errors")
+
+    render = verb(
+        "render", _render, "draw a run: the last cycle as a picture, its growth as a movie, its curves",
+        "geomech render outputs/two_cracks/phi_30 --component yy --no-gif",
+    )  # fmt: skip
+    render.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    render.add_argument("--out", type=Path, metavar="DIR", help="where the pictures go (default RUN/pictures)")
+    render.add_argument("--component", metavar="NAME", help="stress to fill with: xx, yy, xy, zz, s1, s3, von_mises (default yy)")
+    render.add_argument("--width", type=int, metavar="PX", help="width of the pictures (default 800)")
+    render.add_argument("--gif", action=argparse.BooleanOptionalAction, default=None, help="draw the movie (default: yes)")
+
+    report = verb(
+        "report", _report, "tabulate what runs came to: loads of initiation and coalescence, growth, time",
+        "geomech report outputs/two_cracks/*",
+    )  # fmt: skip
+    report.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="run folders, or folders of run folders")
+    report.add_argument("--csv", action="store_true", help="write the table as CSV")
+
+    verb("doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
+         "geomech doctor")  # fmt: skip
+    return parser
+
+
+def _scene_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="a scene.toml, or a folder that holds one")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="override a key of the scene, e.g. growth.increment_m=2e-3 (may be repeated)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--variant", action="append", default=[], metavar="NAME", dest="variants",
+        help="a variant that the scene names, or 'all' (may be repeated)",
+    )  # fmt: skip
+
+
+def _check(options: argparse.Namespace) -> int:
+    from .scene import load_scene
+
+    first = load_scene(options.scene, options.overrides, None)
+    if options.keys:
+        print(first.describe_keys())
+        return DONE
+    for name in _variants(first, options.variants) or [None]:
+        scene = first if name is None else load_scene(options.scene, options.overrides, name)
+        problem = scene.problem()
+        cracks = f"{problem.cracks.n_cracks} cracks with {len(problem.cracks.tips)} tips"
+        print(f"{problem.title}{f' [{name}]' if name else ''}: {problem.blocks.n_blocks} blocks, {cracks}: no errors")
+    if first.variants and not options.variants:
+        print(f"variants: {', '.join(first.variants)}")
+    return DONE
+
+
+def _run(options: argparse.Namespace) -> int:
+    place: Path = options.scene
+    if place.is_dir() and (place / "run.py").is_file():
+        out = options.out or default_folder(place)
+        script = _load_script(place / "run.py")
+        overrides = [*options.overrides, *(f"variant={name}" for name in options.variants)]
+        result = script.main(place, out, overrides, options.quiet)
+        return DONE if result is None else int(result)
+
+    from .output import standard_observers
+    from .pipeline import run
+    from .scene import load_scene
+
+    first = load_scene(place, options.overrides, None)
+    names = _variants(first, options.variants)
+    # Every variant is read before the first one runs: an error in the last should not cost an hour.
+    scenes = {name: load_scene(place, options.overrides, name) for name in names} or {None: first}
+    base = options.out or default_folder(place)
+    for name, scene in scenes.items():
+        # One variant with --out goes into exactly that folder.
+        folder = base if name is None or (options.out and len(scenes) == 1) else base / name
+        run(scene, out=folder, observers=standard_observers(scene, quiet=options.quiet))
+    return DONE
+
+
+def _variants(scene: Any, asked: Sequence[str]) -> list[str]:
+    known = list(scene.variants)
+    names = known if "all" in asked else list(dict.fromkeys(asked))
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise BadInput(f"no variant {', '.join(unknown)}; the scene has {', '.join(known) or 'none'}")
+    return names
+
+
+def default_folder(scene: Path) -> Path:
+    """``outputs/NAME`` below the working folder: NAME is the pipeline's folder, or the file's own name without suffix."""
+    scene = scene.resolve()
+    return Path("outputs") / (scene.parent.name if scene.name == "scene.toml" else scene.stem)
+
+
+def _load_script(path: Path) -> Any:
+    import importlib.util
+
+    spec = importlib.util.spec_from_file_location(f"geomech_pipeline_{path.parent.name}", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not hasattr(module, "main"):
+        raise BadInput(f"{path} has no main(folder, out, overrides, quiet)")
+    return module
+
+
+def _render(options: argparse.Namespace) -> int:
+    from .output import Run
+    from .render import draw
+
+    run = _open_run(Run, options.run)
+    wishes = {"component": options.component, "width": options.width, "movie": options.gif}
+    for path in draw(run, options.out, **{key: value for key, value in wishes.items() if value is not None}):
+        print(path)
+    return DONE
+
+
+def _report(options: argparse.Namespace) -> int:
+    from .output import Run
+    from .report import as_csv, as_text, table
+
+    folders = [found for place in options.runs for found in _run_folders(place)]
+    rows = table([_open_run(Run, folder) for folder in folders])
+    print(as_csv(rows) if options.csv else as_text(rows))
+    return DONE
+
+
+def _run_folders(place: Path) -> list[Path]:
+    if (place / "history.csv").is_file() or not place.is_dir():
+        return [place]
+    return sorted(found.parent for found in place.rglob("history.csv")) or [place]
+
+
+def _open_run(run: Callable[[Path], Any], folder: Path) -> Any:
+    try:
+        return run(folder)
+    except FileNotFoundError as error:
+        raise BadInput(str(error)) from None
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from .doctor import examine
+
+    checks = examine()
+    for check in checks:
+        print(f"{'ok  ' if check.good else 'FAIL'} {check.name:<12} {check.found}")
+        if not check.good:
+            print(f"     {'':<12} → {check.mend}")
+    return DONE if all(check.good for check in checks) else FAILED
+
+
+class BadInput(ValueError):
+    """Something on the command line that cannot be: exit code 2."""
+
+
+def _is_bad_input(error: Exception) -> bool:
+    if isinstance(error, BadInput):
+        return True
+    # The scene package is only asked when it has been imported: no other part raises its error.
+    scene = sys.modules.get("geomech.scene")
+    return scene is not None and isinstance(error, getattr(scene, "SceneError", ()))
+
+
+def _say_errors(error: Exception) -> None:
+    errors = getattr(error, "errors", None)
+    if not errors:
+        _say(f"geomech: {error}")
+        return
+    for place, message, way_out in errors:
+        _say(f"{place}: {message}" + (f"\n    {way_out}" if way_out else ""))
+    _say(f"{len(errors)} error{'s' if len(errors) > 1 else ''}; nothing was run")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,409 @@
+"""Pictures of a run: stress in the rock, cracks coloured by when they grew, drawn deformed, without a screen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from geomech.output.reading import Run
+
+from . import offscreen
+
+if TYPE_CHECKING:
+    import pyvista as pv
+
+#: Name on the command line → (array, column, how it is written).
+COMPONENTS = {
+    "xx": ("stress", 0, "σxx"),
+    "yy": ("stress", 1, "σyy"),
+    "zz": ("stress", 2, "σzz"),
+    "xy": ("stress", 3, "σxy"),
+    "s1": ("principal_stress", 0, "σ1"),
+    "s3": ("principal_stress", 2, "σ3"),
+    "von_mises": ("", -1, "von Mises stress"),
+}
+
+#: The largest displacement relative to the block system, drawn as this fraction of its size.
+DEFORMATION = 0.03
+#: Stress at a crack tip is singular: the colours span these percentiles of the rock's area and end there.
+ROBUST = (1.5, 98.5)
+
+_ROCK_OUTLINE, _INK, _IDLE = "#3b3f46", "#1b1d21", "#e4e4e1"
+_OLD_CRACK = "#15161a"
+
+
+@dataclass(frozen=True)
+class Look:
+    """What stays the same from frame to frame. ``bounds`` (x0, x1, y0, y1) m as drawn; ``limits`` MPa; ``scale`` of
+    the displacement; ``births`` first and last cycle in which a crack grew (equal: none did)."""
+
+    component: str
+    bounds: tuple[float, float, float, float]
+    limits: tuple[float, float]
+    scale: float
+    births: tuple[int, int]
+    width: int
+
+    @property
+    def upright(self) -> bool:
+        """The legend stands beside a tall drawing and lies below a wide one."""
+        x0, x1, y0, y1 = self.bounds
+        return (x1 - x0) <= 1.25 * (y1 - y0)
+
+    @property
+    def colours(self) -> str:
+        """Diverging about zero where tension and compression both matter, else one hue that darkens with stress."""
+        low, high = self.limits
+        if low < 0 < high and min(-low, high) > 0.15 * max(-low, high):
+            return "RdBu_r"
+        return "YlGnBu" if high > 0 and low > -0.15 * high else "YlGnBu_r"
+
+
+def picture(run: Run, path: Path, *, component: str = "yy", width: int = 800, cycle: int | None = None) -> Path:
+    """Draw ``cycle`` (default: the last) of ``run`` into the PNG ``path``. Raises KeyError for an unknown component,
+    RenderingUnavailable where no window can be opened."""
+    last = int(run.history["cycle"][-1]) if cycle is None else cycle
+    with _Painter(run, look(run, last, component=component, width=width)) as painter:
+        painter.draw(last)
+        painter.save(path)
+    return path
+
+
+def movie(
+    run: Run, path: Path, *, component: str = "yy", width: int = 800, frames: int = 48, seconds: float = 6.0
+) -> Path | None:
+    """Draw the run's growth as the GIF ``path``: about ``frames`` cycles, most of them from those in which cracks grew;
+    the last one stands still for a while. None where there are not two cycles to show."""
+    import imageio.v3 as imageio
+
+    shown = moments(run, frames)
+    if len(shown) < 2:
+        return None
+    fixed = look(run, int(run.history["cycle"][-1]), component=component, width=width)
+    with _Painter(run, fixed) as painter:
+        images = []
+        for cycle in shown:
+            painter.draw(cycle)
+            images.append(painter.image())
+    times = [1000 * seconds / len(images)] * len(images)
+    times[-1] = 1800
+    imageio.imwrite(path, _palettes(images), extension=".gif", plugin="pillow", duration=times, loop=0)
+    return path
+
+
+def moments(run: Run, frames: int) -> list[int]:
+    """The cycles a movie shows: a third of ``frames`` spread over the loading, the rest over the growth; first and
+    last always."""
+    written = np.array(list(run.grids("blocks")))
+    grew = set(run.history["cycle"][run.history["growing"] > 0].astype(int))
+    growth = np.array([c for c in written if c in grew], dtype=int)
+    loading = np.array([c for c in written if c not in grew], dtype=int)
+
+    def spread(cycles: np.ndarray, count: int) -> np.ndarray:
+        return cycles[np.unique(np.linspace(0, len(cycles) - 1, min(count, len(cycles))).round().astype(int))]
+
+    few = frames if not len(growth) else max(frames // 3, frames - len(growth))
+    chosen = [*spread(loading, few), *spread(growth, frames - min(few, len(loading))), *written[[0, -1]]]
+    return sorted({int(c) for c in chosen})
+
+
+def look(run: Run, cycle: int, *, component: str = "yy", width: int = 800) -> Look:
+    """Colours, frame and magnification that suit ``cycle``, for it and every one before it."""
+    if component not in COMPONENTS:
+        raise KeyError(f"no stress component {component!r}; there are {', '.join(COMPONENTS)}")
+    blocks = run.grid("blocks", cycle)
+    x0, x1, y0, y1 = blocks.bounds[:4]
+    size = max(x1 - x0, y1 - y0)
+    scale = _magnification(blocks, size)
+    moved = blocks.points + scale * blocks["displacement"]
+    (x0, y0), (x1, y1) = np.minimum((x0, y0), moved.min(axis=0)[:2]), np.maximum((x1, y1), moved.max(axis=0)[:2])
+    interior = _interior(run, cycle)
+    source = interior if interior is not None else blocks
+    birth = run.grid("cracks", cycle)["birth_cycle"]
+    grown = birth[birth > 0]
+    return Look(
+        component=component,
+        bounds=(x0, x1, y0, y1),
+        limits=_limits(source, component),
+        scale=scale,
+        births=(int(grown.min()), int(grown.max())) if len(grown) else (0, 0),
+        width=width,
+    )
+
+
+def _magnification(blocks: pv.UnstructuredGrid, size: float) -> float:
+    if not int(blocks.field_data["REFERENCE"][0]):
+        return 0.0  # drawn where they are
+    # A common translation shows nothing; what counts is how far points move against each other.
+    spread = np.ptp(blocks["displacement"], axis=0).max()
+    if spread <= 1e-12 * size:
+        return 1.0
+    scale = DEFORMATION * size / spread
+    # Motion that is large enough to be seen is drawn true.
+    return max(1.0, float(f"{scale:.1g}")) if scale > 1 else 1.0
+
+
+def _limits(grid: pv.UnstructuredGrid, component: str) -> tuple[float, float]:
+    values = _values(grid, component)
+    in_cells = len(values) == grid.n_cells and "stress" in grid.cell_data
+    area = grid.compute_cell_sizes(length=False, volume=False)["Area"]
+    if in_cells:
+        weights = area
+    else:
+        corners = grid.cells.reshape(-1, 4)[:, 1:]
+        weights = np.bincount(corners.ravel(), weights=np.repeat(area / 3, 3), minlength=grid.n_points)
+    order = np.argsort(values)
+    share = np.cumsum(weights[order]) / weights.sum() * 100
+    low, high = np.interp(ROBUST, share, values[order])
+    if high - low < 1e-6 * max(abs(low), abs(high), 1e-9):
+        # A uniform field: a band about its value, or colours would show round-off.
+        middle, half = 0.5 * (low + high), max(0.05 * max(abs(low), abs(high)), 1e-9)
+        return float(middle - half), float(middle + half)
+    return float(low), float(high)
+
+
+def _values(grid: pv.UnstructuredGrid, component: str) -> np.ndarray:
+    """MPa, at the points of an interior grid or the cells of a block grid."""
+    array, column, _ = COMPONENTS[component]
+    data = grid.cell_data if "stress" in grid.cell_data else grid.point_data
+    if not array:
+        s1, s2, s3 = np.asarray(data["principal_stress"], dtype=float).T
+        return np.sqrt(0.5 * ((s1 - s2) ** 2 + (s2 - s3) ** 2 + (s3 - s1) ** 2)) / 1e6
+    return np.asarray(data[array], dtype=float)[:, column] / 1e6
+
+
+def _interior(run: Run, cycle: int) -> pv.UnstructuredGrid | None:
+    try:
+        grid = run.grid("interior", cycle)
+    except KeyError:
+        return None
+    return grid if grid.n_cells else None
+
+
+def _palettes(images: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """All frames on one palette of 256 colours, taken from the last: a GIF of frames with palettes of their own
+    flickers and is larger."""
+    from PIL import Image
+
+    palette = Image.fromarray(images[-1]).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    return [
+        np.asarray(Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB"))
+        for image in images
+    ]
+
+
+class _Painter:
+    """One off-screen window, drawn into again and again."""
+
+    def __init__(self, run: Run, fixed: Look) -> None:
+        offscreen.ready()
+        import pyvista as pv
+
+        self.run, self.look = run, fixed
+        x0, x1, y0, y1 = fixed.bounds
+        w, h = x1 - x0, y1 - y0
+        # Pixels: margins, the strip of the title, the strip of the legend; the drawing takes the rest.
+        self.unit = fixed.width / 800
+        side, top = 24 * self.unit, 74 * self.unit
+        legend = (210 if fixed.upright else 96) * self.unit
+        if fixed.upright:
+            drawing = (fixed.width - legend - 2 * side, None)
+            height = min(drawing[0] * h / w, 900 * self.unit)
+            self.size = (fixed.width, round(height + top + side))
+            self.centre = (side + 0.5 * drawing[0], side + 0.5 * height)
+            self.metres_per_pixel = max(w / drawing[0], h / height)
+        else:
+            drawing = (fixed.width - 2 * side, None)
+            height = drawing[0] * h / w
+            self.size = (fixed.width, round(height + top + legend))
+            self.centre = (0.5 * fixed.width, legend + 0.5 * height)
+            self.metres_per_pixel = w / drawing[0]
+        self.plotter = pv.Plotter(off_screen=True, window_size=self.size, border=False)
+        self.plotter.set_background("white")
+        self.plotter.enable_anti_aliasing("msaa", multi_samples=8)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.plotter.close()
+
+    def image(self) -> np.ndarray:
+        """(height, width, 3) of 8 bits."""
+        return np.array(self.plotter.screenshot(return_img=True))
+
+    def save(self, path: Path) -> None:
+        self.plotter.screenshot(str(path))
+
+    def draw(self, cycle: int) -> None:
+        # Every actor that is added would draw the window anew.
+        self.plotter.suppress_rendering = True
+        self.plotter.clear()
+        self._rock(cycle)
+        self._cracks(cycle)
+        self._camera()
+        self._words(cycle)
+        self.plotter.suppress_rendering = False
+        self.plotter.render()
+
+    def _warped(self, grid: pv.UnstructuredGrid, lift: float) -> pv.UnstructuredGrid:
+        grid.points = grid.points + self.look.scale * grid["displacement"] + (0.0, 0.0, lift)
+        return grid
+
+    def _rock(self, cycle: int) -> None:
+        blocks, interior = self._warped(self.run.grid("blocks", cycle), 0.0), _interior(self.run, cycle)
+        size = 1e3 * self.metres_per_pixel
+        solved = set() if interior is None else set(np.unique(interior["block_id"]).tolist())
+        here = np.isin(blocks["block_id"], list(solved))
+        # Beside a solved specimen, other materials (platens) only hold it: their stress would take attention off it.
+        idle = ~np.isin(blocks["material"], np.unique(blocks["material"][here])) if solved else np.zeros(len(here), bool)
+        if idle.any():
+            self.plotter.add_mesh(blocks.extract_cells(idle), color=_IDLE, lighting=False)
+        plain = ~here & ~idle
+        if plain.any():
+            self._filled(blocks.extract_cells(plain))
+        if interior is not None:
+            self._filled(self._warped(interior, 1e-5 * size))
+        edges = blocks.extract_surface(algorithm="dataset_surface").extract_feature_edges(
+            boundary_edges=True, feature_edges=False, non_manifold_edges=False, manifold_edges=False
+        )
+        edges.points += (0.0, 0.0, 2e-5 * size)
+        self.plotter.add_mesh(edges, color=_ROCK_OUTLINE, line_width=1.4 * self.unit, lighting=False)
+
+    def _filled(self, grid: pv.UnstructuredGrid) -> None:
+        grid["fill"] = _values(grid, self.look.component)
+        self.plotter.add_mesh(
+            grid, scalars="fill", cmap=self.look.colours, clim=self.look.limits, n_colors=256,
+            lighting=False, show_scalar_bar=False, copy_mesh=False,
+        )  # fmt: skip
+
+    def _cracks(self, cycle: int) -> None:
+        try:
+            grid = self.run.grid("cracks", cycle)
+        except KeyError:
+            return
+        if not grid.n_cells:
+            return
+        lines = self._warped(grid, 5e-2 * self.metres_per_pixel * 1e3)
+        old = np.asarray(lines["birth_cycle"]) == 0
+        first, last = self.look.births
+        for part, width in ((~old, 4.0), (old, 4.6)):
+            if not part.any():
+                continue
+            chosen = lines.extract_cells(part)
+            fill = {"color": _OLD_CRACK}
+            if part is not old:
+                fill = {"scalars": "birth_cycle", "cmap": "autumn", "clim": (first, max(last, first + 1))}
+            self.plotter.add_mesh(
+                chosen, line_width=width * self.unit, render_lines_as_tubes=True, lighting=False,
+                show_scalar_bar=False, **fill,
+            )  # fmt: skip
+
+    def _camera(self) -> None:
+        x0, x1, y0, y1 = self.look.bounds
+        # The focal point is the window's middle; the drawing's middle is to land on ``centre``.
+        shift_x = (0.5 * self.size[0] - self.centre[0]) * self.metres_per_pixel
+        shift_y = (0.5 * self.size[1] - self.centre[1]) * self.metres_per_pixel
+        focus = (0.5 * (x0 + x1) + shift_x, 0.5 * (y0 + y1) + shift_y)
+        far = 10 * max(x1 - x0, y1 - y0)
+        camera = self.plotter.camera
+        camera.parallel_projection = True
+        camera.focal_point = (*focus, 0.0)
+        camera.position = (*focus, far)
+        camera.up = (0.0, 1.0, 0.0)
+        camera.parallel_scale = 0.5 * self.size[1] * self.metres_per_pixel
+        camera.clipping_range = (0.5 * far, 2 * far)
+
+    def _words(self, cycle: int) -> None:
+        row = self.run.at(cycle)
+        w, h = self.size
+        u = self.unit
+        said = []
+        if np.isfinite(row["load"]):
+            said.append(f"load {row['load'] / 1e6:.2f} MPa")
+        said += [f"t = {_round(row['time'])} s", f"cycle {int(row['cycle'])}"]
+        if self.look.scale not in (0.0, 1.0):
+            said.append(f"displacements × {self.look.scale:g}")
+        self._text(self.run.title, (24 * u, h - 38 * u), 15)
+        self._text("     ".join(said), (24 * u, h - 64 * u), 11, "#4a4e55")
+        name = COMPONENTS[self.look.component][2]
+        low, high = self.look.limits
+        if self.look.upright:
+            left = w - 190 * u
+            self._bar(self.look.colours, low, high, (left, h - 400 * u, 26 * u, 260 * u))
+            self._text(f"{name}, MPa", (left, h - 128 * u), 12)
+            self._text("tension positive", (left, h - 428 * u), 9, "#4a4e55")
+            below = (left, 60 * u, 26 * u, 150 * u)
+        else:
+            self._bar(self.look.colours, low, high, (24 * u, 44 * u, 0.45 * w, 18 * u))
+            self._text(f"{name}, MPa (tension positive)", (24 * u, 68 * u), 11)
+            below = (0.62 * w, 44 * u, 0.3 * w, 18 * u)
+        first, last = self.look.births
+        if last > first:
+            self._bar("autumn", first, last, below, whole=True)
+            self._text("grown in cycle", (below[0], below[1] + below[3] + 10 * u), 11)
+
+    def _text(self, text: str, at: tuple[float, float], size: float, colour: str = _INK) -> None:
+        # VTK's own fonts have no Greek.
+        self.plotter.add_text(text, position=at, font_size=size * self.unit, color=colour, font_file=_font())
+
+    def _bar(
+        self, colours: str, low: float, high: float, box: tuple[float, float, float, float], whole: bool = False
+    ) -> None:
+        """A scalar bar drawn as an actor of its own, since several meshes share it and its labels are to be round."""
+        import pyvista as pv
+        from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
+
+        x, y, w, h = box
+        upright, n = h > w, 256
+        t = np.linspace(0.0, 1.0, n + 1)
+        across = np.array([0.0, 1.0])
+        gx, gy = np.meshgrid(x + w * across, y + h * t) if upright else np.meshgrid(x + w * t, y + h * across)
+        strip = pv.StructuredGrid(gx, gy, np.zeros_like(gx)).extract_surface(algorithm="dataset_surface")
+        strip.cell_data["colour"] = _strip_colours(colours, n)
+        mapper = vtkPolyDataMapper2D()
+        mapper.SetInputData(strip)
+        mapper.SetScalarModeToUseCellData()
+        place = vtkCoordinate()
+        place.SetCoordinateSystemToDisplay()
+        mapper.SetTransformCoordinate(place)
+        actor = vtkActor2D()
+        actor.SetMapper(mapper)
+        self.plotter.add_actor(actor, render=False)
+        for value in _ticks(low, high, max(2, int(max(w, h) / (45 if upright else 80) / self.unit)), whole):
+            f = (value - low) / (high - low)
+            at = (x + w + 10 * self.unit, y + h * f - 8 * self.unit) if upright else (x + w * f - 8 * self.unit, y - 26 * self.unit)
+            self._text(_round(value), at, 10)
+
+
+def _strip_colours(colours: str, n: int) -> np.ndarray:
+    import matplotlib
+
+    return (255 * matplotlib.colormaps[colours](np.linspace(0, 1, n))[:, :3]).astype(np.uint8)
+
+
+def _ticks(low: float, high: float, most: int, whole: bool = False) -> list[float]:
+    """Round numbers from ``low`` to ``high``, at most about ``most``; ``whole`` ones where asked."""
+    least = (high - low) / most
+    step = 10.0 ** math.floor(math.log10(least))
+    step *= next(m for m in (1, 2, 5, 10) if m * step >= least * (1 - 1e-9))
+    if whole:
+        step = max(1.0, step)
+    return [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
+
+
+@lru_cache(maxsize=1)
+def _font() -> str:
+    import matplotlib
+
+    return str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
+
+
+def _round(value: float) -> str:
+    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
