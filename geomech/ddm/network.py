@@ -33,7 +33,7 @@ class Obstacle:
     b: Point
     row: Row | None
 
-    def same_as(self, other: "Obstacle | None") -> bool:
+    def same_as(self, other: Obstacle | None) -> bool:
         if other is None:
             return False
         return self is other or (self.row is not None and self.row is other.row) or (

@@ -301,7 +301,7 @@ def test_random_networks_stay_sound(seed):
                 break
             tips = tips_of(cracks, rng.normal(0, turn, n).clip(-2.4, 2.4), rng.uniform(0.5, 4, n))
             before = cracks
-            growth = advance(cracks, lambda b: loops, tips, settings, np.ones(n), cycle)
+            growth = advance(cracks, lambda b, loops=loops: loops, tips, settings, np.ones(n), cycle)
             cracks = growth.cracks
             assert_sound(cracks, {0: loops}, settings)
             kinds |= {join.kind for join in growth.joins}
