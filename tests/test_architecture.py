@@ -1,0 +1,184 @@
+"""The house's order, read from the source: who may import whom, what stays out of the solvers, what stands at the top."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+HOUSE = ROOT / "geomech"
+
+BASE = {"conventions", "reference", "model"}
+#: What each part may import of geomech (besides itself). Data flows one way.
+MAY_IMPORT = {
+    "conventions": BASE,
+    "reference": BASE,
+    "model": BASE,
+    "dda": BASE,
+    "ddm": BASE,
+    "coupling": BASE | {"dda", "ddm"},
+    "shapes": BASE - {"reference"},
+    "scene": BASE - {"reference"} | {"shapes"},
+    # Output and pictures take records; they know nothing of how they were solved.
+    "output": BASE | {"shapes", "scene"},
+    "render": BASE | {"shapes", "scene", "output"},
+}
+#: The edge, where everything is put together; nothing above imports it.
+EDGE = {"__init__", "__main__", "bench", "cli", "doctor", "pipeline", "report", "sweep"}
+
+#: Distributions that only these parts import.
+ONLY_IN = {
+    "gmsh": {"shapes"},
+    "vtk": {"output", "render"},
+    "vtkmodules": {"output", "render"},
+    "pyvista": {"output", "render"},
+    "matplotlib": {"render"},
+    "imageio": {"render"},
+    "pydantic": {"scene"},
+    "meshio": {"shapes", "output"},
+    "numba": {"dda", "ddm", "coupling"},
+    "shapely": {"shapes", "scene", "coupling", "output", "render"},
+}
+#: Heavy ones are imported where they are used, never when a module is.
+LAZY = {"gmsh", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", "imageio", "meshio"}
+
+SOURCES = sorted(HOUSE.rglob("*.py"))
+
+
+def part_of(path: Path) -> str:
+    """The part of the house that a source file belongs to."""
+    return path.relative_to(HOUSE).parts[0].removesuffix(".py")
+
+
+def is_for_checkers(node: ast.AST) -> bool:
+    """``if TYPE_CHECKING:``, which never runs."""
+    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+
+
+def imports(path: Path, package: str | None = None, source: str | None = None):
+    """All (dotted name, line, at module level) that ``path`` imports, those inside functions too."""
+    package = package or ".".join(path.relative_to(ROOT).parts[:-1])
+    tree = ast.parse(path.read_text(encoding="utf-8") if source is None else source, filename=str(path))
+    inner = {
+        id(node)
+        for outer in ast.walk(tree)
+        if isinstance(outer, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)) or is_for_checkers(outer)
+        for node in ast.walk(outer)
+    }
+    for node in ast.walk(tree):
+        top = id(node) not in inner
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node.lineno, top
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                above = package.split(".")[: len(package.split(".")) - node.level + 1]
+                base = ".".join([*above, base] if base else above)
+            for alias in node.names:
+                yield f"{base}.{alias.name}", node.lineno, top
+
+
+def breaches(path: Path, part: str, found) -> list[str]:
+    """What in the imports ``found`` of a file of ``part`` is against the rules."""
+    wrong = []
+    for name, line, top in found:
+        first, *rest = name.split(".")
+        where = f"{path}:{line}"
+        if first == "geomech":
+            other = rest[0] if rest else "__init__"
+            if other != "__version__" and part in MAY_IMPORT and other != part and other not in MAY_IMPORT[part]:
+                wrong.append(f"{where}: {part} must not import geomech.{other}")
+        elif first in ONLY_IN and part not in ONLY_IN[first]:
+            wrong.append(f"{where}: {first} is imported outside {', '.join(sorted(ONLY_IN[first]))}")
+        elif first in LAZY and top:
+            wrong.append(f"{where}: {first} must be imported inside the function that needs it")
+    return wrong
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_keep_to_the_house(path):
+    assert breaches(path.relative_to(ROOT), part_of(path), imports(path)) == []
+
+
+def test_the_reader_of_imports_sees_every_kind():
+    """The check above is only as good as its reading: every form of import, against rules it breaks."""
+    source = (
+        "import gmsh\nfrom ..ddm import Body\nfrom .. import coupling\n"
+        "def f():\n    from geomech.output.series import Series\n    import scipy.linalg\n    from . import basis\n"
+    )
+    path = HOUSE / "dda" / "imaginary.py"
+    found = list(imports(path, source=source))
+    assert [name for name, _, _ in found] == [
+        "gmsh",
+        "geomech.ddm.Body",
+        "geomech.coupling",
+        "geomech.output.series.Series",
+        "scipy.linalg",
+        "geomech.dda.basis",
+    ]
+    wrong = breaches(path, "dda", found)
+    assert [w.split(": ", 1)[1] for w in wrong] == [
+        "gmsh is imported outside shapes",
+        "dda must not import geomech.ddm",
+        "dda must not import geomech.coupling",
+        "dda must not import geomech.output",
+    ]
+    assert breaches(path, "dda", [("scipy.linalg", 1, True)]) != []
+
+
+def test_every_part_has_its_place():
+    parts = {part_of(path) for path in SOURCES}
+    assert parts <= set(MAY_IMPORT) | EDGE, "a new part of the house: say above what it may import"
+    assert {"conventions", "model", "dda", "ddm", "coupling"} <= parts
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_modules_are_named_after_their_idea_and_do_not_print(path):
+    assert path.stem not in {"utils", "util", "helpers", "helper", "common", "misc"}
+    if part_of(path) in EDGE:
+        return
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    printing = [
+        n.lineno
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Call) and isinstance(n.func, ast.Name) and n.func.id == "print"
+    ]
+    assert not printing, f"print in line {printing}"
+
+
+ABSENT = """
+import importlib.abc, sys
+class Absent(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {absent!r}:
+            raise ImportError(name + " is not here")
+sys.meta_path.insert(0, Absent())
+import {module}
+print(sorted({absent!r} & {{name.split(".")[0] for name in sys.modules}}))
+"""
+
+
+@pytest.mark.parametrize("module", ["geomech", "geomech.ddm", "geomech.dda", "geomech.ddm.criteria", "geomech.ddm.growth"])
+def test_solvers_stand_alone(module):
+    """Each solver imports with none of the packages of scenes, drawings and pictures installed."""
+    absent = {"pydantic", "shapely", "gmsh", "vtk", "vtkmodules", "pyvista", "matplotlib", "meshio", "imageio"}
+    code = ABSENT.format(absent=absent, module=module)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "[]"
+
+
+def test_top_level_is_as_agreed():
+    listed = subprocess.run(["git", "ls-files"], capture_output=True, text=True, cwd=ROOT, check=False)
+    if listed.returncode or not listed.stdout:
+        pytest.skip("not a git checkout")
+    files = [Path(line) for line in listed.stdout.splitlines()]
+    allowed = {"pyproject.toml", "README.md", "LICENSE", ".gitignore", ".ci"}
+    allowed |= {"geomech", "geometry", "pipelines", "tests", "outputs"}
+    assert {f.parts[0] for f in files} <= allowed
+    assert not [f for f in files if f.parts[0] == "geometry" and f.suffix == ".py"], "geometry holds data, no Python"
