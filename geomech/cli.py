@@ -77,11 +77,13 @@ def _parser() -> argparse.ArgumentParser:
         "render", _render, "draw a run: the last cycle as a picture, its growth as a movie, its curves",
         "geomech render outputs/two_cracks/phi_30 --component yy --no-gif",
     )  # fmt: skip
+    render.description += " What is not said here, the scene's [render] table says."
     render.add_argument("run", type=Path, metavar="RUN", help="run folder")
     render.add_argument("--out", type=Path, metavar="DIR", help="where the pictures go (default RUN/pictures)")
-    render.add_argument("--component", metavar="NAME", help="stress to fill with: xx, yy, xy, zz, s1, s3, von_mises (default yy)")
-    render.add_argument("--width", type=int, metavar="PX", help="width of the pictures (default 800)")
-    render.add_argument("--gif", action=argparse.BooleanOptionalAction, default=None, help="draw the movie (default: yes)")
+    render.add_argument("--component", metavar="NAME", 
+                        help="stress to fill with: xx, yy, zz, xy, principal_max, principal_min, von_mises")  # fmt: skip
+    render.add_argument("--width", type=int, metavar="PX", help="width of the pictures")
+    render.add_argument("--gif", action=argparse.BooleanOptionalAction, default=None, help="draw the movie")
 
     report = verb(
         "report", _report, "tabulate what runs came to: loads of initiation and coalescence, growth, time",

@@ -24,10 +24,13 @@ COMPONENTS = {
     "yy": ("stress", 1, "σyy"),
     "zz": ("stress", 2, "σzz"),
     "xy": ("stress", 3, "σxy"),
-    "s1": ("principal_stress", 0, "σ1"),
-    "s3": ("principal_stress", 2, "σ3"),
+    "principal_max": ("principal_stress", 0, "largest principal stress"),
+    "principal_min": ("principal_stress", 2, "smallest principal stress"),
     "von_mises": ("", -1, "von Mises stress"),
 }
+
+#: What the colour of cracks means → the legend's title.
+CRACK_COLOURS = {"birth": "grown in cycle", "opening": "opening, µm"}
 
 #: The largest displacement relative to the block system, drawn as this fraction of its size.
 DEFORMATION = 0.03
@@ -35,19 +38,20 @@ DEFORMATION = 0.03
 ROBUST = (1.5, 98.5)
 
 _ROCK_OUTLINE, _INK, _IDLE = "#3b3f46", "#1b1d21", "#e4e4e1"
-_OLD_CRACK = "#15161a"
+_OLD_CRACK, _CRACK_COLOURS = "#15161a", "autumn"
 
 
 @dataclass(frozen=True)
 class Look:
     """What stays the same from frame to frame. ``bounds`` (x0, x1, y0, y1) m as drawn; ``limits`` MPa; ``scale`` of
-    the displacement; ``births`` first and last cycle in which a crack grew (equal: none did)."""
+    the displacement; ``cracks`` the array that colours them and ``crack_limits`` its span (equal: all the same)."""
 
     component: str
     bounds: tuple[float, float, float, float]
     limits: tuple[float, float]
     scale: float
-    births: tuple[int, int]
+    cracks: str
+    crack_limits: tuple[float, float]
     width: int
 
     @property
@@ -65,19 +69,15 @@ class Look:
         return "YlGnBu" if high > 0 and low > -0.15 * high else "YlGnBu_r"
 
 
-def picture(run: Run, path: Path, *, component: str = "yy", width: int = 800, cycle: int | None = None) -> Path:
-    """Draw ``cycle`` (default: the last) of ``run`` into the PNG ``path``. Raises KeyError for an unknown component,
-    RenderingUnavailable where no window can be opened."""
-    last = int(run.history["cycle"][-1]) if cycle is None else cycle
-    with _Painter(run, look(run, last, component=component, width=width)) as painter:
-        painter.draw(last)
+def picture(run: Run, path: Path, fixed: Look, cycle: int) -> Path:
+    """Draw ``cycle`` of ``run`` into the PNG ``path``. Raises RenderingUnavailable where no window can be opened."""
+    with _Painter(run, fixed) as painter:
+        painter.draw(cycle)
         painter.save(path)
     return path
 
 
-def movie(
-    run: Run, path: Path, *, component: str = "yy", width: int = 800, frames: int = 48, seconds: float = 6.0
-) -> Path | None:
+def movie(run: Run, path: Path, fixed: Look, *, frames: int = 48, frames_per_second: float = 10.0) -> Path | None:
     """Draw the run's growth as the GIF ``path``: about ``frames`` cycles, most of them from those in which cracks grew;
     the last one stands still for a while. None where there are not two cycles to show."""
     import imageio.v3 as imageio
@@ -85,13 +85,12 @@ def movie(
     shown = moments(run, frames)
     if len(shown) < 2:
         return None
-    fixed = look(run, int(run.history["cycle"][-1]), component=component, width=width)
     with _Painter(run, fixed) as painter:
         images = []
         for cycle in shown:
             painter.draw(cycle)
             images.append(painter.image())
-    times = [1000 * seconds / len(images)] * len(images)
+    times = [1000 / frames_per_second] * len(images)
     times[-1] = 1800
     imageio.imwrite(path, _palettes(images), extension=".gif", plugin="pillow", duration=times, loop=0)
     return path
@@ -113,33 +112,54 @@ def moments(run: Run, frames: int) -> list[int]:
     return sorted({int(c) for c in chosen})
 
 
-def look(run: Run, cycle: int, *, component: str = "yy", width: int = 800) -> Look:
-    """Colours, frame and magnification that suit ``cycle``, for it and every one before it."""
+def look(
+    run: Run,
+    cycle: int,
+    *,
+    component: str = "yy",
+    width: int = 800,
+    scale: float | None = None,
+    crack_colour: str = "birth",
+) -> Look:
+    """Colours, frame and magnification that suit ``cycle``, for it and every one before it.
+
+    ``scale`` magnifies displacements (None: so that they are seen); ``crack_colour`` is "birth" (the cycle in which a
+    piece grew) or "opening". Raises KeyError for an unknown component or crack colour."""
     if component not in COMPONENTS:
         raise KeyError(f"no stress component {component!r}; there are {', '.join(COMPONENTS)}")
+    if crack_colour not in CRACK_COLOURS:
+        raise KeyError(f"no crack colour {crack_colour!r}; there are {', '.join(CRACK_COLOURS)}")
     blocks = run.grid("blocks", cycle)
     x0, x1, y0, y1 = blocks.bounds[:4]
-    size = max(x1 - x0, y1 - y0)
-    scale = _magnification(blocks, size)
+    if not int(blocks.field_data["REFERENCE"][0]):
+        scale = 0.0  # drawn where they are
+    elif scale is None:
+        scale = _magnification(blocks, max(x1 - x0, y1 - y0))
     moved = blocks.points + scale * blocks["displacement"]
     (x0, y0), (x1, y1) = np.minimum((x0, y0), moved.min(axis=0)[:2]), np.maximum((x1, y1), moved.max(axis=0)[:2])
     interior = _interior(run, cycle)
     source = interior if interior is not None else blocks
-    birth = run.grid("cracks", cycle)["birth_cycle"]
-    grown = birth[birth > 0]
     return Look(
         component=component,
         bounds=(x0, x1, y0, y1),
         limits=_limits(source, component),
         scale=scale,
-        births=(int(grown.min()), int(grown.max())) if len(grown) else (0, 0),
+        cracks=crack_colour,
+        crack_limits=_crack_limits(run, cycle, crack_colour),
         width=width,
     )
 
 
+def _crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
+    cracks = run.grid("cracks", cycle)
+    if colour == "birth":
+        grown = cracks["birth_cycle"][cracks["birth_cycle"] > 0]
+        return (float(grown.min()), float(grown.max())) if len(grown) else (0.0, 0.0)
+    opening = np.abs(cracks["opening"][np.isfinite(cracks["opening"])]) * 1e6
+    return (0.0, float(np.percentile(opening, 98))) if len(opening) else (0.0, 0.0)
+
+
 def _magnification(blocks: pv.UnstructuredGrid, size: float) -> float:
-    if not int(blocks.field_data["REFERENCE"][0]):
-        return 0.0  # drawn where they are
     # A common translation shows nothing; what counts is how far points move against each other.
     spread = np.ptp(blocks["displacement"], axis=0).max()
     if spread <= 1e-12 * size:
@@ -291,19 +311,23 @@ class _Painter:
         if not grid.n_cells:
             return
         lines = self._warped(grid, 5e-2 * self.metres_per_pixel * 1e3)
-        old = np.asarray(lines["birth_cycle"]) == 0
-        first, last = self.look.births
-        for part, width in ((~old, 4.0), (old, 4.6)):
-            if not part.any():
-                continue
-            chosen = lines.extract_cells(part)
-            fill = {"color": _OLD_CRACK}
-            if part is not old:
-                fill = {"scalars": "birth_cycle", "cmap": "autumn", "clim": (first, max(last, first + 1))}
-            self.plotter.add_mesh(
-                chosen, line_width=width * self.unit, render_lines_as_tubes=True, lighting=False,
-                show_scalar_bar=False, **fill,
-            )  # fmt: skip
+        lines["opening"] = 1e6 * lines["opening"]
+        by_birth = self.look.cracks == "birth"
+        # What the scene drew has no birth to show: black. Openings are shown on all of a crack.
+        old = np.asarray(lines["birth_cycle"]) == 0 if by_birth else np.zeros(lines.n_cells, bool)
+        low, high = self.look.crack_limits
+        fill = {
+            "scalars": "birth_cycle" if by_birth else "opening",
+            "cmap": _CRACK_COLOURS,
+            "clim": (low, high if high > low else low + 1),
+            "nan_color": _OLD_CRACK,
+        }
+        for part, width, shown in ((~old, 4.0, fill), (old, 4.6, {"color": _OLD_CRACK})):
+            if part.any():
+                self.plotter.add_mesh(
+                    lines.extract_cells(part), line_width=width * self.unit, render_lines_as_tubes=True,
+                    lighting=False, show_scalar_bar=False, **shown,
+                )  # fmt: skip
 
     def _camera(self) -> None:
         x0, x1, y0, y1 = self.look.bounds
@@ -344,10 +368,10 @@ class _Painter:
             self._bar(self.look.colours, low, high, (24 * u, 44 * u, 0.45 * w, 18 * u))
             self._text(f"{name}, MPa (tension positive)", (24 * u, 68 * u), 11)
             below = (0.62 * w, 44 * u, 0.3 * w, 18 * u)
-        first, last = self.look.births
+        first, last = self.look.crack_limits
         if last > first:
-            self._bar("autumn", first, last, below, whole=True)
-            self._text("grown in cycle", (below[0], below[1] + below[3] + 10 * u), 11)
+            self._bar(_CRACK_COLOURS, first, last, below, whole=self.look.cracks == "birth")
+            self._text(CRACK_COLOURS[self.look.cracks], (below[0], below[1] + below[3] + 10 * u), 11)
 
     def _text(self, text: str, at: tuple[float, float], size: float, colour: str = _INK) -> None:
         # VTK's own fonts have no Greek.
