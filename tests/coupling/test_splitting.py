@@ -8,7 +8,8 @@ import shapely
 import shapely.ops
 
 from geomech.coupling.splitting import split_blocks
-from geomech.model import CONTACT, OPEN, STICK, Blocks, Cracks, State
+from geomech.ddm.growth import advance
+from geomech.model import CONTACT, OPEN, STICK, TIP, Blocks, Cracks, GrowthSettings, State
 
 DENSITY = 2700.0
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
@@ -368,3 +369,39 @@ def test_random_line_cuts(seed):
         return
     assert split.blocks.n_blocks == expected
     assert_conserved(blocks, state, split)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_growing_cracks_fragment_a_block(seed):
+    """Cracks that wander through a block with a hole until little grows: after every split mass and momenta are the
+    same, the pieces tile the block, and each piece can be cut on."""
+    rng = np.random.default_rng(seed)
+    outline = np.array([[0, 0], [10, 0], [10, 8], [6, 8], [5, 5], [4, 8], [0, 8.0]])
+    hole = np.array([[4, 2], [6, 2], [6, 3], [4, 3.0]])
+    blocks = Blocks.from_polygons([[outline, hole]])
+    state = moving(blocks, seed)
+    start = totals(blocks, state)
+    lines = [[[0, 4], [1, 4.2]], [[2, 1], [3, 1.5]], [[8, 2], [8.5, 3]], [[7, 6], [8, 6.5]], [[2, 6], [2.5, 5]]]
+    cracks = Cracks.from_polylines(lines, surface=[(k == 0, False) for k in range(5)])
+    settings = GrowthSettings(increment=0.5, min_increment=0.1, join_distance=0.5)
+    splits = 0
+    for cycle in range(1, 60):
+        tips = np.zeros(len(cracks.tips), TIP)
+        tips["node"] = cracks.tips
+        for tip in tips:
+            row = int(np.argwhere(cracks.segments == tip["node"])[0, 0])
+            far = cracks.segments[row].sum() - tip["node"]
+            tip["crack"], tip["block"] = cracks.crack[row], cracks.block[row]
+            tip["direction"] = (out := cracks.nodes[tip["node"]] - cracks.nodes[far]) / np.hypot(*out)
+        tips["k_eq"], tips["angle"] = rng.uniform(0.5, 2, len(tips)), rng.normal(0, 0.3, len(tips)).clip(-1, 1)
+        growth = advance(cracks, blocks.loops, tips, settings, np.ones(len(tips)), cycle)
+        cracks = growth.cracks
+        split = split_blocks(blocks, state, cracks)
+        if split is not None:
+            assert growth.joins, "a block fell apart though nothing joined"
+            assert_conserved(blocks, state, split)
+            blocks, state, cracks = split.blocks, split.state, split.cracks
+            splits += 1
+            assert split_blocks(blocks, state, cracks) is None
+    assert splits >= 2
+    np.testing.assert_allclose(totals(blocks, state), start, rtol=1e-11, atol=1e-12 * np.abs(start).max())
