@@ -29,7 +29,7 @@ class InteriorMeshes:
 
     def __init__(self, n_triangles: int = 1500, tip_ratio: float = 15.0) -> None:
         self.n_triangles, self.tip_ratio = n_triangles, tip_ratio
-        self._kept: dict[int, tuple[bytes, Any, np.ndarray]] = {}
+        self._kept: dict[int, tuple[bytes, Any, np.ndarray, np.ndarray]] = {}
 
     def grid(self, cycle: Cycle, materials: Sequence[Material], motion: Motion, configuration: str) -> Grid:
         """The blocks of ``cycle.bodies`` as one grid; empty when there are none."""
@@ -61,18 +61,20 @@ class InteriorMeshes:
         )
 
     def _block(self, cycle: Cycle, b: int, body: Any, motion: Motion) -> dict[str, np.ndarray]:
-        mesh, look_from = self._mesh(cycle, b)
+        mesh, look_from, weights = self._mesh(cycle, b)
         gradient = motion.gradient[b]
         turn = float(rotation(gradient))
         own = np.asarray(body.displacement(look_from), dtype=float)
         return {
             "points": mesh.points,
             "triangles": mesh.triangles,
-            "moved": _placed(mesh.points, own, motion.reference_centre[b], motion.centre[b], gradient, turn),
+            "moved": _placed(
+                mesh.points, weights, own, motion.reference_centre[b], motion.centre[b], gradient, turn
+            ),
             "stress": rotate_stress(body.stress(look_from), turn),
         }
 
-    def _mesh(self, cycle: Cycle, b: int) -> tuple[Any, np.ndarray]:
+    def _mesh(self, cycle: Cycle, b: int) -> tuple[Any, np.ndarray, np.ndarray]:
         loops, cracks = cycle.blocks.loops(b), cycle.cracks.in_block(b)
         key = b"|".join([*(loop.tobytes() for loop in loops), cracks.nodes.tobytes(), cracks.segments.tobytes()])
         kept = self._kept.get(b)
@@ -81,7 +83,8 @@ class InteriorMeshes:
 
             size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self.n_triangles))
             mesh = mesh_interior(loops, cracks, size, size / self.tip_ratio)
-            kept = self._kept[b] = (key, mesh, mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side)
+            look_from = mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side
+            kept = self._kept[b] = (key, mesh, look_from, _node_areas(mesh))
         return kept[1:]
 
 
@@ -96,22 +99,39 @@ def _local_size(mesh: Any) -> np.ndarray:
     return np.where(np.isfinite(size), size, 0.0)
 
 
+def _node_areas(mesh: Any) -> np.ndarray:
+    """(n,) m²: a third of the triangles around every point."""
+    a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
+    u, v = b - a, c - a
+    third = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 6
+    return np.bincount(mesh.triangles.ravel(), weights=np.repeat(third, 3), minlength=len(mesh.points))
+
+
 def _placed(
-    points: np.ndarray, own: np.ndarray, centre: np.ndarray, centre_now: np.ndarray, gradient: np.ndarray, turn: float
+    points: np.ndarray,
+    weights: np.ndarray,
+    own: np.ndarray,
+    centre: np.ndarray,
+    centre_now: np.ndarray,
+    gradient: np.ndarray,
+    turn: float,
 ) -> np.ndarray:
     """The body's ``own`` displacement with its rigid part replaced by the block's.
 
-    A body under given tractions knows its displacement up to a rigid motion, so that part is taken out (least squares
-    over the mesh) and the block's put in its place; the deformation turns with the block.
+    A body under given tractions knows its displacement up to a rigid motion, so that part is taken out and the block's
+    put in its place; the deformation turns with the block. The rigid part is that of the affine motion which fits best
+    over the area (``weights``): fitted without the strain, it would pick up a spin from strain on a lopsided body.
     """
-    arm = points - points.mean(axis=0)
-    spin = np.sum(arm[:, 0] * own[:, 1] - arm[:, 1] * own[:, 0]) / np.sum(arm**2)
-    deforming = own - own.mean(axis=0) - spin * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+    share = weights / weights.sum()
+    middle = share @ points
+    arm, mean = points - middle, share @ own
+    moments = arm.T @ (share[:, None] * arm)
+    slope = (own - mean).T @ (share[:, None] * arm) @ np.linalg.inv(moments)
+    spin = 0.5 * (slope[1, 0] - slope[0, 1])
+    deforming = own - mean - spin * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
     c, s = math.cos(turn), math.sin(turn)
-    r = np.array([[c, -s], [s, c]])
     # cos − 1 = −2 sin²(turn/2) keeps the digits of small rotations.
-    r_minus_1 = np.array([[-2 * math.sin(turn / 2) ** 2, -s], [s, -2 * math.sin(turn / 2) ** 2]])
-    # The middle of the mesh goes where the block's affine motion takes it; about it, the block turns.
-    middle = points.mean(axis=0)
+    less = -2 * math.sin(turn / 2) ** 2
+    # The body's middle goes where the block's affine motion takes it; about it, the block turns.
     shift = (centre_now - centre) + (gradient - np.eye(2)) @ (middle - centre)
-    return shift + arm @ r_minus_1.T + deforming @ r.T
+    return shift + arm @ np.array([[less, -s], [s, less]]).T + deforming @ np.array([[c, -s], [s, c]]).T
