@@ -1,0 +1,141 @@
+"""Pictures held against what they must show: where the rock is, where the crack is, which colours stand where.
+
+A picture is measured in pixels; positions follow from the layout within two of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import synthetic_run as made
+
+from geomech.output import Histories, Run, Series, Summary
+from geomech.render import draw, offscreen
+from geomech.render.picture import COMPONENTS, _ticks, look, moments, picture
+from geomech.render.plots import plots
+
+imageio = pytest.importorskip("imageio.v3")
+pytestmark = pytest.mark.skipif(offscreen.usable_window() is None, reason="no off-screen OpenGL here")
+
+
+@pytest.fixture(scope="module")
+def drawn(drawn_run, tmp_path_factory):
+    out = tmp_path_factory.mktemp("pictures")
+    return {path.name: path for path in draw(drawn_run, out)}
+
+
+def test_everything_is_drawn_at_the_scenes_width(drawn):
+    assert list(drawn) == ["specimen.png", "growth.gif", "stress_strain.png", "stress_intensity.png", "crack_length.png"]
+    image = imageio.imread(drawn["specimen.png"])
+    assert image.shape[1] == 500
+    assert (image[:3] == 255).all()  # white margins
+
+
+def test_rock_hole_notch_and_crack_are_where_they_should_be(drawn_run, tmp_path):
+    """Undeformed, 1 m is so many pixels: the crack is dark at the origin, the hole and the notch are white."""
+    fixed = look(drawn_run, 5, scale=0.0, width=1000)
+    image = imageio.imread(picture(drawn_run, tmp_path / "a.png", fixed, 5)).astype(int)
+    ink = (image < 250).any(axis=2)
+    # The platens' lower edge: the lowest row with ink right across; bounds are those of the blocks.
+    x0, x1, y0, y1 = fixed.bounds
+    assert (x0, x1, y0, y1) == pytest.approx((-0.03, 0.03, -0.07, 0.07))
+    bottom = np.flatnonzero(ink.sum(axis=1) > 200)[-1]
+    row = np.flatnonzero(ink[bottom - 5, :700])
+    pixels_per_metre = (row[-1] - row[0]) / (x1 - x0)
+
+    def at(x, y):
+        return image[round(bottom - (y - y0) * pixels_per_metre), round(row[0] + (x - x0) * pixels_per_metre)]
+
+    assert (at(-0.0175, -0.0375) == 255).all()  # the hole
+    assert (at(0.0285, 0.0) == 255).all()  # the notch
+    assert at(0.0, 0.0).max() < 60  # the flaw, black
+    assert np.ptp(at(0.0, 0.065)) < 10  # the platen, grey: another material than the solved specimen
+    assert np.ptp(at(0.0, 0.03)) > 40  # the rock, in colour
+
+
+def test_movie_grows_to_the_last_picture(drawn, drawn_run):
+    frames = imageio.imread(drawn["growth.gif"])
+    assert len(frames) == len(moments(drawn_run, 48)) == 10
+    yellow = [((f[..., 0] > 200) & (f[..., 1] > 120) & (f[..., 2] < 60))[:, :330].sum() for f in frames]
+    assert yellow[0] == 0
+    assert yellow[-1] > 20  # the youngest pieces of crack
+
+
+def test_moments_prefer_growth(tmp_path):
+    made.write(tmp_path, [Histories(), Series(interior_every=0), Summary()], steps=80, passes=30)
+    chosen = moments(Run(tmp_path), 24)
+    assert len(chosen) <= 26
+    assert chosen[0] == 0
+    assert chosen[-1] == 109
+    assert sum(cycle >= 80 for cycle in chosen) >= 14
+
+
+def test_colours_end_at_percentiles_of_the_area(drawn_run):
+    """A uniform field gets a band about its value; unknown names are refused with the known ones."""
+    low, high = look(drawn_run, 9).limits
+    assert low < -5 * made.RATE / 1e6 < high
+    assert (high - low) == pytest.approx(0.1 * 5 * made.RATE / 1e6, rel=1e-3)
+    with pytest.raises(KeyError, match="von_mises"):
+        look(drawn_run, 9, component="mises")
+
+
+def test_automatic_magnification_is_a_round_number(drawn_run):
+    scale = look(drawn_run, 9).scale
+    spread = np.ptp(drawn_run.grid("blocks", 9)["displacement"], axis=0).max()
+    assert 0.02 * 0.14 < scale * spread < 0.05 * 0.14
+    assert scale == float(f"{scale:.1g}")
+
+
+def test_a_scene_without_cracks_and_interior_is_drawn(tmp_path):
+    from dataclasses import replace
+
+    from geomech.model import TIP, Cracks
+
+    cycle = replace(
+        made.cycle(0, 5, 0, 0, contacts=0), cracks=Cracks.from_polylines([]), tips=np.zeros(0, TIP), faces=None, bodies={}
+    )
+    for watch in (watchers := [Histories(), Series(configuration="current"), Summary()]):
+        watch.on_start(made.problem(), tmp_path)
+        watch.on_cycle(cycle)
+    for watch in watchers:
+        watch.on_end({})
+    paths = draw(Run(tmp_path), component="von_mises", width=400)
+    assert [path.name for path in paths] == ["specimen.png"]
+    assert imageio.imread(paths[0]).std() > 10
+
+
+def test_opening_can_colour_the_cracks(drawn_run, tmp_path):
+    fixed = look(drawn_run, 9, crack_colour="opening", width=400)
+    assert fixed.crack_limits[1] == pytest.approx(5 * made.RATE * 1e-13 * 0.5 * 1e6, rel=1e-6)
+    assert picture(drawn_run, tmp_path / "o.png", fixed, 9).stat().st_size > 5000
+
+
+@pytest.mark.parametrize("component", COMPONENTS)
+def test_every_component_has_values(drawn_run, component):
+    from geomech.render.picture import _values
+
+    for name in ("interior", "blocks"):
+        values = _values(drawn_run.grid(name, 9), component)
+        assert np.isfinite(values).all()
+    # Uniaxial: von Mises in plane strain is σ √(1 − ν + ν²).
+    if component == "von_mises":
+        grid = drawn_run.grid("interior", 9)
+        assert np.allclose(_values(grid, component), np.asarray(grid["von_mises"]) / 1e6, rtol=1e-5)
+
+
+def test_ticks_are_round_and_inside():
+    assert _ticks(-48.2, 3.1, 6) == [-40.0, -30.0, -20.0, -10.0, 0.0]
+    assert _ticks(0.0, 1.0, 5) == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    assert _ticks(3, 6, 20, whole=True) == [3, 4, 5, 6]
+
+
+def test_curves_need_no_opengl(drawn_run, tmp_path):
+    assert [path.name for path in plots(drawn_run, tmp_path)] == [
+        "stress_strain.png", "stress_intensity.png", "crack_length.png"
+    ]  # fmt: skip
+
+
+def test_missing_opengl_is_told_with_the_way_out(monkeypatch):
+    monkeypatch.setattr(offscreen, "usable_window", lambda: None)
+    with pytest.raises(offscreen.RenderingUnavailable, match="apt-get install -y libegl1"):
+        offscreen.ready()

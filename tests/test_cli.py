@@ -1,0 +1,253 @@
+"""The command line as a user meets it: verbs, exit codes, messages."""
+
+from __future__ import annotations
+
+import csv
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from geomech import __version__, doctor
+from geomech.cli import BAD_INPUT, DONE, FAILED, default_folder, main
+
+VERBS = ("check", "run", "render", "report", "doctor")
+SPECIMEN = """
+title = "A plate"
+[geometry]
+zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
+cracks = [{ name = "flaw", centre = [0.0, 0.0], length_m = 0.01, angle_deg = 45.0 }]
+edges = [
+    { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
+    { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
+]
+[materials.rock]
+youngs_modulus_pa = 17e9
+poissons_ratio = 0.21
+density_kg_m3 = 2200
+k_ic_pa_sqrt_m = 2e6
+[zones.rock]
+material = "rock"
+[loads]
+leading_edge = "load:top"
+[[loads.tractions]]
+edge = "load:top"
+rate_pa_per_s = [0.0, -0.2e6]
+[[loads.tractions]]
+edge = "load:bottom"
+rate_pa_per_s = [0.0, 0.2e6]
+[run]
+end_time_s = 3.0
+[variants.steep]
+"geometry.cracks.0.angle_deg" = 60.0
+"""
+
+
+@pytest.fixture
+def scene(tmp_path) -> Path:
+    (tmp_path / "plate.toml").write_text(SPECIMEN)
+    return tmp_path / "plate.toml"
+
+
+@pytest.fixture
+def finished(tmp_path) -> Path:
+    sys.path.insert(0, str(Path(__file__).parent / "output"))
+    import synthetic_run
+
+    from geomech.output import Histories, Series, Summary
+
+    synthetic_run.write(tmp_path / "runs" / "one", [Histories(), Series(interior_every=0), Summary()])
+    return tmp_path / "runs" / "one"
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.strip() == f"geomech {__version__}"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help_with_an_example(verb, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main([verb, "--help"])
+    assert ended.value.code == 0
+    text = capsys.readouterr().out
+    assert f"example:\n  geomech {verb}" in text
+
+
+@pytest.mark.parametrize("arguments", [[], ["frobnicate"], ["run"], ["render", "x", "--width", "wide"]])
+def test_wrong_usage_ends_with_2(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == BAD_INPUT
+
+
+def test_help_imports_nothing_heavy():
+    heavy = "numpy scipy numba gmsh vtkmodules pyvista shapely pydantic matplotlib"
+    code = (
+        "import sys, geomech.cli\n"
+        "try: geomech.cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        f"loaded = [m for m in {heavy!r}.split() if m in sys.modules]\n"
+        "assert not loaded, loaded\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_check_tells_what_is_there(scene, capsys):
+    assert main(["check", str(scene)]) == DONE
+    out = capsys.readouterr().out
+    assert "A plate: 1 blocks, 1 cracks with 2 tips: no errors" in out
+    assert "variants: steep" in out
+
+
+def test_check_of_all_variants(scene, capsys):
+    assert main(["check", str(scene), "--variant", "all"]) == DONE
+    assert "A plate [steep]" in capsys.readouterr().out
+
+
+def test_check_lists_the_keys(scene, capsys):
+    assert main(["check", str(scene), "--keys"]) == DONE
+    assert "youngs_modulus_pa" in capsys.readouterr().out
+
+
+def test_bad_scene_ends_with_2_and_all_its_errors(scene, capsys):
+    scene.write_text(SPECIMEN.replace("poissons_ratio = 0.21", "poissons_ratio = 0.7").replace("[run]", "[run]\nfast = true"))
+    assert main(["check", str(scene)]) == BAD_INPUT
+    told = capsys.readouterr().err
+    assert "poissons_ratio" in told
+    assert "fast" in told
+    assert "2 errors; nothing was run" in told
+    assert "plate.toml" in told
+    assert "Traceback" not in told
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["check", "nowhere.toml"], "nowhere.toml"),
+        (["run", "nowhere.toml"], "nowhere.toml"),
+        (["render", "nowhere"], "holds no run"),
+        (["report", "nowhere"], "holds no run"),
+    ],
+)
+def test_missing_input_ends_with_2(arguments, message, capsys):
+    assert main(arguments) == BAD_INPUT
+    assert message in capsys.readouterr().err
+
+
+def test_unknown_variant_names_the_known_ones(scene, capsys):
+    assert main(["run", str(scene), "--variant", "flat"]) == BAD_INPUT
+    assert "no variant flat; the scene has steep" in capsys.readouterr().err
+
+
+def test_wrong_override_ends_with_2(scene, capsys):
+    assert main(["check", str(scene), "--set", "growth.criterium=mts"]) == BAD_INPUT
+    assert "criterion" in capsys.readouterr().err
+
+
+def test_run_hands_scene_folder_and_observers_over(scene, tmp_path, monkeypatch):
+    """One folder a run: --out itself for one variant, a sub-folder each for several."""
+    import geomech.pipeline
+
+    ran = []
+    monkeypatch.setattr(geomech.pipeline, "run", lambda scene, out, observers: ran.append((scene.title, out, len(observers))))
+    out = tmp_path / "out"
+    assert main(["run", str(scene), "--out", str(out), "--quiet"]) == DONE
+    assert main(["run", str(scene), "--out", str(out), "--variant", "steep"]) == DONE
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", str(scene), "--variant", "all"]) == DONE
+    assert [entry[1] for entry in ran] == [out, out, Path("outputs/plate/steep")]
+    assert all(entry[0] == "A plate" and entry[2] >= 5 for entry in ran)
+
+
+def test_failed_run_ends_with_1_and_tells_why(scene, tmp_path, monkeypatch, capsys):
+    import geomech.pipeline
+
+    def fails(scene, out, observers):
+        raise ArithmeticError("no equilibrium at t = 2 s")
+
+    monkeypatch.setattr(geomech.pipeline, "run", fails)
+    assert main(["run", str(scene), "--out", str(tmp_path)]) == FAILED
+    told = capsys.readouterr().err
+    assert "no equilibrium at t = 2 s" in told
+    assert "Traceback" not in told
+    with pytest.raises(ArithmeticError):
+        main(["--debug", "run", str(scene), "--out", str(tmp_path)])
+
+
+def test_pipeline_folder_runs_its_script(tmp_path):
+    """A folder with a run.py is handed the folder, the output folder, the overrides and whether to be quiet."""
+    (tmp_path / "study").mkdir()
+    (tmp_path / "study" / "run.py").write_text(
+        "def main(folder, out, overrides, quiet):\n"
+        "    (folder / 'said.txt').write_text(repr((out.name, overrides, quiet)))\n"
+    )
+    arguments = ["run", str(tmp_path / "study"), "--out", str(tmp_path / "o"), "--set", "a.b=1", "--quiet"]
+    assert main(arguments) == DONE
+    assert (tmp_path / "study" / "said.txt").read_text() == repr(("o", ["a.b=1"], True))
+
+
+def test_default_folder_is_named_after_the_scene():
+    assert default_folder(Path("pipelines/two_cracks")) == Path("outputs/two_cracks")
+    assert default_folder(Path("pipelines/two_cracks/scene.toml")) == Path("outputs/two_cracks")
+    assert default_folder(Path("mine/plate.toml")) == Path("outputs/plate")
+
+
+def test_report_of_a_folder_of_runs(finished, capsys):
+    assert main(["report", str(finished.parent)]) == DONE
+    header, row = capsys.readouterr().out.splitlines()
+    assert header.split()[:2] == ["run", "end"]
+    assert row.startswith("one")
+    assert "0.60" in row  # initiation at 3 steps of 0.2 MPa
+    assert main(["report", str(finished), "--csv"]) == DONE
+    (read,) = csv.DictReader(io.StringIO(capsys.readouterr().out))
+    assert float(read["initiation MPa"]) == pytest.approx(0.6, rel=1e-12)
+    assert read["coalescence MPa"] == ""
+
+
+def test_render_prints_what_it_drew(finished, capsys):
+    from geomech.render import offscreen
+
+    if offscreen.usable_window() is None:
+        pytest.skip("no off-screen OpenGL here")
+    assert main(["render", str(finished), "--no-gif", "--width", "300", "--component", "xx"]) == DONE
+    paths = [Path(line) for line in capsys.readouterr().out.splitlines()]
+    assert paths[0].name == "specimen.png"
+    assert all(path.is_file() for path in paths)
+    assert not any(path.suffix == ".gif" for path in paths)
+
+
+def test_doctor_says_how_to_mend(monkeypatch, capsys):
+    broken = doctor.Check("gmsh", False, "missing shared libraries: libGLU.so.1", doctor.apt_line(["libGLU.so.1"]))
+    monkeypatch.setattr(doctor, "examine", lambda: [doctor.Check("python", True, "3.12"), broken])
+    assert main(["doctor"]) == FAILED
+    out = capsys.readouterr().out
+    assert "FAIL gmsh" in out
+    assert "apt-get install -y libglu1-mesa" in out
+
+
+def test_doctor_reads_what_loaders_say():
+    """The messages are glibc's and ldd's own."""
+    loader = "OSError: libGLU.so.1: cannot open shared object file: No such file or directory"
+    assert doctor.missing_libraries(loader) == ["libGLU.so.1"]
+    ldd = "\tlibXcursor.so.1 => not found\n\tlibc.so.6 => /lib/libc.so.6 (0x0)\n\tlibXft.so.2 => not found\n"
+    assert doctor.missing_libraries(ldd) == ["libXcursor.so.1", "libXft.so.2"]
+    assert doctor.apt_line(["libXcursor.so.1", "libXft.so.2"]) == "apt-get install -y libxcursor1 libxft2"
+    assert "libodd.so.9" in doctor.apt_line(["libodd.so.9"])
+
+
+def test_doctor_survives_a_library_that_takes_its_process_down():
+    check = doctor.check_import("gmsh", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "mend it")
+    assert not check.good
+    assert check.mend == "mend it"
+
+
+def test_doctor_names_a_library_that_is_missing():
+    code = "import ctypes; ctypes.CDLL('libnever-there.so.7')"
+    check = doctor.check_import("something", code, "")
+    assert "libnever-there.so.7" in check.found
