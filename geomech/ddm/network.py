@@ -269,6 +269,13 @@ def passage(p: Point, q: Point, a: Point, b: Point) -> tuple[float, float]:
 def _contact(p: Point, q: Point, a: Point, b: Point, clearance: float) -> float | None:
     """The least t in [0, 1] at which p + t (q − p) crosses ab or passes within ``clearance`` of one of its ends, or 1
     when q ends within ``clearance`` of it; None when they stay apart."""
+    if (
+        max(p[0], q[0]) + clearance < min(a[0], b[0])
+        or max(a[0], b[0]) + clearance < min(p[0], q[0])
+        or max(p[1], q[1]) + clearance < min(a[1], b[1])
+        or max(a[1], b[1]) + clearance < min(p[1], q[1])
+    ):
+        return None
     t, u = passage(p, q, a, b)
     found = [t] if 0 <= t <= 1 and 0 <= u <= 1 else []
     dx, dy = q[0] - p[0], q[1] - p[1]

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
+from scipy.spatial import cKDTree
 
 from geomech.ddm.growth import SLIVER, advance
 from geomech.model import TIP, Cracks, GrowthSettings
@@ -51,21 +52,21 @@ def assert_sound(cracks, loops_of, settings):
     pairs = np.sort(cracks.segments, axis=1)
     assert len(np.unique(pairs, axis=0)) == len(pairs), "a segment twice"
     i, j = shapely.STRtree(lines).query(lines, predicate="intersects")
-    for a, b in zip(i[i < j], j[i < j]):
-        if cracks.block[a] != cracks.block[b]:
-            continue
-        shared = set(cracks.segments[a]) & set(cracks.segments[b])
-        assert len(shared) == 1, f"segments {a} and {b} meet without a common node"
-        common = lines[a].intersection(lines[b])
-        # Neighbours on a straight line may overlap by round-off.
-        assert common.length < 1e-12 * size, f"segments {a} and {b} overlap"
-        node = cracks.nodes[shared.pop()]
-        assert math.dist(shapely.get_coordinates(common)[0], node) < 1e-9 * size, f"{a} and {b} cross beside their node"
-    distances = shapely.distance(*(shapely.points(cracks.nodes)[k] for k in np.triu_indices(len(cracks.nodes), 1)))
+    met = (i < j) & (cracks.block[i] == cracks.block[j])
+    i, j = i[met], j[met]
+    first, second = cracks.segments[i], cracks.segments[j]
+    same = first[:, :, None] == second[:, None, :]
+    assert (same.sum(axis=(1, 2)) == 1).all(), "segments meet without one common node"
+    node = first[np.arange(len(i)), same.any(axis=2).argmax(axis=1)] if len(i) else np.empty(0, int)
+    common = shapely.intersection(lines[i], lines[j])
+    # Neighbours on a straight line may overlap by round-off.
+    assert (shapely.length(common) < 1e-12 * size).all(), "segments overlap"
+    beside = shapely.distance(common, shapely.points(cracks.nodes[node]))
+    assert (beside < 1e-9 * size).all(), "segments cross beside their common node"
     own_block = np.zeros(len(cracks.nodes), int)
     own_block[cracks.segments] = cracks.block[:, None]
-    first, second = np.triu_indices(len(cracks.nodes), 1)
-    assert (distances[own_block[first] == own_block[second]] > 1e-9 * size).all(), "two nodes in one place"
+    for a, b in cKDTree(cracks.nodes).query_pairs(1e-9 * size):
+        assert own_block[a] != own_block[b], f"nodes {a} and {b} in one place"
     for block, loops in loops_of.items():
         if not len(loops):
             continue
