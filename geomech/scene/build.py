@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import (
-    Blocks,
     Cracks,
     DdaSettings,
     DdmSettings,

@@ -41,6 +41,7 @@ def check(tables, data, drawing, place, faults, warnings) -> None:
     _times(c)
     _growth_lengths(c)
     _names_once(c)
+    _material_names_exist(c)
     if drawing is not None:
         _zones(c)
         _cracks(c)
@@ -87,18 +88,21 @@ def _material_names(c: Check) -> list[str]:
     return list(materials) if isinstance(materials, dict) else []
 
 
+def _material_names_exist(c: Check) -> None:
+    known = _material_names(c)
+    for name, zone in (c.tables.zones or {}).items():
+        if zone.material is not None and zone.material not in known:
+            c.refuse(("zones", name, "material"), f"there is no material {zone.material!r}", nearest(zone.material, known))
+
+
 def _zones(c: Check) -> None:
     known, materials = list(dict.fromkeys(c.drawing.zones)), _material_names(c)
     given = c.tables.zones
     if given is None:
         return
-    for name, zone in given.items():
+    for name in given:
         if name not in known:
             c.refuse(("zones", name), f"the geometry has no zone {name!r}", nearest(name, known))
-        if zone.material is not None and zone.material not in materials:
-            c.refuse(
-                ("zones", name, "material"), f"there is no material {zone.material!r}", nearest(zone.material, materials)
-            )
     if len(materials) > 1:
         for name in known:
             if name not in given or given[name].material is None:
@@ -189,12 +193,11 @@ def _joints(c: Check) -> None:
                     c.refuse(("joints", name, "between", k, n), f"no edge is called {edge!r}", nearest(edge, known))
             claim(tuple(sorted(pair)), name, ("joints", name, "between", k))
     if c.drawing.blocks.n_blocks > 1 and "default" not in c.tables.joints:
-        if not joint_names(tuple(p for j in c.tables.joints.values() for p in j.edges), known) == known:
-            c.warn(
-                ("joints",),
-                "there is no default joint: contacts that no joint names have neither friction nor cohesion",
-                "add [joints.default]",
-            )
+        c.warn(
+            ("joints",),
+            "there is no default joint: contacts that no joint names have neither friction nor cohesion",
+            "add [joints.default]",
+        )
 
 
 def blocks_at(blocks: Blocks, point: tuple[float, float]) -> list[int]:

@@ -43,15 +43,20 @@ def draw(
         from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
 
         source = ("geometry", "model")
-        try:
-            read = read_gmsh_model(folder / geometry.model, geometry.parameters, geometry.chord_tolerance_m)
-        except GmshModelError as error:
-            at = ("geometry", "parameters", error.parameter) if error.parameter is not None else source
-            faults.append(Fault(place(at), error.message, error.way_out))
-            return None
-        except GmshUnavailable as error:
-            faults.append(Fault(place(source), str(error), "or draw the geometry in the scene, [[geometry.zones]]"))
-            return None
+        wanted, read = dict(geometry.parameters), None
+        while read is None:
+            try:
+                read = read_gmsh_model(folder / geometry.model, wanted, geometry.chord_tolerance_m)
+            except GmshModelError as error:
+                at = ("geometry", "parameters", error.parameter) if error.parameter is not None else source
+                faults.append(Fault(place(at), error.message, error.way_out))
+                if error.parameter not in wanted:
+                    return None
+                # Without the faulty parameter the names of zones, edges and cracks can still be checked.
+                del wanted[error.parameter]
+            except GmshUnavailable as error:
+                faults.append(Fault(place(source), str(error), "or draw the geometry in the scene, [[geometry.zones]]"))
+                return None
         warnings += [Fault(place(source), message, way_out) for message, way_out in read.warnings]
         parameters = {name: entry.value for name, entry in read.parameters.items()}
         zones, traces, edges = read.zones, read.traces, ()

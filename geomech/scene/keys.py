@@ -103,6 +103,20 @@ def expected(annotation: Any) -> str:
     return _SIMPLE.get(inner, getattr(inner, "__name__", str(inner)))
 
 
+def expected_of(field: FieldInfo) -> str:
+    """What may be written for ``field``, its bounds included."""
+    text = expected(field.annotation)
+    if text in ("number", "whole number"):
+        bounds = [
+            f" {sign} {getattr(entry, bound):g}"
+            for bound, sign in (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
+            for entry in field.metadata
+            if getattr(entry, bound, None) is not None
+        ]
+        text += " and".join(bounds)
+    return text
+
+
 def describe_keys() -> str:
     """Every key of a scene, one a line: its name, what may be written, its default, what it means."""
     lines: list[str] = []
@@ -126,21 +140,22 @@ def _describe(table: type[BaseModel], prefix: str, header: str, lines: list[str]
         elif field.default is None or field.default is PydanticUndefined:
             default = "unset"
         else:
-            default = f"default {_written(field.default)}"
-        what = expected(field.annotation) if kind != "map" else "table"
+            default = f"default {written(field.default)}"
+        what = expected_of(field) if kind != "map" else "table"
         lines.append(f"  {key} = {what}  ({default})\n      {field.description}")
     for inner, path, shown, description in later:
         lines.append(f"\n{shown}  {description}")
         _describe(inner, path, shown, lines)
 
 
-def _written(value: Any) -> str:
+def written(value: Any) -> str:
+    """``value`` as TOML writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         return f'"{value}"'
-    if isinstance(value, tuple):
-        return f"[{', '.join(_written(v) for v in value)}]"
+    if isinstance(value, (tuple, list)):
+        return f"[{', '.join(written(v) for v in value)}]"
     if isinstance(value, dict):
-        return "{}"
-    return f"{value:g}"
+        return f"{{ {', '.join(f'{k} = {written(v)}' for k, v in value.items())} }}" if value else "{}"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -244,7 +244,7 @@ class GrowthTable(Table):
 class RunTable(Table):
     end_time_s: Positive = Field(description="the run ends at this time, s")
     stop_at: Annotated[
-        tuple[Literal["initiation", "coalescence", "daylighting", "split", "arrest", "failure"], ...], Strict(False)
+        tuple[Literal["initiation", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
     ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
     boundary_stress: Literal["contacts"] = Field(
         "contacts", description='how contact forces become tractions on cracked blocks: "contacts", linear over each face'

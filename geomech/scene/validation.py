@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from .errors import Fault
-from .keys import description_at, expected, field_of, keys_of, table_at
+from .keys import description_at, expected_of, field_of, keys_of, table_at, written
 from .locator import Path
 from .tables import SceneTables
 
@@ -62,7 +62,7 @@ def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
         path = path[:-1]
     table = table_at(path[:-1]) if path else None
     field = field_of(table, path[-1]) if table else None
-    what = expected(field.annotation) if field else ""
+    what = expected_of(field) if field else ""
     meaning = description_at(path)
 
     if kind == "extra_forbidden":
@@ -80,17 +80,16 @@ def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
         return Fault(place(path), str(context.get("error", item["msg"])), meaning)
     if kind == "literal_error":
         choices = context["expected"].replace("'", '"')
-        return Fault(place(path), f"{given!r} is not one of {choices}", meaning)
+        return Fault(place(path), f"{written(given)} is not one of {choices}", meaning)
     if kind in _COMPARISON:
         key, words = _COMPARISON[kind]
-        return Fault(place(path), f"{given!r} is out of range, it must be {words} {context[key]:g}", meaning)
+        return Fault(place(path), f"{written(given)} is out of range, it must be {words} {context[key]:g}", meaning)
     if kind == "finite_number":
-        return Fault(place(path), f"{given!r} is not a finite number", meaning)
-    if kind.endswith("_type") or kind.endswith("_parsing"):
-        if isinstance(path[-1], int):
-            wanted = {"float": "a number", "string": "a text", "tuple": "an array", "model": "a table"}
-            what = wanted.get(kind.split("_")[0], "")
-        elif table_at(path) or not what:
-            what = {"model": "a table", "dict": "a table", "tuple": "an array"}.get(kind.split("_")[0], what)
-        return Fault(place(path), f"{given!r} is not what belongs here" + (f" ({what})" if what else ""), meaning)
+        return Fault(place(path), f"{written(given)} is not a finite number", meaning)
+    if kind.endswith(("_type", "_parsing")):
+        wanted = {"model": "a table", "dict": "a table", "tuple": "an array"}
+        if isinstance(path[-1], int) or table_at(path) or not what:
+            what = {"float": "number", "string": "text", **wanted}.get(kind.split("_")[0], what)
+        hint = "remove the quotes: " if isinstance(given, str) and "number" in what else ""
+        return Fault(place(path), f"{written(given)} stands where {what or 'something else'} belongs", hint + meaning)
     return Fault(place(path), item["msg"], meaning)

@@ -112,6 +112,8 @@ def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[
                 "remove one of them",
             )
         ring = shapely.Polygon(loop)
+        if ring.convex_hull.area <= tolerance * ring.length:
+            return refuse(f"{what} encloses no area", "check its corners")
         if not ring.is_valid:
             reason = shapely.is_valid_reason(ring)
             where = reason[reason.find("[") + 1 : -1].replace(" ", ", ") if "[" in reason else "?"
@@ -119,8 +121,6 @@ def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[
                 f"{what} crosses or touches itself at ({where})",
                 "list the corners in order along the outline, or split the zone in two",
             )
-        if ring.area <= tolerance * ring.length:
-            return refuse(f"{what} encloses no area", "check its corners")
         found.append(_turned(loop, label, counter_clockwise=number == 0))
     if len(found) > 1:
         outline = shapely.Polygon(found[0][0])

@@ -80,13 +80,16 @@ def read_gmsh_model(
 
 def _open(gmsh, path: Path) -> dict[str, Parameter]:
     """(Re)read the file into the current model; its parameters by short name."""
-    gmsh.clear()
+    # Anew, and not gmsh.clear(): that would wipe other models of a session the caller has open.
+    gmsh.model.remove()
+    gmsh.model.add("geomech")
+    gmsh.parser.clear()  # DefineConstant keeps what a variable of that name already holds
     gmsh.logger.start()
     try:
         gmsh.merge(str(path))
         gmsh.model.occ.synchronize()
         error = None
-    except Exception as raised:  # gmsh raises bare Exception
+    except Exception as raised:  # noqa: BLE001 (Gmsh raises nothing narrower)
         error = str(raised)
     errors = [line[len("Error: ") :] for line in gmsh.logger.get() if line.startswith("Error: ")]
     gmsh.logger.stop()

@@ -50,4 +50,5 @@ def gmsh_session(name: str = "geomech") -> Iterator:
                 gmsh.finalize()
             else:
                 gmsh.model.remove()
-                gmsh.model.setCurrent(before)
+                if before in gmsh.model.list():
+                    gmsh.model.setCurrent(before)

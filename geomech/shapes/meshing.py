@@ -31,7 +31,7 @@ def mesh_interior(
     """Mesh the block bounded by ``loops`` ((n, 2) each, the outline first, then holes) with ``cracks`` (nodes shared
     where they meet) cut open.
 
-    ``size`` is the length of a triangle's side away from cracks (default: some 2000 triangles), ``tip_size`` at crack
+    ``size`` is the length of a triangle's side away from cracks (default: two to four thousand triangles in all), ``tip_size`` at crack
     tips (default a tenth of it, m). Sizes grow from the tips over two lengths of ``size``. Nodes on cracks are
     doubled, at junctions once a sector, at mouths too; tips stay single. Raises ValueError for sizes that are not
     positive, RuntimeError where Gmsh cannot mesh the block.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -26,6 +27,9 @@ def crack_network(
     becomes a mouth; ends within ``tolerance`` of a crack join it; crossings become shared nodes. What cannot be
     placed is added to ``flaws`` under "cracks".
     """
+    import shapely
+
+    tree = shapely.STRtree(polygons)
     net = _Network(names, tolerance, decimals, flaws)
     placed: list[tuple[int, int, np.ndarray, np.ndarray]] = []
     for k, branches in enumerate(lines):
@@ -33,7 +37,7 @@ def crack_network(
             line, ok = _cleaned(k, names[k], line, tolerance, flaws)
             if not ok:
                 continue
-            block = _block_of(k, names[k], line, zone_names, polygons, tolerance, flaws)
+            block = _block_of(k, names[k], line, zone_names, tree, tolerance, flaws)
             if block < 0:
                 continue
             line, mouth, ok = _mouths(k, names[k], line, zone_names[block], loops[block], branches, tolerance, flaws)
@@ -63,17 +67,22 @@ def _cleaned(k: int, name: str, line: np.ndarray, tolerance: float, flaws: list[
     return line, True
 
 
-def _block_of(k, name, line, zone_names, polygons, tolerance, flaws) -> int:
+def _block_of(k, name, line, zone_names, tree, tolerance, flaws) -> int:
     """The block that holds the whole of ``line``, or −1 after saying why there is none."""
     import shapely
 
-    path = shapely.LineString(line)
-    inside = np.array([shapely.intersection(path, polygon).length for polygon in polygons])
+    # Piece by piece: the intersection with a whole line would count a stretch that it runs twice only once.
+    pieces = shapely.linestrings(np.stack([line[:-1], line[1:]], axis=1))
+    length = float(shapely.length(pieces).sum())
+    near = np.unique(tree.query(pieces, predicate="intersects")[1])
+    polygons = tree.geometries[near]
+    inside = shapely.length(shapely.intersection(pieces[:, None], polygons[None])).sum(axis=0)
     slack = 2.5 * tolerance  # an overshoot of one tolerance at each end
-    # On a common outline two blocks hold the crack; the one where it does not run along the boundary is right.
-    holds = np.flatnonzero(inside >= path.length - slack)
-    for block in holds:
-        along = shapely.intersection(path, shapely.boundary(polygons[block])).length
+    # A crack on a common outline is held by two blocks and is wrong in both.
+    holds = np.flatnonzero(inside >= length - slack)
+    for held in holds:
+        block = near[held]
+        along = shapely.length(shapely.intersection(pieces, shapely.boundary(polygons[held]))).sum()
         if along > slack:
             flaws.append(
                 Flaw(
@@ -85,7 +94,7 @@ def _block_of(k, name, line, zone_names, polygons, tolerance, flaws) -> int:
             )
             return -1
     if len(holds):
-        return int(holds[0])
+        return int(near[holds[0]])
     if inside.sum() <= slack:
         flaws.append(
             Flaw(
@@ -97,9 +106,9 @@ def _block_of(k, name, line, zone_names, polygons, tolerance, flaws) -> int:
             )
         )
         return -1
-    block = int(np.argmax(inside))
-    where = shapely.intersection(path, shapely.boundary(polygons[block]))
-    at = shapely.get_coordinates(where)
+    best = int(np.argmax(inside))
+    block = near[best]
+    at = shapely.get_coordinates(shapely.intersection(pieces, shapely.boundary(polygons[best])))
     spot = f" at ({at[0, 0]:g}, {at[0, 1]:g})" if len(at) else ""
     flaws.append(
         Flaw(
@@ -124,7 +133,7 @@ def _mouths(k, name, line, zone, loops, branches, tolerance, flaws):
             line[which], mouth[which] = foot, True
     inner = line[1:-1]
     touching = [p for p in inner if _nearest_on(p, starts, ends, tolerance)[1] <= tolerance]
-    for a, b in zip(line[:-1], line[1:]):
+    for a, b in pairwise(line):
         # A re-entrant corner may touch the crack between its points.
         t = np.clip((starts - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
         off = np.hypot(*(a + t[:, None] * (b - a) - starts).T)
@@ -191,7 +200,7 @@ class _Network:
         flags = np.zeros(len(line), bool)
         flags[0], flags[-1] = mouth
         nodes = [self.node(point, block, bool(flag)) for point, flag in zip(line, flags)]
-        self.segments += [(a, b, crack, block) for a, b in zip(nodes[:-1], nodes[1:]) if a != b]
+        self.segments += [(a, b, crack, block) for a, b in pairwise(nodes) if a != b]
 
     def noded(self) -> Cracks:
         if not self.segments:
@@ -205,11 +214,12 @@ class _Network:
         for (a, b, k, home), on in zip(self.segments, cuts):
             start, along = self.points[a], self.points[b] - self.points[a]
             chain = [a, *sorted(on - {a, b}, key=lambda n: float((self.points[n] - start) @ along)), b]
-            for p, q in zip(chain[:-1], chain[1:]):
-                other = seen.setdefault((min(p, q), max(p, q)), k)
-                if (p, q) in segments or (q, p) in segments:
-                    self._coincident(other, k)
+            for p, q in pairwise(chain):
+                pair = (min(p, q), max(p, q))
+                if pair in seen:
+                    self._coincident(seen[pair], k)
                     continue
+                seen[pair] = k
                 segments.append((p, q))
                 crack.append(k)
                 block.append(home)
