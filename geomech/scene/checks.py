@@ -1,4 +1,4 @@
-"""Checks across the sections of a scene: names that must exist, points that must be in rock, loads that must be held."""
+"""Checks across the sections of a scene: names that must exist, points that must be in rock, loads that must hold."""
 
 from __future__ import annotations
 
@@ -55,11 +55,13 @@ def check(tables, data, drawing, place, faults, warnings) -> None:
 
 def _times(c: Check) -> None:
     if c.tables.run is not None and c.tables.dda is not None and c.tables.dda.time_step_s > c.tables.run.end_time_s:
+        # A time step that is not in the file cannot be pointed at.
+        given = "time_step_s" in c.data.get("dda", {})
         c.refuse(
-            ("dda", "time_step_s"),
+            ("dda", "time_step_s") if given else ("run", "end_time_s"),
             f"the time step ({c.tables.dda.time_step_s:g} s) is longer than the whole run "
             f"({c.tables.run.end_time_s:g} s)",
-            "shorten it, or raise run.end_time_s",
+            "shorten dda.time_step_s, or raise run.end_time_s",
         )
 
 
@@ -70,7 +72,7 @@ def _growth_lengths(c: Check) -> None:
     if growth.min_increment_m > growth.increment_m:
         c.refuse(
             ("growth", "min_increment_m"),
-            f"the shortest advance ({growth.min_increment_m:g} m) is longer than the longest ({growth.increment_m:g} m)",
+            f"the shortest advance ({growth.min_increment_m:g} m) is longer than the longest, {growth.increment_m:g} m",
             "make it at most growth.increment_m",
         )
 
@@ -79,7 +81,9 @@ def _names_once(c: Check) -> None:
     seen: set[str] = set()
     for k, monitor in enumerate(c.tables.monitors or ()):
         if monitor.name in seen:
-            c.refuse(("monitors", k, "name"), f"there are two monitors called {monitor.name!r}", "give each its own name")
+            c.refuse(
+                ("monitors", k, "name"), f"there are two monitors called {monitor.name!r}", "give each its own name"
+            )
         seen.add(monitor.name)
 
 
@@ -92,7 +96,9 @@ def _material_names_exist(c: Check) -> None:
     known = _material_names(c)
     for name, zone in (c.tables.zones or {}).items():
         if zone.material is not None and zone.material not in known:
-            c.refuse(("zones", name, "material"), f"there is no material {zone.material!r}", nearest(zone.material, known))
+            c.refuse(
+                ("zones", name, "material"), f"there is no material {zone.material!r}", nearest(zone.material, known)
+            )
 
 
 def _zones(c: Check) -> None:
@@ -120,7 +126,9 @@ def _zones(c: Check) -> None:
 def _cracks(c: Check) -> None:
     for name in c.tables.cracks or ():
         if name != "default" and name not in c.drawing.cracks_drawn:
-            c.refuse(("cracks", name), f"the geometry has no crack {name!r}", nearest(name, list(c.drawing.cracks_drawn)))
+            c.refuse(
+                ("cracks", name), f"the geometry has no crack {name!r}", nearest(name, list(c.drawing.cracks_drawn))
+            )
 
 
 def _edge_names(c: Check) -> list[str]:
@@ -131,7 +139,9 @@ def _edges(c: Check) -> None:
     if c.tables.loads is None:
         return
     known = _edge_names(c)
-    way = "name edges by physical curves in the model" if c.tables.geometry.model else "name edges by [[geometry.edges]]"
+    way = (
+        "name edges by physical curves in the model" if c.tables.geometry.model else "name edges by [[geometry.edges]]"
+    )
     for k, traction in enumerate(c.tables.loads.tractions):
         if traction.edge not in known:
             c.refuse(
@@ -155,7 +165,7 @@ def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
 
 
 def contact_names(drawing: Drawing) -> list[str]:
-    """Names that faces in contact may have: edges as drawn, and the faces that each crack leaves when it cuts through."""
+    """Names that faces in contact may have: edges as drawn, and the faces that a crack leaves when it cuts through."""
     names = [name for name in drawing.blocks.edge_names if name]
     return names + [f"crack:{name}" for name in drawing.cracks_drawn]
 
@@ -170,7 +180,9 @@ def _joints(c: Check) -> None:
         first = owner.setdefault(pair, law)
         if first != law:
             what = f"edges {pair[1]!r}" if not pair[0] else f"edges {pair[0]!r} and {pair[1]!r}"
-            c.refuse(path, f"joints {first!r} and {law!r} both claim contacts of {what}", "leave them to one of the two")
+            c.refuse(
+                path, f"joints {first!r} and {law!r} both claim contacts of {what}", "leave them to one of the two"
+            )
 
     for name, joint in c.tables.joints.items():
         if name == "default":
@@ -219,7 +231,9 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
     if zone is not None:
         inside, at = at, [b for b in at if c.drawing.zones[b] == zone]
         if inside and not at:
-            c.refuse(path, f"{what} ({point[0]:g}, {point[1]:g}) is not in zone {zone!r}", "move it, or name its own zone")
+            c.refuse(
+                path, f"{what} ({point[0]:g}, {point[1]:g}) is not in zone {zone!r}", "move it, or name its own zone"
+            )
             return -1
     if among is not None and len(at) > 1:
         at = [b for b in at if b in among] or at
@@ -240,7 +254,7 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
 
 
 def gauge_carriers(c: Check) -> tuple[int, int] | None:
-    """The blocks that carry the gauge's ends; where an end lies between two blocks, the one that holds the other end."""
+    """The blocks that carry the gauge's ends; where an end lies between two blocks, the one that holds the other."""
     gauge = c.tables.gauge
     if gauge is None:
         return None
@@ -319,6 +333,8 @@ def _held(c: Check) -> None:
             "gravity acts and nothing is fixed: all blocks would fall",
             "fix a zone ([zones.NAME] fixed = true), or set dda.dynamic_factor = 1 if they are to fall",
         )
+        return
+    if any(traction.edge not in blocks.edge_names for traction in t.loads.tractions):
         return
     force, moment, size = _resultant(t, blocks)
     reach = np.ptp(blocks.vertices, axis=0).max()

@@ -166,7 +166,9 @@ def _file(path: FilePath) -> FilePath:
     if not path.is_file():
         near = [str(path.parent / p.name) for p in path.parent.iterdir()] if path.parent.is_dir() else []
         near = [n for n in near if n.endswith(".toml") or FilePath(n, SCENE_FILE).is_file()]
-        raise SceneError([Fault(str(path), "there is no such scene", nearest(str(path), near) if near else "check the path")])
+        raise SceneError(
+            [Fault(str(path), "there is no such scene", nearest(str(path), near) if near else "check the path")]
+        )
     return path
 
 

@@ -20,7 +20,9 @@ def parse_override(text: str) -> tuple[Path, Any]:
     """("section.key=value") as path and value; what is no TOML value is a text. Raises OverrideError without "="."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise OverrideError(f"{text!r} is not a change to a scene", "write section.key=value, as in dda.time_step_s=0.5")
+        raise OverrideError(
+            f"{text!r} is not a change to a scene", "write section.key=value, as in dda.time_step_s=0.5"
+        )
     value = value.strip()
     try:
         return path_of(key.strip()), tomllib.loads(f"value = {value}")["value"]

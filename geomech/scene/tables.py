@@ -63,7 +63,9 @@ class EdgeShape(Table):
 class Geometry(Table):
     model: str | None = Field(None, description="Gmsh model (.geo), relative to the scene file")
     parameters: dict[str, Finite | str] = Field({}, description="values for the model's parameters, by name")
-    zones: Annotated[tuple[ZoneShape, ...], Strict(False)] = Field((), description="zones drawn here instead of a model")
+    zones: Annotated[tuple[ZoneShape, ...], Strict(False)] = Field(
+        (), description="zones drawn here instead of a model"
+    )
     cracks: Annotated[tuple[CrackShape, ...], Strict(False)] = Field((), description="cracks drawn here")
     edges: Annotated[tuple[EdgeShape, ...], Strict(False)] = Field((), description="names for block edges drawn here")
     tolerance_m: Positive | None = Field(
@@ -78,7 +80,9 @@ class Geometry(Table):
         if self.model is None and not self.zones:
             raise ValueError("no rock: give `model` (a Gmsh .geo file) or at least one [[geometry.zones]]")
         if self.model is not None and (self.zones or self.cracks or self.edges):
-            raise ValueError("give either `model` or [[geometry.zones]], [[geometry.cracks]], [[geometry.edges]], not both")
+            raise ValueError(
+                "give either `model` or [[geometry.zones]], [[geometry.cracks]], [[geometry.edges]], not both"
+            )
         if self.model is None and self.parameters:
             raise ValueError("`parameters` belong to a Gmsh `model`; there is none")
         return self
@@ -110,8 +114,9 @@ class JointTable(Table):
         None, description="shear stiffness, Pa/m (unset: the solver's penalty springs)"
     )
     edges: Names = Field(
-        (), description='contacts where either edge has one of these names; "*" matches anything, "crack:NAME" is a '
-        "face that a crack's growth has made"
+        (),
+        description='contacts where either edge has one of these names; "*" matches anything, "crack:NAME" is a '
+        "face that a crack's growth has made",
     )
     between: Annotated[tuple[Annotated[tuple[str, str], Strict(False)], ...], Strict(False)] = Field(
         (), description="contacts between these pairs of edge names, [[a, b], …]; goes before `edges`"
@@ -185,7 +190,8 @@ class LoadsTable(Table):
     gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
     gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
     leading_edge: str | None = Field(
-        None, description="edges whose traction is *the* load of reports, positive in compression (unset: the first traction's)"
+        None,
+        description="edges whose traction is *the* load of a run, positive in compression (unset: the first traction's)",
     )
     tractions: Annotated[tuple[TractionTable, ...], Strict(False)] = Field((), description="tractions on named edges")
     forces: Annotated[tuple[ForceTable, ...], Strict(False)] = Field((), description="forces on points")
@@ -232,9 +238,7 @@ class GrowthTable(Table):
     increment_m: Positive | None = Field(
         None, description="longest advance of a tip in a cycle, m (unset: a tenth of the shortest crack)"
     )
-    min_increment_m: Positive | None = Field(
-        None, description="shortest advance, m (unset: a tenth of the longest)"
-    )
+    min_increment_m: Positive | None = Field(None, description="shortest advance, m (unset: a tenth of the longest)")
     join_distance: NotNegative = Field(
         0.5, description="nearer than this to a crack or a surface a tip joins it, in units of the increment"
     )
@@ -247,7 +251,8 @@ class RunTable(Table):
         tuple[Literal["initiation", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
     ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
     boundary_stress: Literal["contacts"] = Field(
-        "contacts", description='how contact forces become tractions on cracked blocks: "contacts", linear over each face'
+        "contacts",
+        description='how contact forces become tractions on cracked blocks: "contacts", linear over each face',
     )
 
 
@@ -290,7 +295,9 @@ class SceneTables(Table):
     geometry: Geometry = Field(description="what is where")
     materials: Annotated[dict[str, MaterialTable], Field(min_length=1)] = Field(description="materials by name")
     zones: dict[str, ZoneTable] = Field({}, description="what each zone of the geometry is made of, by its name")
-    joints: dict[str, JointTable] = Field({}, description="laws of contacts by name; `default` rules where none is named")
+    joints: dict[str, JointTable] = Field(
+        {}, description="laws of contacts by name; `default` rules where none is named"
+    )
     cracks: dict[str, CrackTable] = Field({}, description="cracks by name; `default` rules where none is named")
     loads: LoadsTable = Field(LoadsTable(), description="what acts on the blocks")
     dda: DdaTable = Field(DdaTable(), description="motion of the blocks")

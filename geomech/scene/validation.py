@@ -47,7 +47,7 @@ def validate(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SceneT
 
 
 def nearest(name: str, known: list[str]) -> str:
-    """"did you mean …?" with the closest of ``known``, or a list of them."""
+    """ "did you mean …?" with the closest of ``known``, or a list of them."""
     close = difflib.get_close_matches(name, known, 1, cutoff=0.6)
     if close:
         return f"did you mean {close[0]!r}?"
@@ -71,7 +71,9 @@ def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
         way = (f"did you mean {close[0]!r}? " if close else "") + f"keys here are {', '.join(known)}"
         return Fault(place(path), f"unknown key {path[-1]!r}", way)
     if kind == "missing" and isinstance(path[-1], str):
-        shape = f"add `{path[-1]} = …`" if field is None or table_at(path) is None else f"add [{'.'.join(map(str, path))}]"
+        shape = (
+            f"add `{path[-1]} = …`" if field is None or table_at(path) is None else f"add [{'.'.join(map(str, path))}]"
+        )
         return Fault(place(path), f"{path[-1]!r} is missing", f"{shape}: {meaning}")
     if kind in ("missing", "too_long", "too_short"):
         whole = path[:-1] if isinstance(path[-1], int) else path

@@ -87,7 +87,7 @@ def signed_area(loop: np.ndarray) -> float:
 
 
 def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[Flaw]):
-    """Shapely polygon, loops and edge names of ``zone`` in canonical form; (None, [], []) after noting what is wrong."""
+    """Shapely polygon, loops and edge names of ``zone`` in canonical form; (None, [], []) after a flaw was found."""
     import shapely
 
     def refuse(message: str, way_out: str):
@@ -127,7 +127,9 @@ def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[
         for number, (loop, _) in enumerate(found[1:], 1):
             hole = shapely.Polygon(loop)
             if not outline.covers(hole) or outline.exterior.distance(hole.exterior) <= tolerance:
-                return refuse(f"hole {number} is not inside the outline", "move it inside, or draw it as part of the outline")
+                return refuse(
+                    f"hole {number} is not inside the outline", "move it inside, or draw it as part of the outline"
+                )
             for other in range(1, number):
                 if hole.distance(shapely.Polygon(found[other][0])) <= tolerance:
                     return refuse(f"holes {other} and {number} touch or overlap", "draw them as one hole")
@@ -206,7 +208,9 @@ def _name_edges(k, line: EdgeLine, zones, loops, names, decimals: int, tolerance
                         )
                     )
                     continue
-                loop, names[b][n] = _with_piece(loop, names[b][n], edge, start[edge], stop[edge], ends, line.name, tolerance)
+                loop, names[b][n] = _with_piece(
+                    loop, names[b][n], edge, start[edge], stop[edge], ends, line.name, tolerance
+                )
             loops[b][n] = loop
     if not hits:
         flaws.append(

@@ -21,7 +21,7 @@ CRACK = "crack:"
 
 
 class GmshModelError(ValueError):
-    """A model that cannot be read. ``parameter`` names the parameter at fault, if one is; ``way_out`` says what to do."""
+    """A model that cannot be read. ``parameter`` is the name of the parameter at fault, or None."""
 
     def __init__(self, message: str, way_out: str, parameter: str | None = None) -> None:
         super().__init__(f"{message}: {way_out}")
@@ -114,7 +114,9 @@ def _open(gmsh, path: Path) -> dict[str, Parameter]:
     return found
 
 
-def _with_parameters(gmsh, path: Path, wanted: dict[str, float | str], known: dict[str, Parameter]) -> dict[str, Parameter]:
+def _with_parameters(
+    gmsh, path: Path, wanted: dict[str, float | str], known: dict[str, Parameter]
+) -> dict[str, Parameter]:
     """Set what is known and read again, until the rest is known too (a parameter may appear with another's value)."""
     waiting = dict(wanted)
     while waiting:
@@ -179,7 +181,9 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
         name = gmsh.model.getPhysicalName(dim, group)
         tags = [int(tag) for tag in gmsh.model.getEntitiesForPhysicalGroup(dim, group)]
         if not name:
-            warnings.append((f"{path.name}: physical curve {group} has no name", 'name it: Physical Curve("NAME") = {…}'))
+            warnings.append(
+                (f"{path.name}: physical curve {group} has no name", 'name it: Physical Curve("NAME") = {…}')
+            )
         elif name.startswith(CRACK):
             traces.append(Trace(name[len(CRACK) :], tuple(curves.chained(tags))))
         else:
@@ -200,11 +204,14 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             named.add(int(tag))
     if not zones:
         raise GmshModelError(
-            f"{path.name} has no physical surface", 'name its surfaces: Physical Surface("rock") = {1}; they become zones'
+            f"{path.name} has no physical surface",
+            'name its surfaces: Physical Surface("rock") = {1}; they become zones',
         )
     for _, tag in gmsh.model.getEntities(2):
         if tag not in named:
-            warnings.append((f"{path.name}: surface {tag} has no physical name and is left out", "name it, or remove it"))
+            warnings.append(
+                (f"{path.name}: surface {tag} has no physical name and is left out", "name it, or remove it")
+            )
     for name in dict.fromkeys(edge_name.values()):
         if not used & {tag for tag, its in edge_name.items() if its == name}:
             warnings.append(

@@ -15,9 +15,9 @@ from .gmsh_session import gmsh_session
 class InteriorMesh:
     """A conforming triangle mesh whose two crack faces have nodes of their own.
 
-        points      (n, 2)   m
-        triangles   (m, 3)   counter-clockwise
-        side        (n, 2)   unit vector from a node on a crack face into its own side of the rock; zero elsewhere
+    points      (n, 2)   m
+    triangles   (m, 3)   counter-clockwise
+    side        (n, 2)   unit vector from a node on a crack face into its own side of the rock; zero elsewhere
     """
 
     points: np.ndarray
@@ -31,8 +31,8 @@ def mesh_interior(
     """Mesh the block bounded by ``loops`` ((n, 2) each, the outline first, then holes) with ``cracks`` (nodes shared
     where they meet) cut open.
 
-    ``size`` is the length of a triangle's side away from cracks (default: two to four thousand triangles in all), ``tip_size`` at crack
-    tips (default a tenth of it, m). Sizes grow from the tips over two lengths of ``size``. Nodes on cracks are
+    ``size`` is the length of a triangle's side away from cracks (default: two to four thousand triangles in all),
+    ``tip_size`` at crack tips (default a tenth of it), both in m. Sizes grow from the tips over two lengths of ``size``. Nodes on cracks are
     doubled, at junctions once a sector, at mouths too; tips stay single. Raises ValueError for sizes that are not
     positive, RuntimeError where Gmsh cannot mesh the block.
     """

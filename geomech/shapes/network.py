@@ -155,7 +155,7 @@ def _mouths(k, name, line, zone, loops, branches, tolerance, flaws):
 
 
 def _nearest_on(point: np.ndarray, starts: np.ndarray, ends: np.ndarray, tolerance: float) -> tuple[np.ndarray, float]:
-    """The nearest point of the segments (n, 2), (n, 2), a vertex where one is within ``tolerance``, and its distance."""
+    """The nearest point of segments (n, 2), (n, 2), a vertex where one is within ``tolerance``, and its distance."""
     corner = np.hypot(*(starts - point).T)
     if corner.min() <= tolerance:
         return starts[np.argmin(corner)], float(corner.min())
@@ -310,7 +310,9 @@ class _Network:
         if first == second:
             message = f"crack {self.names[first]!r} lies on itself over part of its length"
         else:
-            message = f"cracks {self.names[first]!r} and {self.names[second]!r} lie on one another over part of their length"
+            message = (
+                f"cracks {self.names[first]!r} and {self.names[second]!r} lie on one another over part of their length"
+            )
         flaw = Flaw("cracks", second, message, "keep one of them, or move them apart")
         if flaw not in self.flaws:
             self.flaws.append(flaw)

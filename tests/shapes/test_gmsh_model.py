@@ -81,7 +81,9 @@ def test_without_overhang_the_platen_is_a_rectangle():
 
 
 def test_single_flaw_parameters():
-    drawing = read_gmsh_model(GEOMETRY / "single_flaw.geo", {"angle_deg": 90, "half_length_m": 0.02, "centre_x_m": 0.01})
+    drawing = read_gmsh_model(
+        GEOMETRY / "single_flaw.geo", {"angle_deg": 90, "half_length_m": 0.02, "centre_x_m": 0.01}
+    )
     _, cracks = assemble(drawing.zones, drawing.traces)
     assert np.allclose(cracks.nodes, [[0.01, -0.02], [0.01, 0.02]], atol=1e-14)
     assert drawing.parameters["angle_deg"].value == 90
@@ -118,7 +120,8 @@ def test_a_parameter_that_another_one_brings_up(tmp_path):
         tmp_path,
         'DefineConstant[ more = {0, Name "Parameters/more"} ];\n'
         'If (more)\n DefineConstant[ w = {2, Name "Parameters/w"} ];\nElse\n w = 1;\nEndIf\n'
-        "Point(1) = {0,0,0}; Point(2) = {w,0,0}; Point(3) = {w,1,0}; Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,1};\n"
+        "Point(1) = {0,0,0}; Point(2) = {w,0,0}; Point(3) = {w,1,0};"
+        "Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,1};\n"
         'Curve Loop(1) = {1,2,3}; Plane Surface(1) = {1}; Physical Surface("rock") = {1};',
     )
     drawing = read_gmsh_model(path, {"w": 5, "more": 1})
@@ -157,7 +160,8 @@ def test_a_crack_of_several_curves_is_one_polyline(tmp_path):
     corners = "Point(1)={0,0,0};Point(2)={1,0,0};Point(3)={1,1,0};Point(4)={0,1,0};"
     path = written(
         tmp_path,
-        corners + "Line(1)={1,2};Line(2)={2,3};Line(3)={3,4};Line(4)={4,1};Curve Loop(1)={1,2,3,4};Plane Surface(1)={1};"
+        corners
+        + "Line(1)={1,2};Line(2)={2,3};Line(3)={3,4};Line(4)={4,1};Curve Loop(1)={1,2,3,4};Plane Surface(1)={1};"
         "Point(5)={0.2,0.5,0};Point(6)={0.4,0.6,0};Point(7)={0.6,0.5,0};Line(5)={5,6};Line(6)={7,6};"
         'Physical Surface("rock")={1};Physical Curve("crack:bent")={5,6};',
     )

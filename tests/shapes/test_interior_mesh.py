@@ -90,7 +90,7 @@ def test_side_points_into_the_nodes_own_triangles():
 
 
 def test_straight_crack_has_one_node_a_side():
-    _, cracks, mesh = meshed(CASES["inner"])
+    _, _cracks, mesh = meshed(CASES["inner"])
     normal = np.array([-0.2, 0.4]) / np.hypot(0.2, 0.4)
     on = np.flatnonzero(mesh.side.any(axis=1))
     upper = mesh.side[on] @ normal > 0
@@ -110,7 +110,7 @@ def test_sizes_shrink_to_the_tips():
 
 def test_holes_stay_empty_and_may_carry_mouths():
     hole = rectangle(0.4, 0.4, 0.6, 0.6)
-    _, cracks, mesh = meshed([[[0.6, 0.5], [0.8, 0.5]]], holes=(hole,))
+    _, _cracks, mesh = meshed([[[0.6, 0.5], [0.8, 0.5]]], holes=(hole,))
     assert areas(mesh).sum() == pytest.approx(1 - 0.04, abs=1e-12)
     assert len(copies(mesh, [0.6, 0.5])) == 2
 

@@ -1,0 +1,347 @@
+"""Bad scenes are refused with place, message and way out: each kind of fault, alone and all together."""
+
+import re
+
+import pytest
+from scene_texts import GOOD
+
+from geomech.scene import SceneError, load_scene
+
+
+def line_of(text, fragment):
+    return next(n for n, line in enumerate(text.splitlines(), 1) if fragment in line)
+
+
+SPOILT = [
+    # old, new, place, message, way out
+    (
+        "youngs_modulus_pa = 20e9",
+        "youngs_modulus = 20e9",
+        "materials.rock.youngs_modulus",
+        "unknown key",
+        "youngs_modulus_pa",
+    ),
+    (
+        "youngs_modulus_pa = 20e9",
+        'youngs_modulus_pa = "20e9"',
+        "materials.rock.youngs_modulus_pa",
+        '"20e9" stands',
+        "quotes",
+    ),
+    (
+        "youngs_modulus_pa = 20e9",
+        "youngs_modulus_pa = -1.0",
+        "materials.rock.youngs_modulus_pa",
+        "greater than 0",
+        "Pa",
+    ),
+    ("poissons_ratio = 0.25", "poissons_ratio = 0.5", "materials.rock.poissons_ratio", "less than 0.5", "Poisson"),
+    ("poissons_ratio = 0.25", "poissons_ratio = nan", "materials.rock.poissons_ratio", "", "Poisson"),
+    ("density_kg_m3 = 2500", "density_kg_m3 = 0", "materials.rock.density_kg_m3", "no density", "give the density"),
+    ("density_kg_m3 = 2500", "density_kg_m3 = inf", "materials.rock.density_kg_m3", "not a finite number", "density"),
+    ("density_kg_m3 = 2500", "density_kg_m3 = true", "materials.rock.density_kg_m3", "true stands", "density"),
+    ("k_ic_pa_sqrt_m = 1e6", "", "materials.rock", "no fracture toughness", "growth.enabled = false"),
+    ("end_time_s = 100.0", "", "run.end_time_s", "missing", "add `end_time_s = …`"),
+    ("end_time_s = 100.0", "end_time_s = 0.5", "run.end_time_s", "longer than the whole run", "run.end_time_s"),
+    ("end_time_s = 100.0", 'end_time_s = 9\nstop_at = ["spilt"]', "run.stop_at[0]", '"spilt" is not one of', "event"),
+    (
+        "end_time_s = 100.0",
+        "end_time_s = 9\nend_tme_s = 9",
+        "run.end_tme_s",
+        "unknown key",
+        "did you mean 'end_time_s'?",
+    ),
+    ("[materials.rock]", "[material.rock]", "material", "unknown key", "did you mean 'materials'?"),
+    (
+        'edge = "load:top"',
+        'edge = "load:tip"',
+        "loads.tractions[0].edge",
+        "no edge 'load:tip'",
+        "did you mean 'load:top'?",
+    ),
+    ("rate_pa_per_s = [0.0, -1e5]", "", "loads.tractions[0]", "exactly one of", ""),
+    (
+        "rate_pa_per_s = [0.0, -1e5]",
+        "rate_pa_per_s = [0.0]",
+        "loads.tractions[0].rate_pa_per_s",
+        "number of entries",
+        "Pa/s",
+    ),
+    (
+        "rate_pa_per_s = [0.0, -1e5]",
+        "rate_pa_per_s = -1e5",
+        "loads.tractions[0].rate_pa_per_s",
+        "where [x, y] belongs",
+        "Pa/s",
+    ),
+    ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [0.0, -2e5]", "loads", "do not balance", "fix a zone"),
+    ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [1e5, -1e5]", "loads", "do not balance", "fix a zone"),
+    (
+        "rate_pa_per_s = [0.0, -1e5]",
+        "times_s = [0, 0]\nvalues_pa = [[0, 0], [0, 1]]",
+        "loads.tractions[0]",
+        "ascend",
+        "",
+    ),
+    ("rate_pa_per_s = [0.0, -1e5]", "times_s = [0, 1]\nvalues_pa = [[0, 0]]", "loads.tractions[0]", "same number", ""),
+    ("rectangle = [0.0, 0.0, 1.0, 2.0]", "", "geometry.zones[0]", "either `rectangle` or `polygon`", ""),
+    (
+        "rectangle = [0.0, 0.0, 1.0, 2.0]",
+        "rectangle = [0.0, 0.0, 1.0]",
+        "geometry.zones[0].rectangle",
+        "entries",
+        "corners",
+    ),
+    (
+        "rectangle = [0.0, 0.0, 1.0, 2.0]",
+        "polygon = [[0, 0], [1, 2], [1, 0], [0, 2]]",
+        "geometry.zones[0]",
+        "crosses or touches itself at (0.5, 1)",
+        "in order along the outline",
+    ),
+    ("rectangle = [0.0, 0.0, 1.0, 2.0]", "polygon = [[0, 0], [1, 2]]", "geometry.zones[0]", "2 corners", "three"),
+    ("centre = [0.5, 1.0]", "centre = [5.0, 1.0]", "geometry.cracks[0]", "lies outside the rock", "into a zone"),
+    (
+        "centre = [0.5, 1.0]",
+        "centre = [0.95, 1.0]",
+        "geometry.cracks[0]",
+        "crosses the outline of zone 'rock'",
+        "end it",
+    ),
+    ("centre = [0.5, 1.0]", "", "geometry.cracks[0]", "a crack needs `points`", ""),
+    ("length_m = 0.2", "length_m = 0.0", "geometry.cracks[0].length_m", "greater than 0", "length"),
+    (
+        "line = [[0.0, 2.0], [1.0, 2.0]]",
+        "line = [[0.0, 2.1], [1.0, 2.1]]",
+        "geometry.edges[0]",
+        "no block edge",
+        "outline",
+    ),
+    (
+        "line = [[0.0, 0.0], [1.0, 0.0]]",
+        "line = [[0.0, 2.0], [1.0, 2.0]]",
+        "geometry.edges[1]",
+        "'load:top' already",
+        "one name",
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "place", "message", "way_out"), SPOILT, ids=[f"{s[2]}: {s[3]}" for s in SPOILT])
+def test_one_fault_one_message(errors_of, old, new, place, message, way_out):
+    found = [
+        e
+        for e in errors_of((old, new))
+        if e.place.endswith(f": {place}") or re.search(rf": {re.escape(place)}\b", e.place)
+    ]
+    assert any(message in e.message and way_out in e.way_out for e in found), errors_of((old, new))
+    assert re.search(r"scene\.toml:\d+: ", found[0].place)
+
+
+@pytest.mark.parametrize(
+    "case", [s for s in SPOILT if s[1] and s[1] != "youngs_modulus = 20e9" and s[0] != "[materials.rock]"]
+)
+def test_a_spoilt_value_gives_no_second_error(errors_of, case):
+    expected = 2 if "edges" in case[2] else 1  # an edge that is not named leaves its load without an edge
+    assert len(errors_of(case[:2])) <= expected
+
+
+ADDED = [
+    ("[zones.rok]\n", "zones.rok", "no zone 'rok'", "did you mean 'rock'?"),
+    ('[zones.rock]\nmaterial = "stone"\n', "zones.rock.material", "no material 'stone'", "rock"),
+    ("[cracks.flow]\n", "cracks.flow", "no crack 'flow'", "did you mean 'flaw'?"),
+    ('[cracks.flaw]\naperture = "open"\n', "cracks.flaw.aperture", '"closed", "slot"', "m"),
+    ("[cracks.flaw]\naperture = -1.0\n", "cracks.flaw.aperture", '"closed", "slot"', "m"),
+    ('[joints.bed]\nedges = ["joint:*"]\n', "joints.bed.edges[0]", "no edge is called 'joint:*'", "load:top"),
+    ("[joints.bed]\n", "joints.bed", "names no edges", "default"),
+    ('[joints.default]\nedges = ["load:top"]\n', "joints.default", "names edges", "no other joint"),
+    ('[joints.a]\nedges = ["load:*"]\n[joints.b]\nedges = ["load:top"]\n', "joints.b.edges[0]", "both claim", "one"),
+    ("[joints.default]\nfriction_angle_deg = 90\n", "joints.default.friction_angle_deg", "less than 90", "degrees"),
+    ('[[monitors]]\nname = "p"\nat = [3.0, 0.0]\n', "monitors[0].at", "outside all blocks", "x from 0 to 1 m"),
+    ('[[monitors]]\nname = "p"\nat = [0.1, 0.1]\n' * 2, "monitors[1].name", "two monitors", "own name"),
+    ("[gauge]\nfrom = [0.5, -1.0]\nto = [0.5, 1.0]\n", "gauge.from", "outside all blocks", "span"),
+    ("[gauge]\nfrom = [0.5, 1.0]\nto = [0.5, 1.0]\n", "gauge.to", "same point", "different"),
+    ('[gauge]\nfrom = [0.5, 0.0]\nto = [0.5, 1.0]\nzone = "rok"\n', "gauge.zone", "no zone 'rok'", "rock"),
+    ("[growth]\nincrement_m = 1e-3\nmin_increment_m = 1e-2\n", "growth.min_increment_m", "longer than the", "at most"),
+    ('[growth]\ncriterion = "sif"\n', "growth.criterion", '"sif" is not one of', '"mts"'),
+    ("[dda]\ntime_step_s = 1000.0\n", "dda.time_step_s", "longer than the whole run", "shorten"),
+    ("[dda]\ndynamic_factor = 2\n", "dda.dynamic_factor", "at most 1", "dynamic"),
+    ("[ddm]\norder = 2.5\n", "ddm.order", "whole number", "order"),
+    ("[ddm]\norder = 99\n", "ddm.order", "at most 10", "order"),
+    ("[output]\ninterior = 1\n", "output.interior", "true or false", "interior"),
+    ('[render]\ncomponent = "zx"\n', "render.component", '"zx" is not one of', "component"),
+    ("[variants.a]\n\"ddm.ordr\" = 2\n", "variants.a → ddm.ordr", "unknown key", "did you mean 'order'?"),
+    ("[variants.a]\n\"geometry.cracks.7.angle_deg\" = 2\n", 'variants.a."geometry.cracks.7.angle_deg"', "no item '7'", "0"),
+    ('variants = 3\n', "run.variants", "unknown key", ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "place", "message", "way_out"), ADDED, ids=[f"{a[1]}: {a[2]}" for a in ADDED])
+def test_faults_in_further_sections(errors_of, text, place, message, way_out):
+    (error,) = errors_of(add=text)
+    # The line is that of the key's last part in the text added (or of the table where it has none).
+    assert place in error.place and message in error.message and way_out in error.way_out
+    number = int(re.search(r"scene\.toml:(\d+):", error.place).group(1))
+    assert number > line_of(GOOD, "end_time_s")
+
+
+def test_lines_point_at_the_key(scene_file):
+    text = GOOD.replace("poissons_ratio = 0.25", "poissons_ratio = 0.7").replace("length_m = 0.2", "length_m = -1")
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file(text))
+    places = [e.place for e in caught.value.errors]
+    assert f"scene.toml:{line_of(text, 'length_m')}: geometry.cracks[0].length_m" in places[0]
+    assert f"scene.toml:{line_of(text, 'poissons_ratio')}: materials.rock.poissons_ratio" in places[1]
+
+
+def test_all_faults_at_once_in_file_order(errors_of):
+    found = errors_of(
+        ("centre = [0.5, 1.0]", "centre = [5.0, 1.0]"),
+        ('edge = "load:top"', 'edge = "load:tip"'),
+        ("poissons_ratio = 0.25", "poisson_ratio = 0.25"),
+        add='[growth]\ncriterion = "sif"\n[zones.rok]\nfixed = 1\n[colour]\n',
+    )
+    numbers = [int(re.search(r":(\d+):", e.place).group(1)) for e in found]
+    assert numbers == sorted(numbers) and len(found) >= 6
+    assert all(e.message for e in found)
+    text = str(SceneError(found))
+    assert all(e.place in text and e.message in text for e in found)
+
+
+def test_overrides_say_where_they_come_from(errors_of):
+    found = errors_of(
+        overrides=["ddm.ordr=3", "geometry.cracks.4.angle_deg=3", "nonsense", "title.x=1", "ddm.nodes=best"]
+    )
+    places = [e.place for e in found]
+    assert "--set ddm.ordr=3" in places and "--set geometry.cracks.4.angle_deg=3" in places
+    assert "--set nonsense" in places and "--set title.x=1" in places and "--set ddm.nodes=best" in places
+    assert len(found) == 5
+
+
+def test_unknown_variants(errors_of):
+    (error,) = errors_of(add='[variants.fast]\n"dda.time_step_s" = 2.0\n', variant="fats")
+    assert "no variant 'fats'" in error.message and "did you mean 'fast'?" in error.way_out
+
+
+def test_the_chosen_variant_is_named_with_its_line(errors_of):
+    (error,) = errors_of(add='[variants.fast]\n"dda.time_step_s" = 2000.0\n', variant="fast")
+    line = line_of(GOOD + '[variants.fast]\n"dda.time_step_s" = 2000.0\n', '"dda.time_step_s"')
+    assert f"scene.toml:{line}: variants.fast → dda.time_step_s" in error.place
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "message"),
+    [
+        ("a = 1\nb = [1,\nc = 2\n", ":3", "not valid TOML"),
+        ("a = 1\na = 2\n", ":2", "not valid TOML"),
+        ("[run\n", ":1", "not valid TOML"),
+        ('title = "open\n', ":1", "not valid TOML"),
+        ("x = [1, 2", ":1", "not valid TOML"),
+    ],
+)
+def test_toml_syntax(scene_file, text, place, message):
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file(text))
+    (error,) = caught.value.errors
+    assert f"scene.toml{place}" in error.place and message in error.message
+
+
+def test_a_file_that_is_not_text(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match="not UTF-8"):
+        load_scene(path)
+
+
+def test_an_empty_scene_names_what_it_needs(scene_file):
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file(""))
+    messages = " ".join(e.message for e in caught.value.errors)
+    assert all(f"'{name}' is missing" in messages for name in ("geometry", "materials", "run"))
+
+
+def test_model_and_drawing_exclude_one_another(errors_of):
+    (error,) = errors_of(("[[geometry.zones]]", '[geometry]\nmodel = "x.geo"\n[[geometry.zones]]'))
+    assert "not both" in error.message
+
+
+def test_models_that_are_missing_or_set_wrongly(scene_file):
+    base = GOOD[GOOD.index("[materials.rock]") :]
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file('[geometry]\nmodel = "none.geo"\n' + base))
+    assert any("there is no file" in e.message and ":2: geometry.model" in e.place for e in caught.value.errors)
+
+
+def test_all_faulty_parameters_of_a_model_are_named(scene_file):
+    from pathlib import Path
+
+    model = Path(__file__).parents[2] / "geometry" / "two_cracks.geo"
+    head = f'[geometry]\nmodel = "{model}"\nparameters = {{ phi = 3, alpha_deg = 1e9, platens = 0 }}\n'
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file(head + GOOD[GOOD.index("[materials.rock]") :]))
+    found = {e.place.rsplit(":3: ", 1)[1]: e.message for e in caught.value.errors}
+    assert "no parameter 'phi'" in found["geometry.parameters.phi"]
+    assert "1e+09 is outside its range" in found["geometry.parameters.alpha_deg"]
+    assert len(found) == 2
+
+
+TWO_ZONES = GOOD.replace(
+    "[[geometry.cracks]]",
+    '[[geometry.zones]]\nname = "side"\nrectangle = [1.0, 0.0, 2.0, 2.0]\n\n[[geometry.cracks]]',
+    1,
+)
+
+
+def faults(scene_file, text, **kwargs):
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file(text), **kwargs)
+    return caught.value.errors
+
+
+def test_zones_without_a_material_where_there_are_two(scene_file):
+    steel = "[materials.steel]\nyoungs_modulus_pa = 2e11\npoissons_ratio = 0.3\ndensity_kg_m3 = 7850\n"
+    found = faults(scene_file, TWO_ZONES + steel + '[zones.side]\nmaterial = "steel"\n')
+    assert len(found) == 1 and "zone 'rock' has no material" in found[0].message and "[zones.rock]" in found[0].way_out
+
+
+def test_points_between_two_blocks_need_a_zone(scene_file):
+    monitor = '[[monitors]]\nname = "m"\nat = [1.0, 1.0]\n'
+    (error,) = faults(scene_file, TWO_ZONES + monitor)
+    assert "touch" in error.message and "zone" in error.way_out
+    assert load_scene(scene_file(TWO_ZONES + monitor + 'zone = "side"\n')).problem().monitors["m"][0] == 1
+
+
+def test_gravity_needs_something_fixed_unless_blocks_may_fall(scene_file):
+    text = GOOD + "[loads]\n"
+    text = GOOD.replace("[[loads.tractions]]", "[loads]\ngravity_m_s2 = [0.0, -9.81]\n\n[[loads.tractions]]", 1)
+    (error,) = faults(scene_file, text)
+    assert "would fall" in error.message and "fixed = true" in error.way_out
+    load_scene(scene_file(text), ["dda.dynamic_factor=1"])
+    load_scene(scene_file(text), ["zones.rock.fixed=true"])
+
+
+def test_a_moment_is_unbalanced_too(scene_file):
+    # Equal and opposite shear on both ends: no force, but a moment.
+    text = GOOD.replace("[0.0, -1e5]", "[1e5, 0.0]").replace("[0.0, 1e5]", "[-1e5, 0.0]")
+    (error,) = faults(scene_file, text)
+    assert "a force of (0, 0) N/m and a moment of" in error.message
+
+
+def test_leading_edge_must_be_loaded(scene_file):
+    text = GOOD.replace("[[loads.tractions]]", '[loads]\nleading_edge = "load:bttom"\n\n[[loads.tractions]]', 1)
+    (error,) = faults(scene_file, text)
+    assert "no traction acts on" in error.message and "did you mean 'load:bottom'?" in error.way_out
+
+
+def test_two_cracks_of_one_name(scene_file):
+    again = '[[geometry.cracks]]\nname = "flaw"\npoints = [[0.2, 0.2], [0.3, 0.3]]\n\n[[geometry.edges]]'
+    (error,) = faults(scene_file, GOOD.replace("[[geometry.edges]]", again, 1))
+    assert "two cracks called 'flaw'" in error.message
+
+
+def test_coincident_cracks_are_named(scene_file):
+    again = (
+        '[[geometry.cracks]]\nname = "twin"\ncentre = [0.5, 1.0]\nlength_m = 0.1\nangle_deg = 30\n\n[[geometry.edges]]'
+    )
+    (error,) = faults(scene_file, GOOD.replace("[[geometry.edges]]", again, 1))
+    assert "'flaw' and 'twin' lie on one another" in error.message and "geometry.cracks[1]" in error.place

@@ -1,0 +1,300 @@
+"""Scenes become problems: values, defaults, overrides, variants, the resolved form, warnings."""
+
+import math
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+from scene_texts import GOOD
+
+from geomech.scene import SceneError, describe_keys, load_scene
+from geomech.scene.keys import keys_of
+from geomech.scene.tables import SceneTables
+
+PIPELINES = Path(__file__).parents[2] / "pipelines"
+
+
+def test_a_short_scene_has_sensible_defaults(scene_file):
+    scene = load_scene(scene_file())
+    problem = scene.problem()
+    assert problem.title == "A plate between two loads" and scene.warnings == ()
+    assert problem.blocks.n_blocks == 1 and problem.blocks.areas()[0] == pytest.approx(2.0, abs=1e-15)
+    assert problem.materials[0].k_ic == 1e6 and problem.materials[0].plane == "strain"
+    assert problem.cracks.aperture.tolist() == [0.0]
+    assert problem.load_edge == "load:top"
+    assert [law.name for law in problem.joints] == ["default"] and problem.joint_of == {}
+    # A tenth of the shortest crack, and a tenth of that.
+    assert problem.growth.increment == pytest.approx(0.02, rel=1e-9)
+    assert problem.growth.min_increment == pytest.approx(0.002, rel=1e-9)
+    assert problem.run.end_time == 100.0 and problem.gauge is None and problem.monitors == {}
+    assert problem.loads.edge_tractions[0].history.at(10.0).tolist() == [0.0, -1e6]
+
+
+def test_defaults_are_those_of_the_model(scene_file):
+    from geomech.model import DdaSettings, DdmSettings, GrowthSettings, RunSettings
+
+    problem = load_scene(scene_file()).problem()
+    assert problem.dda == DdaSettings() and problem.ddm == DdmSettings()
+    assert problem.run == RunSettings(end_time=100.0)
+    for name in ("criterion", "join_distance", "max_passes"):
+        assert getattr(problem.growth, name) == getattr(GrowthSettings(), name)
+
+
+FULL = """
+[zones.left]
+material = "soft"
+[zones.right]
+material = "hard"
+fixed = true
+[joints.default]
+friction_angle_deg = 30
+cohesion_pa = 1e3
+[joints.bedding]
+edges = ["joint:*", "crack:*"]
+normal_stiffness_pa_per_m = 1e10
+[joints.pair]
+between = [["load:top", "joint:1"]]
+tensile_strength_pa = 5e4
+[cracks.default]
+aperture = "slot"
+[cracks.thin]
+aperture = 1e-4
+[gauge]
+from = [0.5, 0.0]
+to = [0.5, 1.0]
+[[monitors]]
+name = "corner"
+at = [1.0, 1.0]
+zone = "left"
+"""
+TWO = """
+[[geometry.zones]]
+name = "left"
+polygon = [[0, 0], [1, 0], [1, 1], [0, 1]]
+[[geometry.zones]]
+name = "right"
+rectangle = [1.0, 0.0, 2.0, 1.0]
+holes = [[[1.4, 0.4], [1.6, 0.4], [1.6, 0.6]]]
+[[geometry.cracks]]
+name = "wide"
+points = [[0.2, 0.2], [0.3, 0.3], [0.4, 0.3]]
+[[geometry.cracks]]
+name = "thin"
+points = [[0.2, 0.7], [0.4, 0.7]]
+[[geometry.edges]]
+name = "joint:1"
+line = [[1.0, 0.0], [1.0, 1.0]]
+[[geometry.edges]]
+name = "load:top"
+line = [[0.0, 1.0], [1.0, 1.0]]
+[materials.hard]
+youngs_modulus_pa = 50e9
+poissons_ratio = 0.2
+density_kg_m3 = 2700
+[materials.soft]
+youngs_modulus_pa = 5e9
+poissons_ratio = 0.3
+density_kg_m3 = 2000
+k_ic_pa_sqrt_m = 5e5
+plane = "stress"
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+gravity_ramp_s = 2.0
+[[loads.tractions]]
+edge = "load:top"
+times_s = [0.0, 1.0, 3.0]
+values_pa = [[0, 0], [0, -1e5], [1e4, -1e5]]
+[[loads.forces]]
+at = [0.5, 0.9]
+rate_n_per_m_s = [0.0, -10.0]
+start_s = 4.0
+[dda]
+time_step_s = 0.01
+dynamic_factor = 0.9
+max_displacement_ratio = 0.002
+normal_penalty_pa = 1e12
+shear_penalty_pa = 5e11
+max_open_close_iterations = 9
+max_step_cuts = 5
+[ddm]
+order = 3
+nodes = "gauss"
+elements_per_crack = 5
+elements_per_side = 7
+grading_ratio = 0.4
+grading_layers = 1
+[growth]
+criterion = "g"
+increment_m = 0.02
+min_increment_m = 0.001
+join_distance = 0.7
+max_passes = 11
+[run]
+end_time_s = 5
+stop_at = ["initiation"]
+"""
+
+
+def test_every_setting_arrives(scene_file):
+    p = load_scene(scene_file(TWO + FULL)).problem()
+    assert [m.name for m in p.materials] == ["hard", "soft"]
+    assert p.blocks.material.tolist() == [1, 0] and p.blocks.fixed.tolist() == [False, True]
+    assert p.blocks.areas() == pytest.approx([1.0, 0.98], abs=1e-14)
+    assert p.materials[1].plane == "stress" and p.materials[0].k_ic == math.inf
+    assert p.cracks.aperture.tolist() == [math.inf, math.inf, 1e-4]
+    names = [law.name for law in p.joints]
+    assert names == ["default", "bedding", "pair"]
+    assert p.joints[0].friction_angle == pytest.approx(math.pi / 6) and p.joints[0].cohesion == 1e3
+    assert p.joints[1].normal_stiffness == 1e10 and p.joints[2].tensile_strength == 5e4
+    assert p.joint_index("joint:1", "joint:1") == 1
+    assert p.joint_index("crack:wide", "crack:wide") == 1
+    assert p.joint_index("joint:1", "load:top") == 2
+    assert p.joint_index("", "load:top") == 0
+    gravity = p.loads.gravity
+    assert gravity.at(1.0).tolist() == [0.0, -4.905] and gravity.at(9.0).tolist() == [0.0, -9.81]
+    assert p.loads.edge_tractions[0].history.at(2.0).tolist() == [5e3, -1e5]
+    force = p.loads.point_loads[0]
+    assert force.block == 0 and force.at == (0.5, 0.9) and force.history.at(5.0).tolist() == [0.0, -10.0]
+    assert vars(p.dda) == {
+        "time_step": 0.01,
+        "dynamic_factor": 0.9,
+        "max_displacement_ratio": 0.002,
+        "normal_penalty": 1e12,
+        "shear_penalty": 5e11,
+        "max_open_close_iterations": 9,
+        "max_step_cuts": 5,
+    }
+    assert vars(p.ddm) == {
+        "order": 3,
+        "nodes": "gauss",
+        "elements_per_crack": 5,
+        "elements_per_side": 7,
+        "grading_ratio": 0.4,
+        "grading_layers": 1,
+    }
+    assert (p.growth.criterion, p.growth.increment, p.growth.min_increment) == ("g", 0.02, 0.001)
+    assert (p.growth.join_distance, p.growth.max_passes) == (0.7, 11)
+    assert p.run.end_time == 5 and p.run.stop_at == ("initiation",)
+    assert p.gauge == ((0, (0.5, 0.0)), (0, (0.5, 1.0)))
+    assert p.monitors == {"corner": (0, (1.0, 1.0))}
+
+
+def test_growth_switched_off_needs_no_toughness(scene_file):
+    text = GOOD.replace("k_ic_pa_sqrt_m = 1e6\n", "") + "[growth]\nenabled = false\n"
+    assert load_scene(scene_file(text)).problem().materials[0].k_ic == math.inf
+    with_toughness = load_scene(scene_file(GOOD), ["growth.enabled=false"])
+    assert with_toughness.problem().materials[0].k_ic == math.inf
+
+
+def test_overrides(scene_file):
+    overrides = [
+        "dda.time_step_s=0.5",
+        "title = soft rock",
+        "growth.criterion=g",
+        'run.stop_at=["split"]',
+        "geometry.cracks.0.angle_deg=90",
+        "loads.tractions.1.rate_pa_per_s=[0.0, 2e5]",
+        "loads.tractions.0.rate_pa_per_s=[0.0, -2e5]",
+        "ddm.order=2",
+    ]
+    problem = load_scene(scene_file(), overrides).problem()
+    assert problem.dda.time_step == 0.5 and problem.title == "soft rock" and problem.growth.criterion == "g"
+    assert problem.run.stop_at == ("split",) and problem.ddm.order == 2
+    assert problem.cracks.nodes[:, 0] == pytest.approx([0.5, 0.5], abs=1e-12)
+    assert problem.loads.edge_tractions[1].history.rate.tolist() == [0.0, 2e5]
+
+
+VARIANTS = """
+[variants.coarse]
+"ddm.order" = 2
+"geometry.cracks.0.angle_deg" = 45
+[variants.fast]
+dda.time_step_s = 2.0
+[variants.fast.run]
+end_time_s = 50.0
+"""
+
+
+def test_variants_and_overrides_on_top(scene_file):
+    path = scene_file(GOOD + VARIANTS)
+    assert load_scene(path).variants == ("coarse", "fast")
+    assert load_scene(path).problem().ddm.order == 4
+    assert load_scene(path, variant="coarse").problem().ddm.order == 2
+    fast = load_scene(path, ["run.end_time_s=60.0"], variant="fast")
+    assert fast.variant == "fast" and fast.problem().dda.time_step == 2.0 and fast.problem().run.end_time == 60.0
+
+
+def equal(a, b):
+    if isinstance(a, np.ndarray):
+        return np.array_equal(a, b)
+    if hasattr(a, "__dataclass_fields__"):
+        return all(equal(getattr(a, name), getattr(b, name)) for name in a.__dataclass_fields__)
+    if isinstance(a, (tuple, list)):
+        return len(a) == len(b) and all(equal(x, y) for x, y in zip(a, b, strict=True))
+    return a == b
+
+
+@pytest.mark.parametrize("text", [GOOD + VARIANTS, TWO + FULL])
+def test_the_resolved_scene_gives_the_same_problem(scene_file, tmp_path, text):
+    first = load_scene(scene_file(text), ["dda.max_step_cuts=3"])
+    again = tmp_path / "elsewhere" / "scene.toml"
+    again.parent.mkdir()
+    again.write_text(tomli_w.dumps(first.resolved()))
+    assert equal(first.problem(), load_scene(again).problem())
+    assert load_scene(again).variants == ()
+
+
+def test_the_resolved_scene_of_a_model_has_its_path_and_all_parameters(tmp_path):
+    first = load_scene(PIPELINES / "two_cracks", ["geometry.parameters.phi_from=horizontal"], "phi_30")
+    resolved = tomllib.loads(tomli_w.dumps(first.resolved()))
+    assert Path(resolved["geometry"]["model"]).is_absolute()
+    assert resolved["geometry"]["parameters"]["width_m"] == 0.06
+    again = tmp_path / "copy.toml"
+    again.write_text(tomli_w.dumps(resolved))
+    assert equal(first.problem(), load_scene(again).problem())
+
+
+def test_names_of_scenes(scene_file, tmp_path):
+    assert load_scene(scene_file(name="plate.toml")).name == "plate"
+    scene_file()
+    assert load_scene(tmp_path).name == tmp_path.name
+
+
+def test_warnings_do_not_stop_a_scene(scene_file):
+    text = TWO + FULL.replace("[joints.default]\nfriction_angle_deg = 30\ncohesion_pa = 1e3\n", "")
+    (warning,) = load_scene(scene_file(text)).warnings
+    assert "no default joint" in warning.message and "[joints.default]" in warning.way_out
+
+
+def test_every_key_is_described_once():
+    text = describe_keys()
+    for name, field in SceneTables.model_fields.items():
+        assert field.description, name
+    for key in ("youngs_modulus_pa", "friction_angle_deg", "angle_deg", "max_displacement_ratio", "from", "stop_at"):
+        assert text.count(f"\n  {key} = ") == 1, key
+    assert '"mts" | "g" | "s"' in text and "(required)" in text
+    assert set(keys_of(SceneTables)) >= {"geometry", "materials", "variants"}
+
+
+def test_checking_a_scene_loads_no_solver_and_no_gmsh_for_toml():
+    script = (
+        "import sys\nfrom geomech.scene import load_scene\n"
+        f"load_scene({str(PIPELINES / 'two_cracks' / 'toml.toml')!r}).problem()\n"
+        "found = [m for m in ('gmsh', 'numba', 'vtk', 'scipy', 'pyvista', 'matplotlib') if m in sys.modules]\n"
+        "sys.exit(', '.join(found) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_missing_files(tmp_path, scene_file):
+    scene_file(name="plate.toml")
+    with pytest.raises(SceneError, match="no such scene") as caught:
+        load_scene(tmp_path / "plat.toml")
+    assert "plate.toml" in caught.value.errors[0].way_out
+    with pytest.raises(SceneError, match=r"holds no scene.toml"):
+        load_scene(tmp_path)
