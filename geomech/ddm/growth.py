@@ -62,7 +62,11 @@ class Growth:
     joins: tuple[Join, ...]
 
 
-@dataclass
+#: A way for a step to end: on which obstacle, at which of its nodes (None: between them), and where that is.
+_Way = tuple[Obstacle, int | None, Point]
+
+
+@dataclass(frozen=True)
 class _Step:
     """One tip's wish: from ``start`` by ``length`` along the unit vector ``direction``."""
 
@@ -192,35 +196,25 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
         ways = _attracted(work, step)
     crack = network.crack_at(step.node)
     for obstacle, node, at in ways:
-        if math.dist(step.start, at) >= work.sliver:
-            if not _clear(work, step, at, {node} if node is not None else set(), obstacle):
-                continue
-            end = _anchor(work, obstacle, node, at)
-            network.extend(step.node, end)
-        elif _clear_when_drawn(work, step, node, at, obstacle):
-            # So near already that a segment would be a sliver: the tip itself is drawn onto what it meets.
-            other = -1 if obstacle.row is None and node is None else _other_crack(network, obstacle, node, step.node)
-            network.move(step.node, at)
-            if node is not None:
-                network.merge(step.node, node)
-            elif obstacle.row is None:
-                network.surface[step.node] = True
-            else:
-                network.split(obstacle.row, step.node)
-            grown[step.row] = math.dist(step.start, at)
-            work.log(step.node, crack, other, at)
-            return
-        else:
+        # So near already that a segment would be a sliver: then the tip itself is drawn onto what it meets.
+        drawn = math.dist(step.start, at) < work.sliver
+        allowed = set() if node is None else {node}
+        if not (_clear_when_drawn if drawn else _clear)(work, step, at, allowed, obstacle):
             continue
+        other = _other_crack(network, obstacle, node, step.node)
+        if drawn:
+            _draw(network, step.node, obstacle, node, at)
+        else:
+            network.extend(step.node, _anchor(network, obstacle, node, at))
         grown[step.row] = math.dist(step.start, at)
-        work.log(step.node, crack, _other_crack(network, obstacle, node, step.node), at)
+        work.log(step.node, crack, other, at)
         return
     if _clear(work, step, step.end, set(), None):
         network.extend(step.node, network.add_node(step.end))
         grown[step.row] = step.length
 
 
-def _blocked(work: _Work, step: _Step):
+def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
     """Ways to end a step at the first thing it would cross, best first; None when nothing is in its way."""
     network, first = work.network, None
     for obstacle in network.near(step.block, step.node, step.length + work.reach):
@@ -249,7 +243,7 @@ def _blocked(work: _Work, step: _Step):
     return [*ways, (obstacle, None, at)]
 
 
-def _attracted(work: _Work, step: _Step):
+def _attracted(work: _Work, step: _Step) -> list[_Way]:
     """Ways to join what the free end of a step comes near, best first."""
     network, ways, seen = work.network, [], set()
     own = network.crack_at(step.node)
@@ -287,20 +281,27 @@ def _clear(work: _Work, step: _Step, at: Point, allowed: set[int], target: Obsta
     return _free_path(work, step.node, step.block, step.start, at, allowed, target)
 
 
-def _clear_when_drawn(work: _Work, step: _Step, node: int | None, at: Point, target: Obstacle) -> bool:
-    """Whether the tip's last segment stays clear when its end is drawn to ``at``."""
+def _clear_when_drawn(work: _Work, step: _Step, at: Point, allowed: set[int], target: Obstacle) -> bool:
+    """`_clear` for the tip's last segment, were its end drawn to ``at``."""
     before = work.network.other_end(step.node)
-    if before == node or math.dist(work.network.nodes[before], at) < work.sliver:
-        return False
-    if node is not None and work.network.connected(before, node):
-        return False
     start = work.network.nodes[before]
+    if math.dist(start, at) < work.sliver or any(work.network.connected(before, node) for node in allowed):
+        return False
     own = work.network.rows_at(step.node)[0]
-    allowed = {node} if node is not None else set()
     return _free_path(work, before, step.block, start, at, allowed, target, own)
 
 
-def _free_path(work, node, block, start, at, allowed, target, without: Row | None = None) -> bool:
+def _free_path(
+    work: _Work,
+    node: int,
+    block: int,
+    start: Point,
+    at: Point,
+    allowed: set[int],
+    target: Obstacle | None,
+    without: Row | None = None,
+) -> bool:
+    """`_clear` for any path from ``node`` at ``start``, leaving the segment ``without`` out of account."""
     network = work.network
     length = math.dist(start, at)
     late = 1 - 12 * work.clearance / length
@@ -316,9 +317,19 @@ def _free_path(work, node, block, start, at, allowed, target, without: Row | Non
     return True
 
 
-def _anchor(work: _Work, obstacle: Obstacle, node: int | None, at: Point) -> int:
+def _draw(network: Network, tip: int, obstacle: Obstacle, node: int | None, at: Point) -> None:
+    """Move ``tip`` onto the obstacle, or onto its ``node``."""
+    network.move(tip, at)
+    if node is not None:
+        network.merge(tip, node)
+    elif obstacle.row is None:
+        network.surface[tip] = True
+    else:
+        network.split(obstacle.row, tip)
+
+
+def _anchor(network: Network, obstacle: Obstacle, node: int | None, at: Point) -> int:
     """The node at which a step ends: the one given, or a new one on the obstacle."""
-    network = work.network
     if node is not None:
         return node
     new = network.add_node(at, surface=obstacle.row is None)
