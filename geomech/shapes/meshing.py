@@ -32,7 +32,8 @@ def mesh_interior(
     where they meet) cut open.
 
     ``size`` is the length of a triangle's side away from cracks (default: two to four thousand triangles in all),
-    ``tip_size`` at crack tips (default a tenth of it), both in m. Sizes grow from the tips over two lengths of ``size``. Nodes on cracks are
+    ``tip_size`` that at crack tips (default a tenth of it), both in m; along cracks sides are half of ``size``, and all
+    grow back to it over two of its lengths. Nodes on cracks are
     doubled, at junctions once a sector, at mouths too; tips stay single. Raises ValueError for sizes that are not
     positive, RuntimeError where Gmsh cannot mesh the block.
     """
@@ -103,26 +104,40 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float):
             mesh.embed(1, lines, 2, surface)
         for name in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
             option(f"Mesh.{name}", 0)
-        option("Mesh.Algorithm", 5)  # Delaunay: the quickest that honours embedded lines
         option("Mesh.MeshSizeMax", size)
         tips = [tag_of[int(n)] for n in cracks.tips]
         if tips and tip_size < size:
             _refine(mesh, tips, lines, size, tip_size)
-        try:
-            mesh.generate(2)
-        except Exception as error:  # gmsh raises bare Exception
-            raise RuntimeError(f"Gmsh cannot mesh the block: {error}") from error
-        nodes, coordinates, _ = mesh.getNodes()
-        number = np.full(int(nodes.max()) + 1, -1)
-        number[nodes] = np.arange(len(nodes))
-        triangles = number[mesh.getElementsByType(2)[1]].reshape(-1, 3)
-        edges = [number[mesh.getElementsByType(1, line)[1]].reshape(-1, 2) for line in lines]
+        # Delaunay is the quickest that honours embedded lines; the others are for the rare block it fails on.
+        for algorithm in (5, 6, 1):
+            option("Mesh.Algorithm", algorithm)
+            mesh.clear()
+            try:
+                mesh.generate(2)
+            except Exception:  # noqa: BLE001 (Gmsh raises nothing narrower)
+                continue
+            nodes, coordinates, _ = mesh.getNodes()
+            number = np.full(int(nodes.max()) + 1, -1)
+            number[nodes] = np.arange(len(nodes))
+            triangles = number[mesh.getElementsByType(2)[1]].reshape(-1, 3)
+            edges = [number[mesh.getElementsByType(1, line)[1]].reshape(-1, 2) for line in lines]
+            edges = np.concatenate(edges) if edges else np.empty((0, 2), int)
+            if len(triangles) and _are_edges(edges, triangles, len(nodes)):
+                break
+        else:
+            raise RuntimeError("Gmsh cannot mesh the block: its triangles do not follow the cracks")
     points = np.ascontiguousarray(coordinates.reshape(-1, 3)[:, :2])
     used = np.zeros(len(points), bool)
     used[triangles] = True
     renumber = np.cumsum(used) - 1
-    edges = np.concatenate(edges) if edges else np.empty((0, 2), int)
     return points[used], renumber[triangles], renumber[edges]
+
+
+def _are_edges(pairs: np.ndarray, triangles: np.ndarray, n: int) -> bool:
+    """Whether every one of ``pairs`` (k, 2) of the ``n`` nodes is an edge of a triangle."""
+    sides = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    pairs = np.sort(pairs, axis=1)
+    return bool(np.isin(pairs[:, 0] * n + pairs[:, 1], sides[:, 0] * n + sides[:, 1]).all())
 
 
 def _refine(mesh, tips, lines, size: float, tip_size: float) -> None:

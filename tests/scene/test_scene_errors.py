@@ -171,7 +171,7 @@ ADDED = [
     ("[output]\ninterior = 1\n", "output.interior", "true or false", "interior"),
     ('[render]\ncomponent = "zx"\n', "render.component", '"zx" is not one of', "component"),
     ("[variants.a]\n\"ddm.ordr\" = 2\n", "variants.a → ddm.ordr", "unknown key", "did you mean 'order'?"),
-    ("[variants.a]\n\"geometry.cracks.7.angle_deg\" = 2\n", 'variants.a."geometry.cracks.7.angle_deg"', "no item '7'", "0"),
+    ('[variants.a]\n"geometry.cracks.7.angle_deg" = 2\n', 'variants.a."geometry.cracks.7.angle_deg"', "no item", "0"),
     ('variants = 3\n', "run.variants", "unknown key", ""),
 ]  # fmt: skip
 

@@ -128,6 +128,23 @@ def test_random_networks():
             assert len(copies(mesh, tip)) == 1
 
 
+def test_grown_wings_of_many_short_steps():
+    """Paths as growth leaves them: steps from a hundredth to a tenth of the crack, bending at random."""
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        ends = straight_crack((0.5, 0.5), 0.1, rng.uniform(0, np.pi))
+        wings, angles = ([ends[0]], [ends[1]]), rng.uniform(0, 2 * np.pi, 2)
+        for _ in range(20):
+            for wing, angle in zip(wings, angles, strict=True):
+                wing.append(wing[-1] + 10 ** rng.uniform(-3, -2) * np.array([np.cos(angle), np.sin(angle)]))
+            angles += rng.normal(0, 0.15, 2)
+        _, cracks, mesh = meshed([np.array(wings[0][::-1] + wings[1])])
+        assert areas(mesh).min() > 0 and areas(mesh).sum() == pytest.approx(1.0, abs=1e-12)
+        edges = boundary_edges(mesh)
+        length = np.hypot(*(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]]).T).sum()
+        assert length == pytest.approx(4.0 + 2 * cracks.lengths.sum(), abs=1e-9)
+
+
 def test_default_sizes_are_a_few_thousand_triangles_and_quick():
     outline = rectangle(-0.03, -0.06, 0.03, 0.06)
     lines = [Trace(n, (straight_crack((0, y), 0.01, np.pi / 4),)) for n, y in (("a", 0.01), ("b", -0.01))]
