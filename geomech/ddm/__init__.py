@@ -1,0 +1,30 @@
+"""Displacement discontinuity method: cracks in an elastic body.
+
+    body = ddm.Body(loops, cracks, material)        # loops [] for the infinite plane
+    sol = body.solve(ddm.BodyLoad(remote_stress=[0, 1e6, 0]))
+    sol.tips["k_i"], sol.faces.opening, sol.stress(points), sol.displacement(points)
+
+`criteria` say where a tip goes, `growth` takes it there.
+"""
+
+from importlib import import_module
+
+# Resolved on first use: `criteria` and `growth` need no compiled kernel.
+_PUBLIC = {
+    "Body": ".body",
+    "BodyLoad": ".loads",
+    "OutOfEquilibrium": ".loads",
+    "NotConverged": ".faces",
+    "Solution": ".solution",
+}
+_MODULES = ("criteria", "growth", "shapes")
+
+__all__ = [*_PUBLIC, *_MODULES]
+
+
+def __getattr__(name: str):
+    if name in _PUBLIC:
+        return getattr(import_module(_PUBLIC[name], __name__), name)
+    if name in _MODULES:
+        return import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

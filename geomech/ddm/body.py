@@ -1,0 +1,345 @@
+"""A block with cracks: its matrices, made once for a geometry, and its solution under any load.
+
+The total stress in the rock is that of the boundary tractions as Kelvin line forces, of the boundary's own displacement
+and of the cracks' opening and slip as displacement jumps, and of a particular field (Somigliana's identity): the plane
+outside stays at rest. So the traction seen from *outside* the boundary must vanish,
+
+    A_ΓΓ u + A_ΓC w + g = 0,        A_CΓ u + A_CC w + r = −p n,
+
+u the boundary displacement, w slip and opening. A_ΓΓ is factored once and everything else happens on the Schur
+complement S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC of the crack unknowns. The matrices depend on nothing but geometry and ν.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ..model import Cracks, DdmSettings, Material
+from .factor import Factor
+from .influence import ElementSet, influence, line_forces, reuse
+from .loads import BodyLoad, check_equilibrium
+from .mesh import Mesh, mesh, outline_edges
+from .particular import Particular, polygon_moments
+from .solution import Solution, settle_faces
+from .validity import check_cracks, check_outline
+
+#: A load segment may stand this far off the boundary, in units of the extent; it is put onto it.
+_OFF = 1e-6
+
+
+class Body:
+    """An elastic body with cracks.
+
+    ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``cracks``:
+    those of this body. ``previous``: an earlier body of which whatever is unchanged, element by element, is reused:
+    growth costs the rows and columns of the new elements. ``counts`` tells what was done. Raises ValueError naming the
+    item on geometry that is no body, numpy.linalg.LinAlgError when cracks cut a part off.
+    """
+
+    def __init__(
+        self,
+        loops: list[np.ndarray],
+        cracks: Cracks,
+        material: Material,
+        settings: DdmSettings | None = None,
+        previous: "Body | None" = None,
+    ):
+        self.material, self.cracks = material, cracks
+        self.settings = settings = DdmSettings() if settings is None else settings
+        if previous is not None and (previous.settings != settings or previous.nu != material.effective_poissons_ratio):
+            previous = None
+        self.counts = {"elements": 0, "elements_new": 0, "boundary_assemblies": 0, "boundary_factorisations": 0}
+        same = previous is not None and _same_loops(previous.loops, loops)
+        self.loops = previous.loops if same else check_outline(loops)
+        check_cracks(cracks, outline_edges(self.loops)[0], self.loops, _fresh(cracks, previous if same else None))
+        self.mesh: Mesh = mesh(self.loops, cracks, settings)
+        self.boundary: ElementSet = self.mesh.boundary
+        self.faces: ElementSet = self.mesh.cracks
+        if self.loops:
+            _, first, _ = polygon_moments(self.loops, self.loops[0][0])
+            self.area = polygon_moments(self.loops, self.loops[0][0])[0]
+            self.centroid = self.loops[0][0] + first / self.area
+        else:
+            self.area, self.centroid = np.inf, np.zeros(2)
+        points = np.concatenate([self.mesh.edges.reshape(-1, 2), cracks.nodes])
+        self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
+        self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
+        self._assemble(previous)
+
+    @property
+    def nu(self) -> float:
+        return self.material.effective_poissons_ratio
+
+    def _assemble(self, previous: "Body | None") -> None:
+        nu, tol = self.nu, self._tol
+        g, c = self.boundary, self.faces
+        old = previous
+        g_old = g.found_in(old.boundary if old else None)
+        c_old = c.found_in(old.faces if old else None)
+        same_boundary = old is not None and g.n == old.boundary.n and np.array_equal(g_old, np.arange(g.n))
+
+        def block(rows, columns):
+            return lambda r, k: influence(rows.take(r), columns.take(k), nu, tol)
+
+        self.counts["elements"] = g.n + c.n
+        self.counts["elements_new"] = int((g_old < 0).sum() + (c_old < 0).sum())
+        if same_boundary:
+            self.boundary = g = old.boundary
+            self._gg, self._gg_factor = old._gg, old._gg_factor
+            self._rigid, self._rigid_weights = old._rigid, old._rigid_weights
+        else:
+            self._gg = reuse(old._gg if old else None, g_old, g_old, g, g, block(g, g))
+            self._rigid, self._rigid_weights = self._rigid_motions()
+            # Each loop's rigid motions are without stress: R Qᵀ lifts them out of the null space, and Qᵀu = 0 follows.
+            bordered = self._gg + self._rigid @ self._rigid_weights / self._extent
+            self._gg_factor = Factor(bordered, "the boundary equations are singular")
+            self.counts["boundary_assemblies"] = self.counts["boundary_factorisations"] = int(g.n > 0)
+        self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, block(c, g))
+        self._cc = reuse(old._cc if old else None, c_old, c_old, c, c, block(c, c))
+        gc = reuse(old._gc if old else None, g_old, c_old, g, c, block(g, c))
+        self._gc = gc
+        # W = A_ΓΓ⁻¹ A_ΓC, column by column of the new elements; S row and column alike.
+        everything = np.arange(g.n)
+        self._w = reuse(
+            old._w if same_boundary else None,
+            everything,
+            c_old,
+            g,
+            c,
+            lambda r, k: self._gg_factor.solve(np.asfortranarray(gc[:, c.unknowns(k)])),
+        )
+
+        def schur(r, k):
+            rows, columns = c.unknowns(r), c.unknowns(k)
+            return self._cc[np.ix_(rows, columns)] - self._cg[rows] @ self._w[:, columns]
+
+        self._schur = reuse(old._schur if same_boundary else None, c_old, c_old, c, c, schur)
+        self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
+        self._segments: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+        self._edge_forces: tuple[np.ndarray, np.ndarray] | None = None
+        self._recent: list[bytes] = []
+        if same_boundary and old._recent:
+            self._inherit_segments(old, c_old)
+
+    def _rigid_motions(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 3L) rigid motions of every loop in nodal unknowns and (3L, n) their mean over the loop."""
+        g = self.boundary
+        n_loops = len(self.loops)
+        modes = np.zeros((g.n, 2, g.per, 3 * n_loops))
+        weights = np.zeros_like(modes)
+        loop_of = self.mesh.edge_loop[g.source] if g.n else np.empty(0, int)
+        for k in range(n_loops):
+            here = np.flatnonzero(loop_of == k)
+            x, ds = g.nodes[here], g.quadrature[here]
+            perimeter = ds.sum()
+            rel = x - np.einsum("ej,ejc->c", ds, x) / perimeter
+            radius = np.sqrt(np.einsum("ej,ejc,ejc->", ds, rel, rel) / perimeter)
+            one, zero = np.ones(ds.shape), np.zeros(ds.shape)
+            for m, motion in enumerate(((one, zero), (zero, one), (-rel[..., 1] / radius, rel[..., 0] / radius))):
+                vector = np.stack(motion, axis=-1)
+                for component, axis in enumerate((g.tangent, g.normal)):
+                    local = np.einsum("ejc,ec->ej", vector, axis[here])
+                    modes[here, component, :, 3 * k + m] = local
+                    weights[here, component, :, 3 * k + m] = local * ds / perimeter
+        shape = (g.n_unknowns, 3 * n_loops)
+        return modes.reshape(shape), np.ascontiguousarray(weights.reshape(shape).T)
+
+    # Right-hand sides ------------------------------------------------------------------------------------------------
+
+    def _on_boundary(self, segment: np.ndarray, number: int) -> tuple[np.ndarray, bool]:
+        """``segment`` (2, 2) put onto the edge it lies on, and whether it runs against that edge."""
+        edges = self.mesh.edges
+        a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
+        length = np.hypot(*d.T)
+        rel = segment[None] - a[:, None]
+        s = np.einsum("ijc,ic->ij", rel, d) / length[:, None] ** 2
+        clipped = np.clip(s, 0.0, 1.0)
+        foot = a[:, None] + clipped[..., None] * d[:, None]
+        off = np.hypot(*np.moveaxis(foot - segment, 2, 0)).max(axis=1)
+        at = int(np.argmin(off))
+        if off[at] > _OFF * self._extent:
+            raise ValueError(f"load segment {number} lies {off[at]:.3g} m off the boundary of the body")
+        if abs(s[at, 1] - s[at, 0]) * length[at] <= 1e-14 * self._extent:
+            raise ValueError(f"load segment {number} has no length")
+        against = bool(s[at, 1] < s[at, 0])
+        return (foot[at][::-1] if against else foot[at]), against
+
+    def _linear_forces(self, targets: ElementSet, segments: np.ndarray) -> np.ndarray:
+        """(m, n_unknowns, 4) traction from unit (x, y) forces at the start, then at the end of straight segments,
+        linear along them; seen from outside the boundary."""
+        tol = 2 * _OFF * self._extent
+        unit = line_forces(targets, segments[:, 0], segments[:, 1], 1, self.nu, tol, -1.0)
+        d = segments[:, 1] - segments[:, 0]
+        t = d / np.hypot(*d.T)[:, None]
+        turn = np.stack([t, np.column_stack([-t[:, 1], t[:, 0]])], axis=1)
+        by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
+        out = np.einsum("nmce,mcx->mnex", by_end, turn)
+        return np.ascontiguousarray(out.reshape(len(segments), -1, 4))
+
+    def _inherit_segments(self, old: "Body", c_old: np.ndarray) -> None:
+        new = np.flatnonzero(c_old < 0)
+        keys = [key for key in old._recent if key in old._segments]
+        if not keys:
+            return
+        straight = np.array([old._segments[key][2] for key in keys])
+        fresh = self._linear_forces(self.faces.take(new), straight)
+        kept = np.flatnonzero(c_old >= 0)
+        to, fro, at = self.faces.unknowns(kept), old.faces.unknowns(c_old[kept]), self.faces.unknowns(new)
+        for key, block in zip(keys, fresh):
+            on_boundary, on_cracks, segment, against = old._segments[key]
+            rows = np.empty((self.faces.n_unknowns, 4))
+            rows[to], rows[at] = on_cracks[fro], block
+            self._segments[key] = (on_boundary, rows, segment, against)
+        self._recent = keys
+
+    def _segment_response(self, load: BodyLoad) -> tuple[np.ndarray, np.ndarray]:
+        """Tractions on boundary and cracks from the load's segments."""
+        g, c = np.zeros(self.boundary.n_unknowns), np.zeros(self.faces.n_unknowns)
+        if load.segments is None or not len(load.segments):
+            return g, c
+        if not self.loops:
+            raise ValueError("load segments need a body with an outline")
+        keys = [segment.tobytes() for segment in load.segments]
+        missing = [k for k, key in enumerate(keys) if key not in self._segments]
+        if missing:
+            placed = [self._on_boundary(load.segments[k], k) for k in missing]
+            straight = np.array([segment for segment, _ in placed])
+            on_boundary = self._linear_forces(self.boundary, straight)
+            on_cracks = self._linear_forces(self.faces, straight)
+            if len(self._segments) > 400:
+                self._segments.clear()
+                return self._segment_response(load)
+            for k, (segment, against), a, b in zip(missing, placed, on_boundary, on_cracks):
+                self._segments[keys[k]] = (a, b, segment, against)
+        for key, ends in zip(keys, load.tractions):
+            a, b, _, against = self._segments[key]
+            ends = (ends[::-1] if against else ends).ravel()
+            g += a @ ends
+            c += b @ ends
+        self._recent = keys
+        return g, c
+
+    def _particular_response(self, densities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tractions from quadratic line forces on the outline's edges, (m, 2, 3) local monomials."""
+        if self._edge_forces is None:
+            a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
+            self._edge_forces = tuple(
+                line_forces(targets, a, b, 2, self.nu, self._tol, -1.0).reshape(targets.n_unknowns, -1)
+                for targets in (self.boundary, self.faces)
+            )
+        return tuple(matrix @ densities.ravel() for matrix in self._edge_forces)
+
+    def _particular(self, load: BodyLoad) -> Particular:
+        force = np.zeros(2) if load.body_force is None else load.body_force
+        gradient = np.zeros((2, 2)) if load.body_force_gradient is None else load.body_force_gradient
+        if not self.loops and (force.any() or gradient.any()):
+            raise ValueError("a body force needs a body with an outline")
+        if load.about is not None:
+            force = force + gradient @ (self.centroid - load.about)
+        uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
+        return Particular(self.centroid, force, gradient, uniform, self.material)
+
+    def _edge_densities(self, particular: Particular) -> np.ndarray:
+        """(m, 2, 3) monomials of −σ_p n (n outward) along every edge, local components."""
+        a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
+        d = b - a
+        t = d / np.hypot(*d.T)[:, None]
+        out = np.column_stack([t[:, 1], -t[:, 0]])
+        values = []
+        for x in (a, 0.5 * (a + b), b):
+            s = particular.stress_of_force(x)
+            f = -np.column_stack([s[:, 0] * out[:, 0] + s[:, 2] * out[:, 1], s[:, 2] * out[:, 0] + s[:, 1] * out[:, 1]])
+            values.append(np.stack([np.sum(f * t, axis=1), -np.sum(f * out, axis=1)], axis=1))
+        lo, mid, hi = values
+        return np.stack([mid, 0.5 * (hi - lo), 0.5 * (hi + lo) - mid], axis=2)
+
+    def _uniform_on_faces(self, stress: np.ndarray) -> np.ndarray:
+        """(n_unknowns,) traction (along, normal) on the crack nodes of ``stress`` (3,) or (n_nodes, 3)."""
+        c = self.faces
+        s = np.broadcast_to(stress, (c.n, c.per, 3)) if np.ndim(stress) == 1 else stress.reshape(c.n, c.per, 3)
+        t, n = c.tangent[:, None], c.normal[:, None]
+        tx = s[..., 0] * n[..., 0] + s[..., 2] * n[..., 1]
+        ty = s[..., 2] * n[..., 0] + s[..., 1] * n[..., 1]
+        return np.stack([tx * t[..., 0] + ty * t[..., 1], tx * n[..., 0] + ty * n[..., 1]], axis=1).ravel()
+
+    # Solution --------------------------------------------------------------------------------------------------------
+
+    def solve(
+        self, load: BodyLoad, warm: "Solution | None" = None, equilibrium_tolerance: float = 1e-6
+    ) -> Solution:
+        """The body under ``load``. ``warm``: a solution of this or an earlier body whose face states are the first guess.
+
+        Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
+        `faces.NotConverged` when the contact of crack faces does not settle.
+        """
+        particular = self._particular(load)
+        if self.loops:
+            check_equilibrium(
+                load, self.loops, self.centroid, particular.force, particular.gradient, equilibrium_tolerance
+            )
+        g, r = self._segment_response(load)
+        body_force = bool(particular.force.any() or particular.gradient.any())
+        edge_densities = None
+        if body_force:
+            edge_densities = self._edge_densities(particular)
+            more_g, more_r = self._particular_response(edge_densities)
+            g, r = g + more_g, r + more_r
+            r = r + self._uniform_on_faces(particular.stress(self.faces.nodes.reshape(-1, 2)))
+        elif particular.uniform.any():
+            r = r + self._uniform_on_faces(particular.uniform)
+        y = self._gg_factor.solve(g)
+        r_faces = r - self._cg @ y if self.faces.n else r
+        w, closed, traction, solves = settle_faces(self, r_faces, load.crack_pressure, warm)
+        u = -y - self._w @ w if self.faces.n else -y
+        return Solution(self, load, particular, edge_densities, u, w, closed, traction, g, r, solves)
+
+    def _free_factor(self, closed: np.ndarray) -> tuple[np.ndarray, Factor]:
+        """Free unknowns (indices) and factors of S restricted to them, ``closed`` (n_unknowns,) bool fixed."""
+        key = np.packbits(closed).tobytes()
+        if key not in self._factors:
+            if len(self._factors) >= 8:
+                self._factors.pop(next(iter(self._factors)))
+            free = np.flatnonzero(~closed)
+            matrix = self._schur if len(free) == len(closed) else self._schur[np.ix_(free, free)]
+            self._factors[key] = free, Factor(matrix, "cracks cut a part of the body off")
+        return self._factors[key]
+
+    @cached_property
+    def strain_weights(self) -> np.ndarray:
+        """(3, n_unknowns) mean strain of the cracks from nodal slip and opening (times 2μ)."""
+        c = self.faces
+        t, n = c.tangent, c.normal
+        out = np.empty((3, c.n, 2, c.per))
+        for component, axis in enumerate((t, n)):
+            jump = np.stack([n[:, 0] * axis[:, 0], n[:, 1] * axis[:, 1], n[:, 0] * axis[:, 1] + n[:, 1] * axis[:, 0]])
+            out[:, :, component] = jump[:, :, None] * c.quadrature
+        return out.reshape(3, -1) / (self.area * 2 * self.material.shear_modulus)
+
+    def compliance(self, sol: "Solution | None" = None) -> np.ndarray:
+        """(3, 3) added compliance, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform boundary stress,
+        with the face states of ``sol`` (all open if None); symmetrised. Raises ValueError in the infinite plane."""
+        if not self.loops:
+            raise ValueError("the mean strain of cracks needs a body with an outline")
+        if not self.faces.n:
+            return np.zeros((3, 3))
+        closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
+        free, factor = self._free_factor(closed)
+        right = np.column_stack([-self._uniform_on_faces(unit)[free] for unit in np.eye(3)])
+        response = self.strain_weights[:, free] @ factor.solve(right)
+        return 0.5 * (response + response.T)
+
+
+def _same_loops(old: list[np.ndarray], new: list[np.ndarray]) -> bool:
+    return len(old) == len(new) and all(np.array_equal(a, b) for a, b in zip(old, new))
+
+
+def _fresh(cracks: Cracks, previous: "Body | None") -> np.ndarray | None:
+    """(n_segments,) bool: which segments were not in ``previous``."""
+    if previous is None:
+        return None
+    known = {row.tobytes() for row in np.ascontiguousarray(previous.cracks.nodes[previous.cracks.segments])}
+    return np.array(
+        [row.tobytes() not in known for row in np.ascontiguousarray(cracks.nodes[cracks.segments])], dtype=bool
+    )

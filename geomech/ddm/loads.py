@@ -1,0 +1,98 @@
+"""Loads on a body: tractions on pieces of its boundary, body forces, remote stress, pressure in the cracks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .particular import polygon_moments
+
+
+class OutOfEquilibrium(ValueError):
+    """Loads whose resultants do not vanish: no static solution exists.
+
+    ``force`` (2,) N/m, ``moment`` N about the centroid, ``relative`` to the sum of the loads' magnitudes.
+    """
+
+    def __init__(self, force: np.ndarray, moment: float, relative: float):
+        self.force, self.moment, self.relative = force, moment, relative
+        super().__init__(
+            f"the loads are out of equilibrium: force ({force[0]:.6g}, {force[1]:.6g}) N/m, moment {moment:.6g} N about "
+            f"the centroid, {relative:.3g} of the loads' size"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BodyLoad:
+    """All parts are optional and add up.
+
+        segments             (m, 2, 2)  straight pieces of the boundary, anywhere on it, directed along it
+        tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear between
+        body_force           (2,)       N/m³ at ``about``
+        body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
+        about                (2,)       m; the centroid when left out
+        remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
+                                        that carry it act on the boundary in addition to ``tractions``
+        crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses
+    """
+
+    segments: np.ndarray | None = None
+    tractions: np.ndarray | None = None
+    body_force: np.ndarray | None = None
+    body_force_gradient: np.ndarray | None = None
+    about: np.ndarray | None = None
+    remote_stress: np.ndarray | None = None
+    crack_pressure: np.ndarray | float = 0.0
+
+    def __post_init__(self) -> None:
+        shapes = {
+            "segments": (-1, 2, 2),
+            "tractions": (-1, 2, 2),
+            "body_force": (2,),
+            "body_force_gradient": (2, 2),
+            "about": (2,),
+            "remote_stress": (3,),
+        }
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            value = np.ascontiguousarray(value, dtype=float)
+            if value.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, value.shape)):
+                raise ValueError(f"{name}: expected shape {str(shape).replace('-1', 'm')}, got {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name}: not finite")
+            object.__setattr__(self, name, value)
+        if not np.isfinite(self.crack_pressure).all():
+            raise ValueError("crack_pressure: not finite")
+        n = [0 if x is None else len(x) for x in (self.segments, self.tractions)]
+        if n[0] != n[1]:
+            raise ValueError(f"{n[0]} load segments but {n[1]} tractions")
+
+
+def check_equilibrium(
+    load: BodyLoad, loops: list[np.ndarray], centroid: np.ndarray, force: np.ndarray, gradient: np.ndarray, tolerance: float
+) -> None:
+    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size; ``force`` and
+    ``gradient`` are the body force about the ``centroid``."""
+    total, moment, size, reach = np.zeros(2), 0.0, 0.0, 0.0
+    reach = float(np.ptp(loops[0], axis=0).max())
+    if load.segments is not None and len(load.segments):
+        x0, x1 = load.segments[:, 0] - centroid, load.segments[:, 1] - centroid
+        t0, t1 = load.tractions[:, 0], load.tractions[:, 1]
+        length = np.hypot(*(x1 - x0).T)
+        total = total + 0.5 * length @ (t0 + t1)
+        a, b = 2 * t0 + t1, t0 + 2 * t1
+        moment += float(length @ (x0[:, 0] * a[:, 1] - x0[:, 1] * a[:, 0] + x1[:, 0] * b[:, 1] - x1[:, 1] * b[:, 0])) / 6
+        size += 0.5 * float(length @ (np.hypot(*t0.T) + np.hypot(*t1.T)))
+    if force.any() or gradient.any():
+        area, first, second = polygon_moments(loops, centroid)
+        total = total + area * force + gradient @ first
+        turned = gradient @ second
+        moment += first[0] * force[1] - first[1] * force[0] + turned[1, 0] - turned[0, 1]
+        size += area * (float(np.hypot(*force)) + float(np.abs(gradient).max()) * reach)
+    if size > 0:
+        relative = max(float(np.hypot(*total)), abs(moment) / reach) / size
+        if relative > tolerance:
+            raise OutOfEquilibrium(total, moment, relative)

@@ -1,0 +1,309 @@
+"""From outlines and cracks to elements: a pure function of the geometry, so what has not changed is the same to the bit.
+
+Sides are cut to nearly equal elements, graded towards corners and crack mouths; a straight initial crack has
+``elements_per_crack`` elements, every grown increment one. Density has weak singularities at kinks, junctions and
+mouths: there element sizes shrink geometrically. Last, elements that are long beside their distance to others are
+halved. A kink loses its grading again when the tip is three increments past it, where it no longer matters for the
+stress intensity.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Cracks, DdmSettings
+from . import proximity, shapes
+from .influence import ElementSet
+
+#: A turn by more than this is a kink that is graded, rad.
+KINK = math.radians(20)
+#: Neighbouring segments whose elements differ more than this in length are graded.
+JUMP = 10.0
+#: Increments between a kink and the tip from which the kink is not graded any more.
+FORGOTTEN = 3
+#: Longest element in units of its distance to another one. Its density then still converges like 3.5^−p.
+APART = 1.25
+#: Elements are not halved below this part of the largest extent of the geometry.
+FLOOR = 1e-5
+#: A mouth nearer to an element's end than this part of its length moves the end instead of cutting a sliver.
+SLIVER = 0.08
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """``boundary`` elements (source: edge) and ``cracks`` elements (source: segment); ``edges`` (m, 2, 2) the outline
+    and ``edge_loop`` (m,) the loop of each."""
+
+    boundary: ElementSet
+    cracks: ElementSet
+    edges: np.ndarray
+    edge_loop: np.ndarray
+
+
+def outline_edges(loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 2, 2) edges of all loops and (m,) their loops."""
+    if not loops:
+        return np.empty((0, 2, 2)), np.empty(0, int)
+    edges = np.concatenate([np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in loops])
+    return edges, np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
+
+
+def mesh(loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings) -> Mesh:
+    """Elements of a body with outline ``loops`` (counter-clockwise, holes clockwise, [] for the infinite plane)."""
+    edges, edge_loop = outline_edges(loops)
+    boundary = _boundary(loops, edges, cracks, settings)
+    crack = _cracks(cracks, settings)
+    points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
+    extent = np.ptp(points, axis=0).max() if len(points) else 0.0
+    start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
+    source[len(boundary[0]) :] += len(edges)
+    start, end, kind, source = _halved(
+        start, end, kind, source, _touching(edges, cracks, extent), settings.grading_ratio, FLOOR * extent
+    )
+    on_crack = source >= len(edges)
+    rest = ~on_crack
+    # A rigid rotation of a boundary must be in its elements' span, or it is not without stress.
+    order = max(settings.order, 1)
+    return Mesh(
+        ElementSet(start[rest], end[rest], kind[rest], source[rest], order, settings.nodes),
+        ElementSet(
+            start[on_crack], end[on_crack], kind[on_crack], source[on_crack] - len(edges), settings.order, settings.nodes
+        ),
+        edges,
+        edge_loop,
+    )  # fmt: skip
+
+
+def _graded(ratio: float, layers: int) -> list[float]:
+    """Fractions inside (0, 1) that grade an element towards 0."""
+    return [ratio**k for k in range(layers, 0, -1)]
+
+
+def _boundary(loops, edges, cracks, settings):
+    if not len(edges):
+        return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
+    length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
+    span = math.sqrt(abs(_area(loops[0])))
+    size = min(length.max(), span) / settings.elements_per_side
+    layers, ratio = settings.grading_layers, settings.grading_ratio
+    mouths = [cracks.nodes[k] for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))]
+    corner = np.concatenate([_interior_angles(loop) for loop in loops])
+    first = np.cumsum([0] + [len(loop) for loop in loops])
+    nodes, source = [], []
+    for k in range(len(loops)):
+        n_edges = len(loops[k])
+        for i in range(n_edges):
+            edge = first[k] + i
+            fractions = _side(
+                length[edge],
+                size,
+                _corner_layers(corner[edge], layers),
+                _corner_layers(corner[first[k] + (i + 1) % n_edges], layers),
+                ratio,
+            )
+            line = _with_mouths(edges[edge], fractions, mouths, ratio, layers, span)
+            nodes.append(np.stack([line[:-1], line[1:]], axis=1))
+            source.append(np.full(len(line) - 1, edge))
+    pairs = np.concatenate(nodes)
+    return pairs[:, 0], pairs[:, 1], np.zeros(len(pairs), np.int64), np.concatenate(source)
+
+
+def _area(loop: np.ndarray) -> float:
+    own = loop - loop[0]
+    after = np.roll(own, -1, axis=0)
+    return 0.5 * float(np.sum(own[:, 0] * after[:, 1] - own[:, 1] * after[:, 0]))
+
+
+def _interior_angles(loop: np.ndarray) -> np.ndarray:
+    """(n,) angle of rock at each vertex, rad, in (0, 2π)."""
+    out = np.roll(loop, -1, axis=0) - loop
+    back = np.roll(loop, 1, axis=0) - loop
+    turn = np.arctan2(out[:, 0] * back[:, 1] - out[:, 1] * back[:, 0], np.sum(out * back, axis=1))
+    return np.mod(turn, 2 * np.pi)
+
+
+def _corner_layers(angle: float, layers: int) -> int:
+    """Re-entrant corners are singular and get all layers and one more, convex ones one, straight ones none."""
+    if angle > math.pi + KINK:
+        return layers + 1
+    return 1 if angle < math.pi - KINK and layers else 0
+
+
+def _side(length: float, size: float, layers_start: int, layers_end: int, ratio: float) -> np.ndarray:
+    """(n + 1,) fractions along a side, from 0 to 1."""
+    n = max(1, math.ceil(length / size - 1e-9))
+    if n == 1 and layers_start and layers_end:
+        n = 2
+    inner = list(range(1, n))
+    fine = [f for f in _graded(ratio, layers_start)] + inner + [n - f for f in _graded(ratio, layers_end)][::-1]
+    return np.array([0.0, *(f / n for f in fine), 1.0])
+
+
+def _with_mouths(edge, fractions, mouths, ratio, layers, span) -> np.ndarray:
+    """(n, 2) points along an ``edge`` with mouths as nodes, graded; elsewhere as without them."""
+    a, b = edge
+    along = b - a
+    length = math.hypot(*along)
+    points = [((1 - f) * a + f * b) for f in fractions]
+    points[0], points[-1] = a, b
+    fractions = list(fractions)
+    here = []
+    for mouth in mouths:
+        rel = mouth - a
+        f = float(rel @ along) / length**2
+        off = abs(rel[0] * along[1] - rel[1] * along[0]) / length
+        # At a corner there is nothing to split.
+        if off <= 1e-7 * span and 1e-7 * span < f * length < length - 1e-7 * span:
+            here.append((f, mouth))
+    for f, mouth in sorted(here, key=lambda pair: pair[0]):
+        k = int(np.searchsorted(fractions, f))
+        cell = fractions[k] - fractions[k - 1]
+        for end in (k, k - 1):
+            if abs(fractions[end] - f) < SLIVER * cell and 0 < end < len(fractions) - 1:
+                del fractions[end], points[end]
+                k = int(np.searchsorted(fractions, f))
+                break
+        before, after = fractions[k - 1], fractions[k]
+        left = [f - (f - before) * g for g in _graded(ratio, layers)][::-1]
+        right = [f + (after - f) * g for g in _graded(ratio, layers)]
+        at = lambda q: (1 - q) * a + q * b  # noqa: E731
+        fractions[k:k] = [*left, f, *right]
+        points[k:k] = [*map(at, left), mouth, *map(at, right)]
+    return np.array(points)
+
+
+def _cracks(cracks: Cracks, settings: DdmSettings):
+    n = cracks.n_segments
+    if n == 0:
+        return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
+    length = cracks.lengths
+    drawn = cracks.birth_cycle == 0
+    total = np.bincount(cracks.crack, weights=np.where(drawn, length, 0.0), minlength=cracks.crack.max() + 1)
+    share = np.where(drawn, length / np.maximum(total[cracks.crack], 1e-300), 0.0)
+    count = np.maximum(1, np.rint(settings.elements_per_crack * share).astype(int))
+    layers = _node_layers(cracks, length / count, settings)
+    tip = np.zeros(len(cracks.nodes), bool)
+    tip[cracks.tips] = True
+    start, end, kind, source = [], [], [], []
+    for s in range(n):
+        i, j = cracks.segments[s]
+        m = int(count[s])
+        at_start, at_end = int(layers[s, 0]), int(layers[s, 1])
+        if m == 1 and at_start and at_end:
+            m = 2
+        fine = _graded(settings.grading_ratio, at_start) + list(range(1, m))
+        fine += [m - f for f in _graded(settings.grading_ratio, at_end)][::-1]
+        f = np.array([q / m for q in fine])[:, None]
+        a, b = cracks.nodes[i], cracks.nodes[j]
+        line = np.concatenate([a[None], (1 - f) * a + f * b, b[None]])
+        kinds = np.full(len(line) - 1, shapes.ORDINARY)
+        if tip[i]:
+            kinds[0] = shapes.TIP_START
+        if tip[j]:
+            kinds[-1] = shapes.TIP_BOTH if len(kinds) == 1 and tip[i] else shapes.TIP_END
+        start.append(line[:-1])
+        end.append(line[1:])
+        kind.append(kinds)
+        source.append(np.full(len(kinds), s))
+    return np.concatenate(start), np.concatenate(end), np.concatenate(kind), np.concatenate(source)
+
+
+def _node_layers(cracks: Cracks, size: np.ndarray, settings: DdmSettings) -> np.ndarray:
+    """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
+    full = settings.grading_layers
+    layers = np.zeros((cracks.n_segments, 2), int)
+    ends: list[list[tuple[int, int]]] = [[] for _ in range(len(cracks.nodes))]
+    for s, (i, j) in enumerate(cracks.segments):
+        ends[i].append((s, 0))
+        ends[j].append((s, 1))
+    direction = (cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]) / cracks.lengths[:, None]
+    for node, here in enumerate(ends):
+        if len(here) == 1:
+            if cracks.surface[node]:
+                layers[here[0]] = full
+            continue
+        if len(here) > 2 or len({cracks.crack[s] for s, _ in here}) > 1 or cracks.surface[node]:
+            for at in here:
+                layers[at] = full
+            continue
+        if not here:
+            continue
+        (s, e), (r, f) = here
+        # Both directions away from the node: straight on means opposite.
+        u, v = direction[s] * (1 - 2 * e), direction[r] * (1 - 2 * f)
+        turn = math.pi - abs(math.atan2(u[0] * v[1] - u[1] * v[0], float(u @ v)))
+        if turn > KINK and not _forgotten(cracks, ends, here):
+            layers[s, e] = layers[r, f] = full
+        if max(size[s], size[r]) > JUMP * min(size[s], size[r]):
+            longer = (s, e) if size[s] > size[r] else (r, f)
+            needed = math.log(min(size[s], size[r]) / max(size[s], size[r])) / math.log(settings.grading_ratio)
+            layers[longer] = max(layers[longer], round(needed))
+    return layers
+
+
+def _forgotten(cracks: Cracks, ends, here) -> bool:
+    """Whether the chain that grew from a kink has left it ``FORGOTTEN`` increments behind."""
+    s, e = max(here, key=lambda at: cracks.birth_cycle[at[0]])
+    if cracks.birth_cycle[s] == 0:
+        return False
+    for _ in range(FORGOTTEN - 1):
+        node = cracks.segments[s, 1 - e]
+        if len(ends[node]) != 2:
+            return False
+        s, e = next(at for at in ends[node] if at[0] != s)
+    return True
+
+
+def _touching(edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
+    """(m, m) which edges and segments meet in a node."""
+    n_edges, n = len(edges), len(edges) + cracks.n_segments
+    out = np.eye(n, dtype=bool)
+    ends = np.concatenate([edges, cracks.nodes[cracks.segments]]) if n else np.empty((0, 2, 2))
+    # Nodes by coordinates, so that corners, junctions and drawn end points that coincide count alike.
+    flat = np.ascontiguousarray(ends.reshape(-1, 2)) + 0.0
+    _, number = np.unique(flat.view([("x", float), ("y", float)]).ravel(), return_inverse=True)
+    incident = np.zeros((n, number.max() + 1 if n else 0), np.float32)
+    incident[np.repeat(np.arange(n), 2), number] = 1
+    out |= (incident @ incident.T) > 0
+    if n_edges and cracks.n_segments:
+        a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
+        length = np.hypot(*d.T)
+        for s, at in zip(*np.nonzero(cracks.surface[cracks.segments])):
+            rel = cracks.nodes[cracks.segments[s, at]] - a
+            off = np.abs(rel[:, 0] * d[:, 1] - rel[:, 1] * d[:, 0]) / length
+            f = np.sum(rel * d, axis=1) / length**2
+            met = (off <= 1e-7 * extent) & (f > -1e-7) & (f < 1 + 1e-7)
+            out[n_edges + s, :n_edges] |= met
+            out[:n_edges, n_edges + s] |= met
+    return out
+
+
+def _halved(start, end, kind, source, touching, ratio, floor):
+    """Halve what stands too close, until nothing does or the ``floor`` is reached."""
+    chained = max(2.5, 1.05 * (1 - ratio) / ratio)
+    for _ in range(20):
+        tip = np.where(kind == shapes.ORDINARY, 0, kind)
+        start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
+        ratios = proximity.crowding(start, end, tip, source, touching, APART, chained)
+        length = np.hypot(*(end - start).T)
+        cut = (ratios > 1 + 1e-9) & (length > 2 * floor)
+        if not cut.any():
+            break
+        middle = 0.5 * (start + end)
+        at = np.repeat(np.arange(len(start)), np.where(cut, 2, 1))
+        second = np.r_[False, at[1:] == at[:-1]] if len(at) else np.empty(0, bool)
+        first = np.r_[second[1:], False]
+        new_start, new_end, new_kind = start[at], end[at], kind[at]
+        new_end[first] = middle[at[first]]
+        new_start[second] = middle[at[second]]
+        was = kind[at]
+        starts, stops = (was == shapes.TIP_START) | (was == shapes.TIP_BOTH), (was == shapes.TIP_END) | (
+            was == shapes.TIP_BOTH
+        )
+        new_kind[first] = np.where(starts, shapes.TIP_START, shapes.ORDINARY)[first]
+        new_kind[second] = np.where(stops, shapes.TIP_END, shapes.ORDINARY)[second]
+        start, end, kind, source = new_start, new_end, new_kind, source[at]
+    return start, end, kind, source

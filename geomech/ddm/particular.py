@@ -1,0 +1,72 @@
+"""A particular solution for body forces that vary linearly, and the polygon moments their resultants need.
+
+For a force b = b0 + B X per volume, X measured from any origin, with M = λ + 2μ the cubic field
+
+    u_x = −(b0x x²/2 + Bxx x³/6)/M − Bxy y³/(6μ),    u_y = −(b0y y²/2 + Byy y³/6)/M − Byx x³/(6μ)
+
+satisfies Navier's equations (by direct substitution); gravity, linear acceleration and spin are of this form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Material
+
+
+@dataclass(frozen=True, eq=False)
+class Particular:
+    """``origin`` (2,), ``force`` (2,) N/m³ there, ``gradient`` (2, 2) N/m⁴, ``uniform`` (3,) Pa added everywhere."""
+
+    origin: np.ndarray
+    force: np.ndarray
+    gradient: np.ndarray
+    uniform: np.ndarray
+    material: Material
+
+    def stress(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) Pa, the uniform part included."""
+        return self.stress_of_force(points) + self.uniform
+
+    def stress_of_force(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) Pa, of the body force alone."""
+        x, y = (np.asarray(points) - self.origin).T
+        b, g = self.force, self.gradient
+        nu = self.material.effective_poissons_ratio
+        ratio = nu / (1 - nu)
+        fx = b[0] * x + 0.5 * g[0, 0] * x * x
+        fy = b[1] * y + 0.5 * g[1, 1] * y * y
+        return np.column_stack([-fx - ratio * fy, -fy - ratio * fx, -0.5 * (g[0, 1] * y * y + g[1, 0] * x * x)])
+
+    def displacement(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) m, of the body force and the uniform stress (no rotation, zero at the origin)."""
+        x, y = (np.asarray(points) - self.origin).T
+        b, g = self.force, self.gradient
+        mu, nu = self.material.shear_modulus, self.material.effective_poissons_ratio
+        m = 2 * mu * (1 - nu) / (1 - 2 * nu)
+        strain = self.material.compliance() @ self.uniform
+        ux = -(b[0] * x**2 / 2 + g[0, 0] * x**3 / 6) / m - g[0, 1] * y**3 / (6 * mu)
+        uy = -(b[1] * y**2 / 2 + g[1, 1] * y**3 / 6) / m - g[1, 0] * x**3 / (6 * mu)
+        return np.column_stack(
+            [ux + strain[0] * x + 0.5 * strain[2] * y, uy + strain[1] * y + 0.5 * strain[2] * x]
+        )
+
+
+def polygon_moments(loops: list[np.ndarray], origin: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Area, first moments (2,) and second moments (2, 2) about ``origin``, holes (clockwise) taken out."""
+    area, first, second = 0.0, np.zeros(2), np.zeros((2, 2))
+    for loop in loops:
+        p = loop - origin
+        q = np.roll(p, -1, axis=0)
+        cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+        area += 0.5 * cross.sum()
+        first += ((p + q) * cross[:, None]).sum(axis=0) / 6
+        s = p + q
+        second += (
+            np.einsum("i,ij,ik->jk", cross, p, p)
+            + np.einsum("i,ij,ik->jk", cross, q, q)
+            + np.einsum("i,ij,ik->jk", cross, s, s)
+        ) / 24
+    return area, first, second

@@ -1,0 +1,277 @@
+"""What a solved body knows: stress intensity factors, crack faces, fields anywhere, the strain its cracks carry."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..conventions import normal_of
+from ..model import OPEN, SLIP, TIP, CrackFaces
+from . import shapes
+from .faces import settle
+from .influence import add_fields
+from .loads import BodyLoad
+from .particular import Particular
+
+if TYPE_CHECKING:
+    from .body import Body
+
+#: Where a field is asked for at the very end of an element it is taken this part of the element's length away: the
+#: stress of the discrete solution has no value there.
+_NUDGE = 0.02
+
+
+def settle_faces(
+    body: "Body", load_traction: np.ndarray, pressure: np.ndarray | float, warm: "Solution | None"
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Slip and opening (times 2μ), closed unknowns (bool), traction on the faces and the number of solves."""
+    c = body.faces
+    n = c.n_unknowns
+    if n == 0:
+        return np.zeros(0), np.zeros(0, bool), np.zeros(0), 0
+    pressure = np.broadcast_to(np.asarray(pressure, dtype=float), (body.cracks.n_segments,))
+    normal = np.zeros((c.n, 2, c.per), bool)
+    normal[:, 1] = True
+    normal = normal.ravel()
+    applied = np.zeros((c.n, 2, c.per))
+    applied[:, 1] = -pressure[c.source, None]
+    right = applied.ravel() - load_traction
+    aperture = np.zeros((c.n, 2, c.per))
+    aperture[:, 1] = 2 * body.material.shear_modulus * body.cracks.aperture[c.source, None]
+    aperture = aperture.ravel()
+    can_close = normal & np.isfinite(aperture)
+    fixed = np.where(can_close, -aperture, 0.0)
+    stress_scale = max(float(np.abs(right).max()), np.finfo(float).tiny)
+    gap_scale = stress_scale * float(c.length.max())
+    state: dict[str, np.ndarray] = {}
+
+    def respond(closed):
+        free, factor = body._free_factor(closed)
+        w = np.where(closed, fixed, 0.0)
+        known = right if not closed.any() else right - body._schur @ w
+        w[free] = factor.solve(known[free])
+        traction = body._schur @ w + load_traction
+        state["w"], state["traction"] = w, traction
+        return (w + np.where(can_close, aperture, 0.0)) / gap_scale, (applied.ravel() - traction) / stress_scale
+
+    closed = np.zeros(n, bool)
+    if not can_close.any():
+        respond(closed)
+        return state["w"], closed, state["traction"], 1
+    if warm is not None:
+        at = c.found_in(warm.body.faces)
+        rows = np.zeros((c.n, 2 * c.per), bool)
+        rows[at >= 0] = warm.closed.reshape(-1, 2 * c.per)[at[at >= 0]]
+        closed = rows.ravel()
+    closed, solves = settle(respond, can_close, closed)
+    return state["w"], closed, state["traction"], solves
+
+
+class Solution:
+    """A body under a load; everything is computed when it is asked for.
+
+    ``states`` (n_elements, p+1) OPEN or SLIP (closed, frictionless) at the collocation nodes of the crack elements;
+    ``solves`` counts the contact's passes.
+    """
+
+    def __init__(
+        self,
+        body: "Body",
+        load: BodyLoad,
+        particular: Particular,
+        edge_densities: np.ndarray | None,
+        boundary_displacement: np.ndarray,
+        jumps: np.ndarray,
+        closed: np.ndarray,
+        traction: np.ndarray,
+        boundary_load: np.ndarray,
+        face_load: np.ndarray,
+        solves: int,
+    ):
+        self.body, self.load, self.solves = body, load, solves
+        self.closed = closed
+        self._particular, self._edge_densities = particular, edge_densities
+        self._u, self._w, self._traction = boundary_displacement, jumps, traction
+        self._boundary_load, self._face_load = boundary_load, face_load
+
+    @cached_property
+    def states(self) -> np.ndarray:
+        c = self.body.faces
+        return np.where(self.closed.reshape(c.n, 2, c.per)[:, 1], SLIP, OPEN)
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        """TIP rows in the order of the network's ``tips``, k_i and k_ii in Pa √m filled.
+
+        From the leading coefficient of the tip element, D ≈ d√r: K = μ√(2π)/(4(1−ν)) d (Crouch & Starfield 1983).
+        K_I is zero where the faces next to the tip are closed, and never negative at a crack without aperture.
+        """
+        body, c = self.body, self.body.faces
+        network = body.cracks
+        rows = np.zeros(len(network.tips), TIP)
+        if not len(rows):
+            return rows
+        w = self._w.reshape(c.n, 2, c.per)
+        factor = np.sqrt(2 * np.pi) / (8 * (1 - body.nu))
+        at_tip: dict[int, tuple[int, bool]] = {}
+        for e in np.flatnonzero(c.kind != shapes.ORDINARY):
+            i, j = network.segments[c.source[e]]
+            if c.kind[e] in (shapes.TIP_START, shapes.TIP_BOTH):
+                at_tip[int(i)] = int(e), False
+            if c.kind[e] in (shapes.TIP_END, shapes.TIP_BOTH):
+                at_tip[int(j)] = int(e), True
+        for row, node in zip(rows, network.tips):
+            e, at_end = at_tip[int(node)]
+            segment = c.source[e]
+            lead = shapes.leading(c.family, c.order, int(c.kind[e]), at_end)
+            slip, opening = factor * (w[e] @ lead) / np.sqrt(c.length[e])
+            if network.aperture[segment] == 0 and (opening < 0 or self.states[e, -1 if at_end else 0] != OPEN):
+                opening = 0.0
+            row["node"], row["crack"], row["block"] = node, network.crack[segment], network.block[segment]
+            row["point"] = network.nodes[node]
+            row["direction"] = c.tangent[e] if at_end else -c.tangent[e]
+            row["k_i"], row["k_ii"] = opening, slip
+        return rows
+
+    @cached_property
+    def faces(self) -> CrackFaces:
+        """Opening, slip, traction and state at the ends and collocation nodes of every element. Traction and state are
+        those of the nodes; between and beyond them traction is interpolated linearly, state is the nearest node's."""
+        body, c = self.body, self.body.faces
+        t = np.concatenate([[-1.0], shapes.nodes(c.family, c.order), [1.0]])
+        slip, opening = np.moveaxis(c.evaluate(self._w, t), 1, 0) / (2 * body.material.shear_modulus)
+        pad = np.r_[0, np.arange(c.per), c.per - 1]
+        traction = self._traction.reshape(c.n, 2, c.per)[:, :, pad]
+        return CrackFaces(
+            segment=c.source,
+            points=c.at(t),
+            opening=opening,
+            slip=slip,
+            traction=np.stack([traction[:, 1], traction[:, 0]], axis=2),
+            state=self.states[:, pad],
+        )
+
+    @cached_property
+    def crack_strain(self) -> np.ndarray:
+        """(3,) mean strain of the cracks, (1/A) Σ ∫ sym(n ⊗ [u]) ds, engineering shear. ValueError without outline."""
+        if not self.body.loops:
+            raise ValueError("the mean strain of cracks needs a body with an outline")
+        return self.body.strain_weights @ self._w
+
+    @cached_property
+    def residual(self) -> float:
+        """Largest traction left over at the collocation nodes, relative to the largest applied there."""
+        body = self.body
+        on_boundary = body._gg @ self._u + body._gc @ self._w + self._boundary_load
+        on_faces = body._cg @ self._u + body._cc @ self._w + self._face_load - self._traction
+        scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
+        left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
+        return left / scale if scale else left
+
+    @cached_property
+    def condition(self) -> float:
+        """Estimated condition number of the matrices solved with, the worse one."""
+        _, factor = self.body._free_factor(self.closed) if self.body.faces.n else (None, self.body._gg_factor)
+        return 1.0 / min(factor.rcond, self.body._gg_factor.rcond)
+
+    def stress(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) total stress at ``points`` (n, 2), Pa.
+
+        On a boundary it is the rock's, on a crack that of the upper face; at the ends of elements (corners, crack tips,
+        crack nodes), where the discrete field has no value, that at a hundredth of the element's length beside.
+        """
+        return self._fields(points)[0]
+
+    def displacement(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) displacement at ``points`` (n, 2), m. The mean displacement and mean rotation of the outline are zero; in
+        the infinite plane cracks add to the uniform strain about the origin."""
+        points = np.asarray(points, dtype=float).reshape(-1, 2)
+        return self._fields(points)[1] - _rigid(self._motion, self.body.centroid, points)
+
+    def _fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        body = self.body
+        points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
+        where = self._off_ends(points)
+        stress, shift = np.zeros((len(points), 3)), np.zeros((len(points), 2))
+        nu = body.nu
+
+        def add(start, end, kind, density, tol, force):
+            add_fields(where, start, end, kind, density, nu, tol, 1.0, force, stress, shift)
+
+        for elements, values in ((body.boundary, self._u), (body.faces, self._w)):
+            if elements.n:
+                add(elements.start, elements.end, elements.kind, elements.densities(values), body._tol, False)
+        if self.load.segments is not None and len(self.load.segments):
+            start, end, density = self._line_forces
+            add(start, end, np.zeros(len(start), np.int64), density, 2e-6 * body._extent, True)
+        if self._edge_densities is not None:
+            edges = body.mesh.edges
+            add(edges[:, 0], edges[:, 1], np.zeros(len(edges), np.int64), self._edge_densities, body._tol, True)
+        shift /= 2 * body.material.shear_modulus
+        return stress + self._particular.stress(where), shift + self._particular.displacement(where)
+
+    @cached_property
+    def _line_forces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        body = self.body
+        start, end, density = [], [], []
+        for k, (segment, ends) in enumerate(zip(self.load.segments, self.load.tractions)):
+            (a, b), against = body._on_boundary(segment, k)
+            ends = ends[::-1] if against else ends
+            t = (b - a) / np.hypot(*(b - a))
+            local = ends @ np.column_stack([t, normal_of(t)])
+            start.append(a)
+            end.append(b)
+            density.append(np.stack([local.mean(axis=0), 0.5 * (local[1] - local[0])], axis=1))
+        return np.array(start), np.array(end), np.array(density)
+
+    def _off_ends(self, points: np.ndarray) -> np.ndarray:
+        """The points, those within a nudge of an element's end moved away from it, into the rock."""
+        body = self.body
+        sets = [s for s in (body.boundary, body.faces) if s.n]
+        if not sets or not len(points):
+            return points
+        from scipy.spatial import cKDTree
+
+        ends = np.concatenate([x for s in sets for x in (s.start, s.end)])
+        reach = _NUDGE * np.concatenate([x for s in sets for x in (s.length, s.length)])
+        inward = np.concatenate([x for s in sets for x in (s.normal, s.normal)])
+        moved = points.copy()
+        tree = cKDTree(ends)
+        distance, nearest = tree.query(points)
+        for i in np.flatnonzero(distance < reach[nearest]):
+            here = tree.query_ball_point(ends[nearest[i]], 1e-12 * body._extent)
+            way = inward[here].sum(axis=0)
+            if distance[i] > 1e-3 * reach[nearest[i]]:
+                way = (points[i] - ends[nearest[i]]) / distance[i]
+            elif np.hypot(*way) < 1e-6:
+                way = inward[nearest[i]]
+            moved[i] = ends[nearest[i]] + way / np.hypot(*way) * reach[here].min()
+        return moved
+
+    @cached_property
+    def _motion(self) -> np.ndarray:
+        """(3,) mean displacement (2) and rotation of the outline before it is taken out."""
+        body, g = self.body, self.body.boundary
+        if not g.n:
+            return np.zeros(3)
+        here = np.flatnonzero(body.mesh.edge_loop[g.source] == 0)
+        u = self._u.reshape(g.n, 2, g.per)[here] / (2 * body.material.shear_modulus)
+        x, ds = g.nodes[here], g.quadrature[here]
+        total = u[:, 0, :, None] * g.tangent[here, None] + u[:, 1, :, None] * g.normal[here, None]
+        total = total + self._particular.displacement(x.reshape(-1, 2)).reshape(x.shape)
+        perimeter = ds.sum()
+        mean = np.einsum("ej,ejc->c", ds, total) / perimeter
+        middle = np.einsum("ej,ejc->c", ds, x) / perimeter
+        rel = x - middle
+        turn = np.einsum("ej,ej->", ds, rel[..., 0] * total[..., 1] - rel[..., 1] * total[..., 0])
+        turn /= np.einsum("ej,ejc,ejc->", ds, rel, rel)
+        # Given about the body's centroid, as the field is.
+        arm = body.centroid - middle
+        return np.array([mean[0] - turn * arm[1], mean[1] + turn * arm[0], turn])
+
+
+def _rigid(motion: np.ndarray, centre: np.ndarray, points: np.ndarray) -> np.ndarray:
+    rel = points - centre
+    return np.column_stack([motion[0] - motion[2] * rel[:, 1], motion[1] + motion[2] * rel[:, 0]])

@@ -1,0 +1,164 @@
+"""What a body may look like: outlines that bound an area, cracks inside it that do not cross or coincide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import Cracks
+
+#: Lengths below this part of the extent are zero.
+_SMALL = 1e-9
+
+
+def check_outline(loops: list[np.ndarray]) -> list[np.ndarray]:
+    """The loops as float arrays. Raises ValueError naming the loop: shape, finiteness, repeated vertices, sense of
+    rotation (outline counter-clockwise, holes clockwise), crossing edges."""
+    out = []
+    for k, loop in enumerate(loops):
+        name = "the outline" if k == 0 else f"hole {k}"
+        loop = np.array(loop, dtype=float)
+        if loop.ndim != 2 or loop.shape[1] != 2 or len(loop) < 3:
+            raise ValueError(f"{name}: expected at least three vertices (n, 2), got shape {loop.shape}")
+        if not np.isfinite(loop).all():
+            raise ValueError(f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not finite")
+        step = np.roll(loop, -1, axis=0) - loop
+        span = np.ptp(loop, axis=0).max()
+        short = np.hypot(*step.T) <= _SMALL * span
+        if short.any():
+            at = int(np.flatnonzero(short)[0])
+            raise ValueError(f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide")
+        own = loop - loop[0]
+        after = np.roll(own, -1, axis=0)
+        area = 0.5 * np.sum(own[:, 0] * after[:, 1] - own[:, 1] * after[:, 0])
+        if k == 0 and area <= 0:
+            raise ValueError(f"{name}: vertices must run counter-clockwise and enclose an area")
+        if k and area >= 0:
+            raise ValueError(f"{name}: the vertices of a hole must run clockwise")
+        out.append(loop)
+    if out:
+        edges = np.concatenate([np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in out])
+        where = _crossings(edges, edges, upper=True)
+        if len(where):
+            i, j = where[0]
+            raise ValueError(f"the outline crosses itself: edges {i} and {j} near {_near(edges[i])}")
+        for k, hole in enumerate(out[1:], 1):
+            if not inside(out[:1], hole).all():
+                raise ValueError(f"hole {k}: not inside the outline")
+    return out
+
+
+def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fresh: np.ndarray | None = None) -> None:
+    """Raise ValueError naming the crack: not finite, no length, outside the rock, on the boundary without being a
+    mouth, crossing the outline, crossing or covering another without a shared node. ``fresh`` (n_segments,) bool limits
+    the comparison to segments that are new."""
+    n = cracks.n_segments
+    if n == 0:
+        return
+
+    def name(s):
+        k = int(cracks.crack[s])
+        return f"{cracks.names[k]!r}" if k < len(cracks.names) else f"crack {k}"
+
+    segments = cracks.nodes[cracks.segments]
+    if not np.isfinite(segments).all():
+        s = int(np.flatnonzero(~np.isfinite(segments).all(axis=(1, 2)))[0])
+        raise ValueError(f"{name(s)}: a crack point is not finite")
+    span = np.ptp(np.concatenate([edges.reshape(-1, 2), segments.reshape(-1, 2)]), axis=0).max()
+    if (cracks.lengths <= 1e-12 * span).any():
+        raise ValueError(f"{name(int(np.argmin(cracks.lengths)))}: a crack segment has no length")
+    if not (cracks.aperture >= 0).all():
+        raise ValueError(f"{name(int(np.argmin(cracks.aperture)))}: an aperture must not be negative")
+    fresh = np.ones(n, bool) if fresh is None else fresh
+    new = np.flatnonzero(fresh)
+    if not len(new):
+        return
+    if len(edges):
+        mouth = cracks.surface[cracks.segments]
+        ends = segments.reshape(-1, 2)
+        distance = _to_segments(ends, edges).reshape(n, 2)
+        rock = inside(loops, ends).reshape(n, 2)
+        for s in new:
+            for e in (0, 1):
+                x, y = segments[s, e]
+                if mouth[s, e]:
+                    if distance[s, e] > 1e-7 * span:
+                        raise ValueError(
+                            f"{name(s)}: its mouth ({x:g}, {y:g}) is {distance[s, e]:.3g} m off the boundary"
+                        )
+                elif distance[s, e] <= _SMALL * span:
+                    raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies on the boundary but is not marked as a mouth")
+                elif not rock[s, e]:
+                    raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies outside the rock")
+        where = _crossings(segments[new], edges)
+        for i, j in where:
+            s = new[i]
+            # A mouth touches its edge within round-off, which may look like a crossing.
+            near = _to_segments(segments[s], edges[j : j + 1])
+            if not (mouth[s] & (near <= 1e-7 * span)).any():
+                raise ValueError(f"{name(s)}: crosses the outline near {_near(segments[s])}")
+    for i, j in _crossings(segments[new], segments):
+        if new[i] != j:
+            raise ValueError(f"{name(new[i])} and {name(j)} cross near {_near(segments[new[i]])} without a shared node")
+    for i, j in _overlaps(segments[new], segments, span):
+        if new[i] != j:
+            raise ValueError(f"{name(new[i])} and {name(j)} coincide near {_near(segments[new[i]])}")
+
+
+def inside(loops: list[np.ndarray], points: np.ndarray) -> np.ndarray:
+    """(n,) whether points lie inside the outline and outside the holes (even–odd rule)."""
+    points = np.asarray(points, dtype=float)
+    count = np.zeros(len(points), int)
+    for loop in loops:
+        a, b = loop[:, None], np.roll(loop, -1, axis=0)[:, None]
+        x, y = points[None, :, 0], points[None, :, 1]
+        spans = (a[..., 1] > y) != (b[..., 1] > y)
+        rise = np.where(spans, b[..., 1] - a[..., 1], 1.0)
+        count += (spans & (x < a[..., 0] + (y - a[..., 1]) * (b[..., 0] - a[..., 0]) / rise)).sum(axis=0)
+    return count % 2 == 1
+
+
+def _near(segment) -> str:
+    x, y = segment.mean(axis=0)
+    return f"({x:g}, {y:g})"
+
+
+def _side_of(p, segments):
+    d = segments[:, 1] - segments[:, 0]
+    rel = p[..., None, :] - segments[:, 0]
+    return d[:, 0] * rel[..., 1] - d[:, 1] * rel[..., 0]
+
+
+def _crossings(first: np.ndarray, second: np.ndarray, upper: bool = False) -> np.ndarray:
+    """(k, 2) pairs of segments that cross properly: each has the other's ends on both sides, beyond round-off."""
+    scale = np.abs(np.concatenate([first.reshape(-1, 2), second.reshape(-1, 2)])).max()
+    l1 = np.hypot(*(first[:, 1] - first[:, 0]).T)
+    l2 = np.hypot(*(second[:, 1] - second[:, 0]).T)
+    tol1, tol2 = 1e-10 * scale * l2[None, :], 1e-10 * scale * l1[None, :]
+    a, b = _side_of(first[:, 0], second), _side_of(first[:, 1], second)
+    c, d = _side_of(second[:, 0], first), _side_of(second[:, 1], first)
+    across = ((a > tol1) & (b < -tol1)) | ((a < -tol1) & (b > tol1))
+    astride = (((c > tol2) & (d < -tol2)) | ((c < -tol2) & (d > tol2))).T
+    pairs = across & astride
+    if upper:
+        pairs = np.triu(pairs, 1)
+    return np.argwhere(pairs)
+
+
+def _overlaps(first: np.ndarray, second: np.ndarray, span: float) -> np.ndarray:
+    """(k, 2) pairs of segments that lie on one line and share more than a point."""
+    d = first[:, 1] - first[:, 0]
+    length = np.hypot(*d.T)
+    t = d / length[:, None]
+    rel = second[None] - first[:, None, :1]
+    along = np.einsum("ijkl,il->ijk", rel, t)
+    off = np.abs(rel[..., 1] * t[:, None, None, 0] - rel[..., 0] * t[:, None, None, 1])
+    common = np.minimum(along.max(axis=2), length[:, None]) - np.maximum(along.min(axis=2), 0.0)
+    return np.argwhere((off.max(axis=2) <= _SMALL * span) & (common > 1e-7 * span))
+
+
+def _to_segments(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
+    """(n,) distance of points to the nearest of ``segments``."""
+    a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
+    rel = points[:, None] - a
+    s = np.clip(np.sum(rel * d, axis=2) / np.sum(d * d, axis=1), 0.0, 1.0)
+    return np.hypot(*np.moveaxis(rel - s[..., None] * d, 2, 0)).min(axis=1)
