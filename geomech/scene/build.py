@@ -141,6 +141,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
     return DdaSettings(
         time_step=d.time_step_s,
         dynamic_factor=d.dynamic_factor,
+        damping=d.damping,
         max_displacement_ratio=d.max_displacement_ratio,
         normal_penalty=d.normal_penalty_pa,
         shear_penalty=d.shear_penalty_pa,

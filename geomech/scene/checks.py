@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..model import Blocks
+from ..shapes import cutting_cracks
 from .drawing import Drawing
 from .errors import Fault
 from .locator import Path
@@ -46,6 +47,7 @@ def check(tables, data, drawing, place, faults, warnings) -> None:
         _zones(c)
         _cracks(c)
     if drawing is not None and drawing.blocks is not None:
+        _whole(c)
         _edges(c)
         _joints(c)
         _points(c)
@@ -129,6 +131,17 @@ def _cracks(c: Check) -> None:
             c.refuse(
                 ("cracks", name), f"the geometry has no crack {name!r}", nearest(name, list(c.drawing.cracks_drawn))
             )
+
+
+def _whole(c: Check) -> None:
+    """What drawn cracks enclose is a block of its own, and must be drawn as one."""
+    for crack, block in cutting_cracks(c.drawing.blocks, c.drawing.cracks):
+        c.refuse(
+            ("geometry", "cracks", crack) if c.tables.geometry.model is None else ("geometry", "model"),
+            f"crack {c.drawing.cracks.names[crack]!r} cuts a piece off zone {c.drawing.zones[block]!r}, alone or with "
+            "the cracks before it",
+            "draw the pieces as zones of their own: blocks part along their outlines",
+        )
 
 
 def _edge_names(c: Check) -> list[str]:

@@ -202,6 +202,9 @@ class DdaTable(Table):
     dynamic_factor: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0, description="share of the velocity carried from step to step: 0 static, 1 dynamic"
     )
+    damping: NotNegative = Field(
+        0.05, description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration"
+    )
     max_displacement_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
         0.001, description="largest displacement in a step, in units of half the height of the domain"
     )

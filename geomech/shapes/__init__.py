@@ -15,6 +15,7 @@ _PUBLIC = {
     "Zone": "parts",
     "assemble": "assembly",
     "block_names": "assembly",
+    "cutting_cracks": "network",
     "mesh_interior": "meshing",
     "read_gmsh_model": "gmsh_model",
     "rectangle": "outlines",

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..model import Cracks
+from ..model import Blocks, Cracks
 from .parts import Flaw
 
 
@@ -46,6 +46,35 @@ def crack_network(
     for k, block, line, mouth in placed:
         net.add(k, block, line, mouth)
     return net.noded()
+
+
+def cutting_cracks(blocks: Blocks, cracks: Cracks) -> list[tuple[int, int]]:
+    """(crack, block) for every crack that closes a ring with those before it and the outline, so that it cuts a piece
+    off its block.
+
+    Every loop of a block counts as one point; a segment that joins two points which are connected already closes a
+    ring.
+    """
+    parent: dict[tuple, tuple] = {}
+
+    def root(key: tuple) -> tuple:
+        while parent.setdefault(key, key) != key:
+            key = parent[key]
+        return key
+
+    def key_of(node: int, block: int) -> tuple:
+        if not cracks.surface[node]:
+            return ("node", node)
+        ends = [(loop, np.roll(loop, -1, axis=0)) for loop in blocks.loops(block)]
+        return ("loop", block, int(np.argmin([_nearest_on(cracks.nodes[node], a, b, 0.0)[1] for a, b in ends])))
+
+    found: dict[int, int] = {}
+    for (a, b), crack, block in zip(cracks.segments.tolist(), cracks.crack.tolist(), cracks.block.tolist()):
+        first, second = root(key_of(a, block)), root(key_of(b, block))
+        if first == second:
+            found.setdefault(crack, block)
+        parent[first] = second
+    return list(found.items())
 
 
 def _cleaned(k: int, name: str, line: np.ndarray, tolerance: float, flaws: list[Flaw]) -> tuple[np.ndarray, bool]:

@@ -108,6 +108,13 @@ SPOILT = [
         "crosses the outline of zone 'rock'",
         "end it",
     ),
+    (
+        "length_m = 0.2\nangle_deg = 30",
+        "length_m = 1.0\nangle_deg = 0",
+        "geometry.cracks[0]",
+        "cuts a piece off",
+        "zones",
+    ),
     ("centre = [0.5, 1.0]", "", "geometry.cracks[0]", "a crack needs `points`", ""),
     ("length_m = 0.2", "length_m = 0.0", "geometry.cracks[0].length_m", "greater than 0", "length"),
     (

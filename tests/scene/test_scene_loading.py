@@ -115,6 +115,7 @@ start_s = 4.0
 [dda]
 time_step_s = 0.01
 dynamic_factor = 0.9
+damping = 0.1
 max_displacement_ratio = 0.002
 normal_penalty_pa = 1e12
 shear_penalty_pa = 5e11
@@ -162,6 +163,7 @@ def test_every_setting_arrives(scene_file):
     assert vars(p.dda) == {
         "time_step": 0.01,
         "dynamic_factor": 0.9,
+        "damping": 0.1,
         "max_displacement_ratio": 0.002,
         "normal_penalty": 1e12,
         "shear_penalty": 5e11,

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+import shapely
 
-from geomech.shapes import ShapeError, Trace, Zone, assemble, rectangle, straight_crack
+from geomech.shapes import ShapeError, Trace, Zone, assemble, cutting_cracks, rectangle, straight_crack
 
 SQUARE = rectangle(0.0, 0.0, 1.0, 1.0)
 ROCK = [Zone("rock", (SQUARE,))]
@@ -139,3 +140,34 @@ def test_a_reentrant_corner_on_a_crack_is_refused():
     ell = np.array([[0, 0], [1, 0], [1, 0.5], [0.5, 0.5], [0.5, 1], [0, 1.0]])
     (flaw,) = flaws([[0.2, 0.8], [0.8, 0.2]], zones=[Zone("ell", (ell,))])
     assert "touches the outline" in flaw.message
+
+
+RING = [[[0.3, 0.3], [0.7, 0.3]], [[0.6, 0.2], [0.4, 0.7]], [[0.3, 0.2], [0.5, 0.7]]]
+
+
+@pytest.mark.parametrize(
+    ("lines", "found"),
+    [
+        ([[[0.0, 0.4], [1.0, 0.6]]], [0]),  # from side to side
+        ([[[0.0, 0.4], [0.5, 0.5], [0.0, 0.6]]], [0]),  # a bite out of one side
+        ([[[0.0, 0.4], [0.6, 0.5]], [[0.4, 0.3], [0.4, 0.8]], [[1.0, 0.7], [0.3, 0.7]]], [2]),  # three together
+        (RING, [2]),  # a triangle inside
+        (RING[:2], []),
+        ([[[0.0, 0.4], [0.6, 0.5]], [[0.4, 0.3], [0.4, 0.8]]], []),
+    ],
+)
+def test_cracks_that_cut_a_piece_off_are_found(lines, found):
+    """Against Shapely's polygonize: a piece is cut off when outline and cracks bound more than one polygon."""
+    blocks, net = assemble(ROCK, [Trace(str(k), (np.array(line),)) for k, line in enumerate(lines)])
+    assert [crack for crack, _ in cutting_cracks(blocks, net)] == found
+    noded = shapely.union_all([*shapely.linestrings(net.nodes[net.segments]), shapely.LinearRing(SQUARE)])
+    pieces = shapely.polygonize(shapely.get_parts(noded)).geoms
+    assert (len(pieces) > 1) == bool(found)
+
+
+def test_one_bridge_to_a_hole_cuts_nothing_off_and_two_do():
+    zones = [Zone("rock", (SQUARE, rectangle(0.4, 0.4, 0.6, 0.6)))]
+    left, right = (Trace(n, (np.array(p),)) for n, p in (("l", [[0, 0.5], [0.4, 0.5]]), ("r", [[0.6, 0.5], [1, 0.5]])))
+    blocks, one = assemble(zones, [left])
+    assert one.surface.all() and cutting_cracks(blocks, one) == []
+    assert cutting_cracks(*assemble(zones, [left, right])) == [(1, 0)]

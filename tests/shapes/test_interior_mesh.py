@@ -5,6 +5,7 @@ import time
 import numpy as np
 import pytest
 
+from geomech.model import Cracks
 from geomech.shapes import Trace, Zone, assemble, mesh_interior, rectangle, straight_crack
 
 SQUARE = rectangle(0.0, 0.0, 1.0, 1.0)
@@ -38,7 +39,6 @@ CASES = {
     "crossing": [[[0.2, 0.5], [0.8, 0.5]], [[0.5, 0.2], [0.5, 0.8]]],
     "tee": [[[0.2, 0.5], [0.8, 0.5]], [[0.4, 0.5], [0.4, 0.8]]],
     "two": [straight_crack((0.5, 0.6), 0.2, 0.8), straight_crack((0.5, 0.4), 0.2, 2.4)],
-    "through": [[[0.0, 0.4], [1.0, 0.6]]],
 }
 
 
@@ -106,6 +106,17 @@ def test_sizes_shrink_to_the_tips():
     # Gmsh keeps sizes within a factor of about two.
     assert 0.0025 < length[(edges == tip).any(axis=1)].mean() < 0.01
     assert 0.05 < length[(mesh.points[edges[:, 0]] < 0.15).all(axis=1)].mean() < 0.2
+
+
+def test_a_crack_right_through_parts_the_mesh():
+    # No scene may draw it, but growth can leave it for a moment.
+    crack = Cracks.from_polylines([np.array([[0.0, 0.4], [1.0, 0.6]])], surface=[(True, True)])
+    mesh = mesh_interior([SQUARE], crack, 0.1, 0.1)
+    assert areas(mesh).sum() == pytest.approx(1.0, abs=1e-12)
+    assert len(copies(mesh, [0.0, 0.4])) == len(copies(mesh, [1.0, 0.6])) == 2
+    edges = boundary_edges(mesh)
+    length = np.hypot(*(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]]).T).sum()
+    assert length == pytest.approx(4.0 + 2 * np.hypot(1.0, 0.2), abs=1e-9)
 
 
 def test_holes_stay_empty_and_may_carry_mouths():
