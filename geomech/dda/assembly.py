@@ -17,6 +17,8 @@ from ..model import OPEN, SLIP, STICK
 DENSE_BLOCKS = 40
 #: Spring, relative to E', that holds the rigid motion of a block without mass; its force is as small beside the load.
 GROUND_RATIO = 1e-11
+#: A solution without pivoting is kept when it leaves less than this of the right side.
+_RESIDUAL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,12 +104,27 @@ def sparse_pattern(free: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pa
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _invert(first, second, out):
+    """(3, 3) inverse of the sum of two symmetric positive matrices, by cofactors."""
+    a, b, c = first[0, 0] + second[0, 0], first[0, 1] + second[0, 1], first[0, 2] + second[0, 2]
+    d, e, f = first[1, 1] + second[1, 1], first[1, 2] + second[1, 2], first[2, 2] + second[2, 2]
+    out[0, 0], out[0, 1], out[0, 2] = d * f - e * e, c * e - b * f, b * e - c * d
+    out[1, 1], out[1, 2], out[2, 2] = a * f - c * c, b * c - a * e, a * d - b * b
+    out[1, 0], out[2, 0], out[2, 1] = out[0, 1], out[0, 2], out[1, 2]
+    determinant = a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
+    for k in range(3):
+        for m in range(3):
+            out[k, m] /= determinant
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def assemble_blocks(order, moments, density, stiffness, compliance, carried, stress, crack_strain, crack_given,
-                    crack_compliance, crack_offset, gravity, load, dt, n):
+                    crack_compliance, crack_offset, gravity, load, dt, damping, n):
     """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
 
     2M/dt² d = 2M v/dt + …  (Shi's time integration, d = v dt + a dt²/2), ∫ Tᵀρg, the strain rows' share ρω²∫xx, ∫yy,
-    ∫xy of a spinning block, the elastic rows A σ' with σ' = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), and
+    ∫xy of a spinning block, a viscous stress ∝ C Δε/dt that gives a block's own vibration (taken as that of a square,
+    ω² = 12 C₁₁/(ρ h²)) the part ``damping`` of critical damping, the elastic rows A σ' with σ' = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), and
     the generalised forces ``load`` (n_blocks, 6) of whatever else acts.
     """
     n_blocks = order.shape[0]
@@ -124,7 +141,7 @@ def assemble_blocks(order, moments, density, stiffness, compliance, carried, str
                 for m in range(3):
                     soft = soft or crack_compliance[b, k, m] != 0.0
         if soft:
-            tangent[b] = np.linalg.inv(compliance[b] + crack_compliance[b])
+            _invert(compliance[b], crack_compliance[b], tangent[b])
         else:
             tangent[b] = stiffness[b]
         for k in range(3):
@@ -156,9 +173,10 @@ def assemble_blocks(order, moments, density, stiffness, compliance, carried, str
         if rho == 0.0:
             for k in range(3):
                 matrix[row, k, k] += GROUND_RATIO * stiffness[b, 0, 0]
+        viscous = 1.0 + 2.0 * damping * np.sqrt(rho * area / (12.0 * stiffness[b, 0, 0])) / dt
         for k in range(3):
             for m in range(3):
-                matrix[row, 3 + k, 3 + m] += tangent[b, k, m]
+                matrix[row, 3 + k, 3 + m] += viscous * tangent[b, k, m]
             right[row, 3 + k] -= area * stress0[b, k] / h
         right[row, 0] += rho * area * gravity[0] + load[b, 0]
         right[row, 1] += rho * area * gravity[1] + load[b, 1]
@@ -174,7 +192,8 @@ def assemble_blocks(order, moments, density, stiffness, compliance, carried, str
 def contact_vectors(block, other, geometry, order, moments):
     """(n, 2, 12): relative motion of vertex and edge along the normal and along the edge, per unit of the unknowns.
 
-    Both blocks are taken at the vertex itself, so that the pair of contact forces has no moment.
+    Both blocks turn about the vertex itself, so that the pair of contact forces has no moment; the owner of the edge
+    is strained at the vertex's projection on the edge, so that penetration does not stretch its arm.
     """
     n = block.shape[0]
     out = np.zeros((n, 2, 12))
@@ -193,9 +212,11 @@ def contact_vectors(block, other, geometry, order, moments):
                 out[c, k, at] = sign * ax
                 out[c, k, at + 1] = sign * ay
                 out[c, k, at + 2] = sign * (x * ay - y * ax)
-                out[c, k, at + 3] = sign * x * ax
-                out[c, k, at + 4] = sign * y * ay
-                out[c, k, at + 5] = sign * 0.5 * (y * ax + x * ay)
+                sx = x - side * geometry[c, 3] * nx / h
+                sy = y - side * geometry[c, 3] * ny / h
+                out[c, k, at + 3] = sign * sx * ax
+                out[c, k, at + 4] = sign * sy * ay
+                out[c, k, at + 5] = sign * 0.5 * (sy * ax + sx * ay)
     return out
 
 
@@ -270,13 +291,22 @@ def solve(pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool
 
     # The CSR arrays read as CSC are the transpose; blocks stand in elimination order already.
     transpose = csc_array((data, pattern.indices, pattern.indptr), shape=(6 * pattern.n, 6 * pattern.n))
-    try:
-        factor = splu(
-            transpose,
-            permc_spec="NATURAL",
-            diag_pivot_thresh=0.0 if symmetric else 0.1,
-            options={"SymmetricMode": True},
-        )
-    except RuntimeError as error:
-        raise np.linalg.LinAlgError(f"the step's matrix is singular ({error})") from error
-    return factor.solve(right, "T")
+    for pivoting in (0.0, 1.0):
+        # Friction spoils the symmetry but seldom the diagonal: pivots, which ruin the ordering, only if they are needed.
+        try:
+            factor = splu(
+                transpose, permc_spec="NATURAL", diag_pivot_thresh=pivoting, options={"SymmetricMode": pivoting == 0.0}
+            )
+        except RuntimeError as error:
+            if symmetric or pivoting:
+                raise np.linalg.LinAlgError(f"the step's matrix is singular ({error})") from error
+            continue
+        x = factor.solve(right, "T")
+        if symmetric:
+            return x
+        residual = right - transpose.T @ x
+        x += factor.solve(residual, "T")
+        residual = right - transpose.T @ x
+        if np.abs(residual).max() <= _RESIDUAL * np.abs(right).max():
+            break
+    return x

@@ -43,24 +43,29 @@ def _against(vertices, next_vertex, previous_vertex, vertex, edge):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _known(keys, key):
-    """True when ``key`` is in the sorted ``keys``."""
-    at = np.searchsorted(keys, key)
-    return at < keys.shape[0] and keys[at] == key
+def _place(keys, key):
+    """Where ``key`` stands in the sorted ``keys``, −1 if nowhere."""
+    low, high = 0, keys.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if keys[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < keys.shape[0] and keys[low] == key else -1
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _add(table, count, first, vertex, edge):
-    """Row of (vertex, edge) among the rows from ``first`` on, appended if new: (table, count, row)."""
+    """Row of (vertex, edge) among the rows from ``first`` on, appended if new; ``table`` must have room."""
     for row in range(first, count):
         if table[row, 0] == vertex and table[row, 1] == edge:
-            return table, count, row
-    if count == table.shape[0]:
-        wider = np.full((2 * count, 4), -1, np.int64)
-        wider[:count] = table
-        table = wider
-    table[count, 0], table[count, 1], table[count, 2], table[count, 3] = vertex, edge, -1, -1
-    return table, count + 1, count
+            return row
+    table[count, 0] = vertex
+    table[count, 1] = edge
+    table[count, 2] = -1
+    table[count, 3] = -1
+    return count
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -73,31 +78,41 @@ def _join_partners(table, row, other):
             return
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, window, old_keys):
+def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, window, old_keys) -> np.ndarray:
     """(n_contacts, 4): vertex, edge, and up to two partner rows (−1: none), for all pairs nearer than ``window`` (m).
 
     ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
     representations of a corner on a corner is kept, so that contacts do not change names on round-off.
     """
+    first = vertex_start[:-1]
+    box = np.hstack([np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)])
+    order = np.argsort(box[:, 0], kind="stable")
+    room = 32 + 8 * len(box)
+    while True:
+        table = np.empty((room, 4), np.int64)
+        count = _sweep(
+            table, box, order, vertices, next_vertex, previous_vertex, vertex_start, fixed, float(window), old_keys
+        )
+        if count >= 0:
+            return table[:count]
+        room *= 2
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_start, fixed, window, old_keys):
+    """Fill ``table`` with the contacts and return their number, or −1 when it has no room for them.
+
+    ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y; ``order`` sorts them by least x.
+    """
     n_blocks = vertex_start.shape[0] - 1
     n_vertices = vertices.shape[0]
-    box = np.empty((n_blocks, 4))
     convex = np.empty(n_vertices, np.bool_)
-    for b in range(n_blocks):
-        box[b, 0] = box[b, 1] = np.inf
-        box[b, 2] = box[b, 3] = -np.inf
-        for i in range(vertex_start[b], vertex_start[b + 1]):
-            x, y = vertices[i, 0], vertices[i, 1]
-            box[b, 0], box[b, 1] = min(box[b, 0], x), min(box[b, 1], y)
-            box[b, 2], box[b, 3] = max(box[b, 2], x), max(box[b, 3], y)
-            k, j = previous_vertex[i], next_vertex[i]
-            ax, ay = x - vertices[k, 0], y - vertices[k, 1]
-            bx, by = vertices[j, 0] - x, vertices[j, 1] - y
-            # A flat vertex counts as convex: faces that were split at a node still touch there.
-            convex[i] = ax * by - ay * bx >= -1e-9 * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
-    order = np.argsort(box[:, 0])
-    table = np.full((64, 4), -1, np.int64)
+    for i in range(n_vertices):
+        k, j = previous_vertex[i], next_vertex[i]
+        ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
+        bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
+        # A flat vertex counts as convex: faces that were split at a node still touch there.
+        convex[i] = ax * by - ay * bx >= -1e-9 * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
     count = 0
     pick_vertex = np.empty(4, np.int64)
     pick_edge = np.empty(4, np.int64)
@@ -145,8 +160,9 @@ def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, w
                             near = 1e-9 * max(length, pick[same, 4])
                             better = outside < pick[same, 3] - near
                             if abs(outside - pick[same, 3]) <= near:
-                                better = _known(old_keys, vertex * n_vertices + edge) and not _known(
-                                    old_keys, pick_vertex[same] * n_vertices + pick_edge[same]
+                                better = (
+                                    _place(old_keys, vertex * n_vertices + edge) >= 0
+                                    and _place(old_keys, pick_vertex[same] * n_vertices + pick_edge[same]) < 0
                                 )
                             if not better:
                                 continue
@@ -161,11 +177,14 @@ def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, w
                         widest = max(widest, pick[k, 2])
                     if widest > window:
                         continue
+                    if count + 4 > table.shape[0]:
+                        return -1
                     before = -1
                     for k in range(n_lines):
                         if pick[k, 2] < -window:
                             continue
-                        table, count, row = _add(table, count, first, pick_vertex[k], pick_edge[k])
+                        row = _add(table, count, first, pick_vertex[k], pick_edge[k])
+                        count = max(count, row + 1)
                         if before >= 0:
                             _join_partners(table, row, before)
                             _join_partners(table, before, row)
@@ -193,8 +212,10 @@ def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, w
                             continue
                         if (along <= window and convex[edge]) or (along >= length - window and convex[end]):
                             continue  # corner to corner, done above
-                        table, count, _ = _add(table, count, first, v, edge)
-    return table[:count].copy()
+                        if count == table.shape[0]:
+                            return -1
+                        count = max(count, _add(table, count, first, v, edge) + 1)
+    return count
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -252,8 +273,8 @@ def describe_contacts(table, vertices, next_vertex, previous_vertex, window, old
                 tributary += 0.5 * max(0.0, min(face_length, max(s0, s1)) - max(0.0, min(s0, s1)))
         geometry[row, 4] = tributary
         key = vertex * n_vertices + edge
-        at = np.searchsorted(keys, key)
-        if at < keys.shape[0] and keys[at] == key:
+        at = _place(keys, key)
+        if at >= 0:
             parent[row] = old_order[at]
             taken[old_order[at]] = True
     for row in range(n):
@@ -275,8 +296,8 @@ def describe_contacts(table, vertices, next_vertex, previous_vertex, window, old
                     key, sign = corner * n_vertices + vertex, -1.0
                 else:
                     key, sign = corner * n_vertices + previous_vertex[vertex], -1.0
-                at = np.searchsorted(keys, key)
-                if at == keys.shape[0] or keys[at] != key or parent[row] >= 0:
+                at = _place(keys, key)
+                if at < 0 or parent[row] >= 0:
                     continue
                 old = old_order[at]
                 if not taken[old] and sign * (old_normal[old, 0] * nx + old_normal[old, 1] * ny) > 0.99:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,3 +66,19 @@ def contact_springs(
         cohesion=table.cohesion[law] * length,
         tension=table.tension[law] * length,
     )
+
+
+def with_dashpots(
+    springs: Springs, gap: np.ndarray, mass: np.ndarray, damping: float, dt: float
+) -> tuple[Springs, np.ndarray]:
+    """Springs and starting gap (n,) m under which N = −kₙ g − c ġ, with ``damping`` = c / (2 √(kₙ m)) and ġ the mean over a
+    step of ``dt``; ``mass`` (n,) kg of the lighter free block.
+
+    The approach counts only from touching on, so that the dashpot does not act across an open gap. A step much longer than
+    the contact's period leaves the spring as it was.
+    """
+    if damping == 0.0:
+        return springs, gap
+    drag = 2.0 * damping * np.sqrt(springs.normal * mass) / dt
+    stiffer = springs.normal + drag
+    return replace(springs, normal=stiffer), gap - drag / stiffer * np.minimum(gap, 0.0)

@@ -2,7 +2,8 @@
 
 A set of states makes the step linear; its solution is checked against them. A closed contact must not pull beyond its
 tensile strength, an open one must not penetrate, a sticking one must hold less than its strength μN + cℓ, and a sliding
-one must slide against its friction. Every contact that fails is switched and the step solved again. If a combination of
+one would carry more than μN if it stuck (the return mapping of an elastic-plastic spring, under which exactly one of the
+states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves cases in which none does). Every contact that fails is switched and the step solved again. If a combination of
 states returns, only the worst half of the violations is switched, and if it still returns, only the first (the
 least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
 """
@@ -111,9 +112,13 @@ def check_states(unknowns, block, other, order, vectors, partner, state, directi
                 new_state[c], new_bonded[c] = SLIP, 0
                 new_direction[c] = np.sign(forces[c, 1])
                 violation[c] = excess
-        elif friction[c] > 0.0 and direction[c] * slide > slack:
-            new_state[c] = STICK
-            violation[c] = shear[c] * abs(slide)
+        elif friction[c] > 0.0:
+            strength = max(0.0, friction[c] * forces[c, 0])
+            trial = direction[c] * (shear0[c] - shear[c] * slide)
+            if strength - trial > 1e-9 * strength + shear[c] * slack:
+                # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
+                new_state[c] = STICK
+                violation[c] = strength - trial
     return forces, new_state, new_direction, new_bonded, violation
 
 

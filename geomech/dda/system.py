@@ -11,7 +11,7 @@ from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, L
 from . import assembly
 from .basis import advance
 from .contact_search import describe_contacts, find_contacts
-from .contact_springs import PENALTY_RATIO, JointTable, contact_springs
+from .contact_springs import PENALTY_RATIO, JointTable, contact_springs, with_dashpots
 from .loads import AppliedForces, LoadMap, body_forces, generalised
 from .moments import block_moments
 from .open_close import Settled, Unsettled, settle
@@ -223,23 +223,30 @@ class BlockSystem:
         centroid = np.ascontiguousarray(moments[:, 1:3])
         load = generalised(points, edges, centroid)
         given = crack is not None
+        static = self.settings.dynamic_factor == 0.0
         compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
         offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
-        geometry, springs = found["geometry"], found["springs"]
+        geometry = found["geometry"]
+        damping = 0.0 if static else self.settings.damping
+        mass = np.where(self._fixed, np.inf, self.density * moments[:, 0])
+        springs, gap = with_dashpots(
+            found["springs"], np.ascontiguousarray(geometry[:, 3]), np.minimum(mass[found["block"]], mass[found["other"]]),
+            damping, dt,
+        )  # fmt: skip
         n_free = int((~self._fixed).sum())
         pattern = self._pattern(found["block"], found["other"]) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assembly.assemble_blocks(
             order, moments, self.density, self._stiffness, self._compliance, carried, stress, crack_strain, given,
-            compliance, offset, gravity, load, dt, n_free,
+            compliance, offset, gravity, load, dt, damping, n_free,
         )  # fmt: skip
         vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
         n_contacts = len(found["block"])
         if n_free:
             settled = settle(
                 pattern, matrix, right, block=found["block"], other=found["other"], vectors=vectors,
-                partner=found["partner"], gap=np.ascontiguousarray(geometry[:, 3]), springs=springs, state=found["state"],
+                partner=found["partner"], gap=gap, springs=springs, state=found["state"],
                 direction=found["direction"], bonded=found["bonded"], shear_force=found["shear"], slack=self._slack,
                 max_iterations=self.settings.max_open_close_iterations,
             )  # fmt: skip
@@ -251,11 +258,11 @@ class BlockSystem:
         free = np.flatnonzero(~self._fixed)
         increment[free] = settled.unknowns[order[free]]
         increment[:, 2:] /= np.sqrt(moments[:, :1])
-        static = self.settings.dynamic_factor == 0.0
         new_vertices, velocity, new_stress, new_crack, largest = advance(
             increment, carried, dt, static, vertices, self._start, moments, tangent, stress0, compliance, offset, given,
             crack_strain,
         )  # fmt: skip
+        new_gap = settled.gap - (gap - geometry[:, 3])
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
 
         rows = np.zeros(n_contacts, CONTACT)
@@ -263,9 +270,11 @@ class BlockSystem:
             rows[name] = found[name]
         rows["state"], rows["bonded"] = settled.state, settled.bonded
         rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
-        rows["gap"], rows["length"] = settled.gap, geometry[:, 4]
+        rows["gap"], rows["length"] = new_gap, geometry[:, 4]
         rows["normal_force"], rows["shear_force"] = settled.normal_force, settled.shear_force
-        rows["slip"] = found["slip"] + np.where(settled.state == SLIP, settled.sliding, 0.0)
+        # Sliding is what the spring did not take up elastically.
+        elastic = (found["shear"] - settled.shear_force) / springs.shear
+        rows["slip"] = found["slip"] + np.where(settled.state == SLIP, settled.sliding - elastic, 0.0)
 
         body, gradient = body_forces(self.density, gravity, acceleration, carried[:, 2], self._fixed)
         forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), body, gradient)
@@ -288,10 +297,10 @@ class BlockSystem:
             * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self._compliance, new_stress))),
             "contact_energy": 0.5
             * float(
-                np.sum(settled.normal_force[closed] ** 2 / springs.normal[closed])
+                np.sum(new_gap[closed] ** 2 * found["springs"].normal[closed])
                 + np.sum(settled.shear_force[closed] ** 2 / springs.shear[closed])
             ),
-            "worst_penetration": float(max(0.0, -settled.gap.min())) if n_contacts else 0.0,
+            "worst_penetration": float(max(0.0, -new_gap.min())) if n_contacts else 0.0,
             "max_displacement_ratio": largest / self.half_height,
             "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),
         }

@@ -19,12 +19,14 @@ class DdaSettings:
 
     ``normal_penalty`` and ``shear_penalty`` are contact spring stiffnesses, N/m per metre of thickness (Pa); None
     picks them from the blocks' stiffness. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
-    static, 1 fully dynamic. ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
+    static, 1 fully dynamic. ``damping`` is the fraction of critical damping of a block's own lowest vibration (dynamic
+    steps only). ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
     height of the domain.
     """
 
     time_step: float = 1.0
     dynamic_factor: float = 0.0
+    damping: float = 0.05
     max_displacement_ratio: float = 0.001
     normal_penalty: float | None = None
     shear_penalty: float | None = None
