@@ -18,7 +18,7 @@ import numpy as np
 
 from ..model import Cracks, DdmSettings, Material
 from .factor import Factor
-from .influence import ElementSet, influence, line_forces, reuse
+from .influence import ElementSet, influence, line_forces, project_jumps, reuse
 from .loads import BodyLoad, check_equilibrium
 from .mesh import Mesh, mesh, outline_edges
 from .particular import Particular, polygon_moments
@@ -171,12 +171,14 @@ class Body:
         linear along them; seen from outside the boundary."""
         tol = 2 * _OFF * self._extent
         unit = line_forces(targets, segments[:, 0], segments[:, 1], 1, self.nu, tol, -1.0)
+        if targets is self.boundary:
+            project_jumps(unit, targets, segments[:, 0], segments[:, 1], self.nu, tol, -1.0)
         d = segments[:, 1] - segments[:, 0]
         t = d / np.hypot(*d.T)[:, None]
         turn = np.stack([t, np.column_stack([-t[:, 1], t[:, 0]])], axis=1)
         by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
         out = np.einsum("nmce,mcx->mnex", by_end, turn)
-        return np.ascontiguousarray(out.reshape(len(segments), -1, 4))
+        return np.ascontiguousarray(out.reshape(len(segments), targets.n_unknowns, 4))
 
     def _inherit_segments(self, old: "Body", c_old: np.ndarray) -> None:
         new = np.flatnonzero(c_old < 0)
@@ -226,7 +228,7 @@ class Body:
         if self._edge_forces is None:
             a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
             self._edge_forces = tuple(
-                line_forces(targets, a, b, 2, self.nu, self._tol, -1.0).reshape(targets.n_unknowns, -1)
+                line_forces(targets, a, b, 2, self.nu, self._tol, -1.0).reshape(targets.n_unknowns, 6 * len(a))
                 for targets in (self.boundary, self.faces)
             )
         return tuple(matrix @ densities.ravel() for matrix in self._edge_forces)

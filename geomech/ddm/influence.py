@@ -158,7 +158,9 @@ def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -
     from unit nodal jumps times 2μ."""
     out = np.empty((targets.n_unknowns, sources.n_unknowns))
     if out.size:
-        _tractions(targets, sources.start, sources.end, sources.kind, sources.order, nu, tol, 1.0, False, out)
+        _tractions(
+            targets.nodes, targets.tangent, sources.start, sources.end, sources.kind, sources.order, nu, tol, 1.0, False, out
+        )
         out = sources.nodal_matrix(out)
     return out
 
@@ -168,22 +170,66 @@ def line_forces(
 ) -> np.ndarray:
     """(targets.n_unknowns, m, 2, degree+1) traction from line forces t^k along (component 0) and across (1) straight
     segments, Kelvin's solution integrated in closed form; points on a segment are seen from ``side`` of it."""
-    out = np.empty((targets.n_unknowns, len(start) * 2 * (degree + 1)))
+    return _line_forces(targets.nodes, targets.tangent, start, end, degree, nu, tol, side)
+
+
+def _line_forces(points, tangents, start, end, degree, nu, tol, side):
+    n, per = points.shape[:2]
+    out = np.empty((2 * n * per, len(start) * 2 * (degree + 1)))
     if out.size:
-        _tractions(targets, start, end, np.zeros(len(start), np.int64), degree, nu, tol, side, True, out)
-    return out.reshape(targets.n_unknowns, len(start), 2, degree + 1)
+        _tractions(points, tangents, start, end, np.zeros(len(start), np.int64), degree, nu, tol, side, True, out)
+    return out.reshape(2 * n * per, len(start), 2, degree + 1)
 
 
-def _tractions(targets, start, end, kind, order, nu, tol, side, force, out):
-    points = np.ascontiguousarray(targets.nodes.reshape(-1, 2))
-    tangents = np.repeat(targets.tangent, targets.per, axis=0)
+#: Elements this far beyond a traction's end, in half lengths, still feel its logarithm.
+_REACH = 1.3
+
+
+def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, tol: float, side: float) -> None:
+    """Where line forces end on an element their traction jumps and is logarithmic: replace the nodal values in ``unit``
+    (`line_forces`) by those of the polynomial with the same moments, in place.
+
+    Sampled at nodes, a jump would be rounded to a node and the load's resultant with it; with the moments kept, what is
+    lost acts on no more than the element's own surroundings.
+    """
+    t, n, c = targets.tangent, targets.normal, 0.5 * targets.length
+    middle = 0.5 * (targets.start + targets.end)
+    rows = unit.reshape(targets.n, 2, targets.per, *unit.shape[1:])
+    x, q = np.polynomial.legendre.leggauss(14)
+    # s²(3 − 2s) takes the edge off logarithms at both ends of a piece.
+    s = 0.5 * (1 + x)
+    clustered, q = s * s * (3 - 2 * s), 3 * s * (1 - s) * q
+    degrees = np.arange(targets.per)
+    at_nodes = np.polynomial.legendre.legvander(shapes.nodes(targets.family, targets.order), targets.order)
+    for m, (a, b) in enumerate(zip(start, end)):
+        local = [np.stack([np.sum((p - middle) * t, axis=1), np.sum((p - middle) * n, axis=1)]) / c for p in (a, b)]
+        line = (np.abs(local[0][1]) * c <= 2 * tol) & (np.abs(local[1][1]) * c <= 2 * tol)
+        ends = np.stack([local[0][0], local[1][0]])
+        # Ends that coincide with an element's end leave nothing to resolve on it.
+        near = (np.abs(ends) < _REACH) & (np.abs(np.abs(ends) - 1) > 1e-6)
+        for e in np.flatnonzero(line & near.any(axis=0)):
+            cuts = np.unique(np.concatenate([[-1.0, 1.0], np.clip(ends[near[:, e], e], -1, 1)]))
+            u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in zip(cuts[:-1], cuts[1:])])
+            w = np.concatenate([(hi - lo) * q for lo, hi in zip(cuts[:-1], cuts[1:])])
+            points = (middle[e] + c[e] * u[:, None] * t[e])[None]
+            values = _line_forces(points, t[e : e + 1], a[None], b[None], unit.shape[3] - 1, nu, tol, side)
+            values = values.reshape(2, len(u), 2, -1)
+            legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (degrees + 0.5)
+            rows[e, :, :, m] = np.einsum("jk,uk,cuxd->cjxd", at_nodes, legendre, values)
+
+
+def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, out):
+    """``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
+    per = points.shape[1]
+    tangents = np.repeat(tangents, per, axis=0)
+    points = np.ascontiguousarray(points.reshape(-1, 2))
     start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
     kind = np.ascontiguousarray(kind, dtype=np.int64)
     table = shapes.moments()
 
     def work(first, last):
         kernels.tractions(
-            points, tangents, targets.per, first, last, start, end, kind, order, nu, tol, side, force, table, out
+            points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, out
         )
 
     _spread(len(points), len(points) * len(start), work)
