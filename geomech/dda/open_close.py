@@ -92,8 +92,11 @@ def check_states(unknowns, block, other, order, vectors, partner, state, directi
                     inside = False
             if inside:
                 violation[c] = -normal[c] * gap
-                if friction[c] == 0.0 and bonded[c] == 0:
-                    new_state[c], new_direction[c] = SLIP, 0.0
+                # The state to try is that of the springs under the motion at hand: sticking where it would have to slide,
+                # a contact may pull, open, close again and never come to sliding.
+                trial = shear0[c] - shear[c] * slide
+                if abs(trial) > violation[c] * friction[c] and bonded[c] == 0:
+                    new_state[c], new_direction[c] = SLIP, np.sign(trial)
                 else:
                     new_state[c] = STICK
             continue
