@@ -6,7 +6,7 @@ import copy
 import re
 import tomllib
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -66,12 +66,13 @@ class Scene:
 
     def problem(self) -> Problem:
         """The scene as the solvers take it."""
-        return build_problem(self.tables, self.drawing, self._check)
+        return replace(build_problem(self.tables, self.drawing, self._check), title=self.title)
 
     def resolved(self) -> dict[str, Any]:
         """The scene with its variant and changes applied and all defaults written out, ready for ``tomli_w``: paths are
         absolute, all parameters of a Gmsh model are given, variants are gone. Loading it gives the same problem."""
         data = self.tables.model_dump(by_alias=True, exclude_none=True, exclude={"variants"})
+        data["title"] = self.title
         if self.tables.geometry.model is not None:
             data["geometry"]["model"] = str((self.path.parent / self.tables.geometry.model).resolve())
             data["geometry"]["parameters"] = dict(self.drawing.parameters)

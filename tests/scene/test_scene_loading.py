@@ -266,6 +266,11 @@ def test_names_of_scenes(scene_file, tmp_path):
     assert load_scene(tmp_path).name == tmp_path.name
 
 
+def test_an_untitled_scene_is_called_by_its_name(scene_file):
+    scene = load_scene(scene_file(GOOD.replace('title = "A plate between two loads"', ""), "plate.toml"))
+    assert scene.title == scene.problem().title == scene.resolved()["title"] == "plate"
+
+
 def test_warnings_do_not_stop_a_scene(scene_file):
     text = TWO + FULL.replace("[joints.default]\nfriction_angle_deg = 30\ncohesion_pa = 1e3\n", "")
     (warning,) = load_scene(scene_file(text)).warnings
