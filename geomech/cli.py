@@ -131,8 +131,8 @@ def _run(options: argparse.Namespace) -> int:
     if place.is_dir() and (place / "run.py").is_file():
         out = options.out or default_folder(place)
         script = _load_script(place / "run.py")
-        overrides = [*options.overrides, *(f"variant={name}" for name in options.variants)]
-        result = script.main(place, out, overrides, options.quiet)
+        asked = {"overrides": options.overrides, "variants": options.variants, "quiet": options.quiet}
+        result = script.main(place, out, **asked)
         return DONE if result is None else int(result)
 
     from .output import standard_observers
@@ -173,7 +173,7 @@ def _load_script(path: Path) -> Any:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     if not hasattr(module, "main"):
-        raise BadInput(f"{path} has no main(folder, out, overrides, quiet)")
+        raise BadInput(f"{path} has no main(folder, out, overrides, variants, quiet)")
     return module
 
 

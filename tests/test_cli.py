@@ -181,15 +181,15 @@ def test_failed_run_ends_with_1_and_tells_why(scene, tmp_path, monkeypatch, caps
 
 
 def test_pipeline_folder_runs_its_script(tmp_path):
-    """A folder with a run.py is handed the folder, the output folder, the overrides and whether to be quiet."""
+    """A folder with a run.py is handed all that the command line says."""
     (tmp_path / "study").mkdir()
     (tmp_path / "study" / "run.py").write_text(
-        "def main(folder, out, overrides, quiet):\n"
-        "    (folder / 'said.txt').write_text(repr((out.name, overrides, quiet)))\n"
+        "def main(folder, out, overrides, variants, quiet):\n"
+        "    (folder / 'said.txt').write_text(repr((out.name, overrides, variants, quiet)))\n"
     )
-    arguments = ["run", str(tmp_path / "study"), "--out", str(tmp_path / "o"), "--set", "a.b=1", "--quiet"]
+    arguments = ["run", str(tmp_path / "study"), "--out", str(tmp_path / "o"), "--set", "a.b=1", "--variant", "x", "--quiet"]
     assert main(arguments) == DONE
-    assert (tmp_path / "study" / "said.txt").read_text() == repr(("o", ["a.b=1"], True))
+    assert (tmp_path / "study" / "said.txt").read_text() == repr(("o", ["a.b=1"], ["x"], True))
 
 
 def test_default_folder_is_named_after_the_scene():

@@ -27,7 +27,7 @@ class InteriorMeshes:
     finer than the rest.
     """
 
-    def __init__(self, n_triangles: int = 1500, tip_ratio: float = 15.0) -> None:
+    def __init__(self, n_triangles: int = 2000, tip_ratio: float = 15.0) -> None:
         self.n_triangles, self.tip_ratio = n_triangles, tip_ratio
         self._kept: dict[int, tuple[bytes, Any, np.ndarray, np.ndarray]] = {}
 

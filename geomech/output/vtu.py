@@ -70,11 +70,9 @@ def write_grid(path: Path, series: str, grid: Grid, numbers: Mapping[str, float 
 
     xml = [_HEAD]
     for name, value in numbers.items():
-        kind = "Int64" if isinstance(value, (int, np.integer)) else "Float64"
-        xml.append(
-            f'<DataArray type="{kind}" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">'
-            f"{value.item() if isinstance(value, np.generic) else value!r}</DataArray>\n"
-        )
+        # Not as text: VTK's parser stops at "nan", which is the load of a scene that has no leading one.
+        number = np.array([value], dtype="<i8" if isinstance(value, (int, np.integer)) else "<f8")
+        xml.append(array(name, number).replace("<DataArray ", '<DataArray NumberOfTuples="1" ', 1))
     xml.append(f'</FieldData>\n<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n')
     for place, tag, count, arrays in (
         ("point", "PointData", n_points, grid.point_data),

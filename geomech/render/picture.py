@@ -17,6 +17,7 @@ from . import offscreen
 
 if TYPE_CHECKING:
     import pyvista as pv
+    from matplotlib.colors import Colormap
 
 #: Name on the command line → (array, column, how it is written).
 COMPONENTS = {
@@ -24,9 +25,9 @@ COMPONENTS = {
     "yy": ("stress", 1, "σyy"),
     "zz": ("stress", 2, "σzz"),
     "xy": ("stress", 3, "σxy"),
-    "principal_max": ("principal_stress", 0, "largest principal stress"),
-    "principal_min": ("principal_stress", 2, "smallest principal stress"),
-    "von_mises": ("", -1, "von Mises stress"),
+    "principal_max": ("principal_stress", 0, "σ₁"),
+    "principal_min": ("principal_stress", 2, "σ₃"),
+    "von_mises": ("", -1, "von Mises"),
 }
 
 #: What the colour of cracks means → the legend's title.
@@ -38,7 +39,7 @@ DEFORMATION = 0.03
 ROBUST = (1.5, 98.5)
 
 _ROCK_OUTLINE, _INK, _IDLE = "#3b3f46", "#1b1d21", "#e4e4e1"
-_OLD_CRACK, _CRACK_COLOURS = "#15161a", "autumn"
+_OLD_CRACK = "#15161a"
 
 
 @dataclass(frozen=True)
@@ -61,12 +62,19 @@ class Look:
         return (x1 - x0) <= 1.25 * (y1 - y0)
 
     @property
-    def colours(self) -> str:
-        """Diverging about zero where tension and compression both matter, else one hue that darkens with stress."""
+    def colours(self) -> Colormap:
+        """Where tension and compression both matter: red tension, blue compression, white none, equally deep for
+        equal stress. Where one is everywhere, several hues, since the whole span lies on one side of zero."""
+        import matplotlib
+        from matplotlib.colors import ListedColormap
+
         low, high = self.limits
-        if low < 0 < high and min(-low, high) > 0.15 * max(-low, high):
-            return "RdBu_r"
-        return "YlGnBu" if high > 0 and low > -0.15 * high else "YlGnBu_r"
+        if low < 0 < high and min(-low, high) > 0.1 * max(-low, high):
+            # The outermost tenth of this map is nearly black on both sides.
+            at = 0.5 + 0.45 * np.linspace(low, high, 256) / max(-low, high)
+            return ListedColormap(matplotlib.colormaps["RdBu_r"](at))
+        name = "YlGnBu" if low + high > 0 else "YlGnBu_r"
+        return ListedColormap(matplotlib.colormaps[name](np.linspace(0.04, 0.96, 256)))
 
 
 def picture(run: Run, path: Path, fixed: Look, cycle: int) -> Path:
@@ -135,8 +143,10 @@ def look(
         scale = 0.0  # drawn where they are
     elif scale is None:
         scale = _magnification(blocks, max(x1 - x0, y1 - y0))
-    moved = blocks.points + scale * blocks["displacement"]
-    (x0, y0), (x1, y1) = np.minimum((x0, y0), moved.min(axis=0)[:2]), np.maximum((x1, y1), moved.max(axis=0)[:2])
+    # The frame holds what there was at the start as well: rock that runs out leaves its place.
+    first = run.grid("blocks", min(run.grids("blocks")))
+    drawn = np.concatenate([grid.points[:, :2] + scale * grid["displacement"][:, :2] for grid in (first, blocks)])
+    (x0, y0), (x1, y1) = drawn.min(axis=0), drawn.max(axis=0)
     interior = _interior(run, cycle)
     source = interior if interior is not None else blocks
     return Look(
@@ -212,6 +222,10 @@ def _palettes(images: Sequence[np.ndarray]) -> list[np.ndarray]:
     from PIL import Image
 
     palette = Image.fromarray(images[-1]).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    colours = np.array(palette.getpalette()).reshape(-1, 3)
+    # Cutting by medians mixes the page with what is nearly white; the page stays white.
+    colours[colours.min(axis=1) >= 250] = 255
+    palette.putpalette(colours.ravel().tolist())
     return [
         np.asarray(Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB"))
         for image in images
@@ -273,27 +287,28 @@ class _Painter:
         self.plotter.render()
 
     def _warped(self, grid: pv.UnstructuredGrid, lift: float) -> pv.UnstructuredGrid:
-        grid.points = grid.points + self.look.scale * grid["displacement"] + (0.0, 0.0, lift)
+        """``grid`` deformed, ``lift`` pixels above the page."""
+        height = lift * self.metres_per_pixel
+        grid.points = grid.points + self.look.scale * grid["displacement"] + (0.0, 0.0, height)
         return grid
 
     def _rock(self, cycle: int) -> None:
         blocks, interior = self._warped(self.run.grid("blocks", cycle), 0.0), _interior(self.run, cycle)
-        size = 1e3 * self.metres_per_pixel
         solved = set() if interior is None else set(np.unique(interior["block_id"]).tolist())
         here = np.isin(blocks["block_id"], list(solved))
         # Beside a solved specimen, other materials (platens) only hold it: their stress would take attention off it.
-        idle = ~np.isin(blocks["material"], np.unique(blocks["material"][here])) if solved else np.zeros(len(here), bool)
+        idle = ~np.isin(blocks["material"], np.unique(blocks["material"][here])) if solved else blocks["fixed"] == 1
         if idle.any():
             self.plotter.add_mesh(blocks.extract_cells(idle), color=_IDLE, lighting=False)
         plain = ~here & ~idle
         if plain.any():
             self._filled(blocks.extract_cells(plain))
         if interior is not None:
-            self._filled(self._warped(interior, 1e-5 * size))
+            self._filled(self._warped(interior, 1.0))
         edges = blocks.extract_surface(algorithm="dataset_surface").extract_feature_edges(
             boundary_edges=True, feature_edges=False, non_manifold_edges=False, manifold_edges=False
         )
-        edges.points += (0.0, 0.0, 2e-5 * size)
+        edges.points += (0.0, 0.0, 2.0 * self.metres_per_pixel)
         self.plotter.add_mesh(edges, color=_ROCK_OUTLINE, line_width=1.4 * self.unit, lighting=False)
 
     def _filled(self, grid: pv.UnstructuredGrid) -> None:
@@ -310,7 +325,7 @@ class _Painter:
             return
         if not grid.n_cells:
             return
-        lines = self._warped(grid, 5e-2 * self.metres_per_pixel * 1e3)
+        lines = self._warped(grid, 40.0)
         lines["opening"] = 1e6 * lines["opening"]
         by_birth = self.look.cracks == "birth"
         # What the scene drew has no birth to show: black. Openings are shown on all of a crack.
@@ -318,10 +333,15 @@ class _Painter:
         low, high = self.look.crack_limits
         fill = {
             "scalars": "birth_cycle" if by_birth else "opening",
-            "cmap": _CRACK_COLOURS,
+            "cmap": _crack_colours(),
             "clim": (low, high if high > low else low + 1),
             "nan_color": _OLD_CRACK,
         }
+        halo = lines.copy()
+        halo.points -= (0.0, 0.0, 20.0 * self.metres_per_pixel)
+        self.plotter.add_mesh(
+            halo, color="white", line_width=7.5 * self.unit, render_lines_as_tubes=True, lighting=False, opacity=0.75
+        )
         for part, width, shown in ((~old, 4.0, fill), (old, 4.6, {"color": _OLD_CRACK})):
             if part.any():
                 self.plotter.add_mesh(
@@ -370,7 +390,7 @@ class _Painter:
             below = (0.62 * w, 44 * u, 0.3 * w, 18 * u)
         first, last = self.look.crack_limits
         if last > first:
-            self._bar(_CRACK_COLOURS, first, last, below, whole=self.look.cracks == "birth")
+            self._bar(_crack_colours(), first, last, below, whole=self.look.cracks == "birth")
             self._text(CRACK_COLOURS[self.look.cracks], (below[0], below[1] + below[3] + 10 * u), 11)
 
     def _text(self, text: str, at: tuple[float, float], size: float, colour: str = _INK) -> None:
@@ -378,7 +398,7 @@ class _Painter:
         self.plotter.add_text(text, position=at, font_size=size * self.unit, color=colour, font_file=_font())
 
     def _bar(
-        self, colours: str, low: float, high: float, box: tuple[float, float, float, float], whole: bool = False
+        self, colours: Colormap, low: float, high: float, box: tuple[float, float, float, float], whole: bool = False
     ) -> None:
         """A scalar bar drawn as an actor of its own, since several meshes share it and its labels are to be round."""
         import pyvista as pv
@@ -390,7 +410,7 @@ class _Painter:
         across = np.array([0.0, 1.0])
         gx, gy = np.meshgrid(x + w * across, y + h * t) if upright else np.meshgrid(x + w * t, y + h * across)
         strip = pv.StructuredGrid(gx, gy, np.zeros_like(gx)).extract_surface(algorithm="dataset_surface")
-        strip.cell_data["colour"] = _strip_colours(colours, n)
+        strip.cell_data["colour"] = (255 * colours(np.linspace(0, 1, n))[:, :3]).astype(np.uint8)
         mapper = vtkPolyDataMapper2D()
         mapper.SetInputData(strip)
         mapper.SetScalarModeToUseCellData()
@@ -406,12 +426,6 @@ class _Painter:
             self._text(_round(value), at, 10)
 
 
-def _strip_colours(colours: str, n: int) -> np.ndarray:
-    import matplotlib
-
-    return (255 * matplotlib.colormaps[colours](np.linspace(0, 1, n))[:, :3]).astype(np.uint8)
-
-
 def _ticks(low: float, high: float, most: int, whole: bool = False) -> list[float]:
     """Round numbers from ``low`` to ``high``, at most about ``most``; ``whole`` ones where asked."""
     least = (high - low) / most
@@ -420,6 +434,14 @@ def _ticks(low: float, high: float, most: int, whole: bool = False) -> list[floa
     if whole:
         step = max(1.0, step)
     return [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
+
+
+@lru_cache(maxsize=1)
+def _crack_colours() -> Colormap:
+    """From crimson to orange: apart from every colour that rock is filled with."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("crack", ["#8f0d33", "#d7263d", "#ff7a1a", "#ffb01f"])
 
 
 @lru_cache(maxsize=1)

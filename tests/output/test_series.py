@@ -237,6 +237,15 @@ def test_nothing_to_show_still_makes_valid_files(tmp_path):
     assert read_collection(tmp_path / "interior.pvd") == []
 
 
+def test_a_scene_without_a_load_is_written(tmp_path):
+    written_alone(tmp_path, replace(made.cycle(0, 1, 0, 0), load=math.nan, strain=math.nan))
+    mesh, other = pv.read(last_file(tmp_path, "blocks")), meshio.read(last_file(tmp_path, "blocks"))
+    assert np.isnan(mesh.field_data["LOAD"][0])
+    assert mesh.field_data["REFERENCE"][0] == 1
+    assert np.isnan(other.field_data["LOAD"][0])
+    assert other.field_data["TIME"][0] == 1.0
+
+
 def test_cracks_nobody_solved_for_are_drawn_with_nan(tmp_path):
     cycle = made.cycle(0, 1, 0, 2)
     half = CrackFaces(*(getattr(cycle.faces, name)[:2] for name in
