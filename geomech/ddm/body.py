@@ -268,9 +268,7 @@ class Body:
 
     # Solution --------------------------------------------------------------------------------------------------------
 
-    def solve(
-        self, load: BodyLoad, warm: "Solution | None" = None, equilibrium_tolerance: float = 1e-6
-    ) -> Solution:
+    def solve(self, load: BodyLoad, warm: "Solution | None" = None, equilibrium_tolerance: float = 1e-6) -> Solution:
         """The body under ``load``. ``warm``: a solution of this or an earlier body whose face states are the first guess.
 
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;

@@ -159,7 +159,17 @@ def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -
     out = np.empty((targets.n_unknowns, sources.n_unknowns))
     if out.size:
         _tractions(
-            targets.nodes, targets.tangent, sources.start, sources.end, sources.kind, sources.order, nu, tol, 1.0, False, out
+            targets.nodes,
+            targets.tangent,
+            sources.start,
+            sources.end,
+            sources.kind,
+            sources.order,
+            nu,
+            tol,
+            1.0,
+            False,
+            out,
         )
         out = sources.nodal_matrix(out)
     return out
@@ -228,9 +238,7 @@ def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, 
     table = shapes.moments()
 
     def work(first, last):
-        kernels.tractions(
-            points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, out
-        )
+        kernels.tractions(points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, out)
 
     _spread(len(points), len(points) * len(start), work)
 
@@ -263,10 +271,25 @@ def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set
     kept_r, new_r = np.flatnonzero(rows >= 0), np.flatnonzero(rows < 0)
     kept_c, new_c = np.flatnonzero(columns >= 0), np.flatnonzero(columns < 0)
     out = np.empty((row_set.n_unknowns, column_set.n_unknowns))
-    at_r, at_c = row_set.unknowns(kept_r), column_set.unknowns(kept_c)
-    out[np.ix_(at_r, at_c)] = old[np.ix_(row_set.unknowns(rows[kept_r]), column_set.unknowns(columns[kept_c]))]
+    # Elements mostly keep their order: copying a few slices is several times faster than gathering.
+    wr, wc = 2 * row_set.per, 2 * column_set.per
+    column_runs = list(_runs(columns))
+    for r, was_r, m in _runs(rows):
+        for k, was_k, n in column_runs:
+            out[r * wr : (r + m) * wr, k * wc : (k + n) * wc] = old[
+                was_r * wr : (was_r + m) * wr, was_k * wc : (was_k + n) * wc
+            ]
     if len(new_r):
         out[row_set.unknowns(new_r)] = compute(new_r, np.arange(column_set.n))
     if len(new_c):
-        out[np.ix_(at_r, column_set.unknowns(new_c))] = compute(kept_r, new_c)
+        out[np.ix_(row_set.unknowns(kept_r), column_set.unknowns(new_c))] = compute(kept_r, new_c)
     return out
+
+
+def _runs(old_numbers: np.ndarray):
+    """(first, first old number, length) of stretches that stood together before."""
+    kept = np.flatnonzero(old_numbers >= 0)
+    breaks = np.flatnonzero((np.diff(kept) != 1) | (np.diff(old_numbers[kept]) != 1)) + 1
+    for run in np.split(kept, breaks):
+        if len(run):
+            yield int(run[0]), int(old_numbers[run[0]]), len(run)

@@ -27,14 +27,14 @@ class OutOfEquilibrium(ValueError):
 class BodyLoad:
     """All parts are optional and add up.
 
-        segments             (m, 2, 2)  straight pieces of the boundary, anywhere on it, directed along it
-        tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear between
-        body_force           (2,)       N/m³ at ``about``
-        body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
-        about                (2,)       m; the centroid when left out
-        remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
-                                        that carry it act on the boundary in addition to ``tractions``
-        crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses
+    segments             (m, 2, 2)  straight pieces of the boundary, anywhere on it, directed along it
+    tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear between
+    body_force           (2,)       N/m³ at ``about``
+    body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
+    about                (2,)       m; the centroid when left out
+    remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
+                                    that carry it act on the boundary in addition to ``tractions``
+    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses
     """
 
     segments: np.ndarray | None = None
@@ -72,7 +72,12 @@ class BodyLoad:
 
 
 def check_equilibrium(
-    load: BodyLoad, loops: list[np.ndarray], centroid: np.ndarray, force: np.ndarray, gradient: np.ndarray, tolerance: float
+    load: BodyLoad,
+    loops: list[np.ndarray],
+    centroid: np.ndarray,
+    force: np.ndarray,
+    gradient: np.ndarray,
+    tolerance: float,
 ) -> None:
     """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size; ``force`` and
     ``gradient`` are the body force about the ``centroid``."""
@@ -84,7 +89,9 @@ def check_equilibrium(
         length = np.hypot(*(x1 - x0).T)
         total = total + 0.5 * length @ (t0 + t1)
         a, b = 2 * t0 + t1, t0 + 2 * t1
-        moment += float(length @ (x0[:, 0] * a[:, 1] - x0[:, 1] * a[:, 0] + x1[:, 0] * b[:, 1] - x1[:, 1] * b[:, 0])) / 6
+        moment += (
+            float(length @ (x0[:, 0] * a[:, 1] - x0[:, 1] * a[:, 0] + x1[:, 0] * b[:, 1] - x1[:, 1] * b[:, 0])) / 6
+        )
         size += 0.5 * float(length @ (np.hypot(*t0.T) + np.hypot(*t1.T)))
     if force.any() or gradient.any():
         area, first, second = polygon_moments(loops, centroid)

@@ -87,7 +87,7 @@ def _boundary(loops, edges, cracks, settings):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     span = math.sqrt(abs(_area(loops[0])))
-    size = min(length.max(), span) / settings.elements_per_side
+    size = span / settings.elements_per_side
     layers, ratio = settings.grading_layers, settings.grading_ratio
     mouths = [cracks.nodes[k] for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))]
     corner = np.concatenate([_interior_angles(loop) for loop in loops])
@@ -283,7 +283,8 @@ def _touching(edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
 
 def _halved(start, end, kind, source, touching, ratio, floor):
     """Halve what stands too close, until nothing does or the ``floor`` is reached."""
-    chained = max(2.5, 1.05 * (1 - ratio) / ratio)
+    # A graded element is 1/ratio times its distance to the next but one.
+    chained = max(2.5, 1.05 / ratio)
     for _ in range(20):
         tip = np.where(kind == shapes.ORDINARY, 0, kind)
         start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
@@ -300,8 +301,9 @@ def _halved(start, end, kind, source, touching, ratio, floor):
         new_end[first] = middle[at[first]]
         new_start[second] = middle[at[second]]
         was = kind[at]
-        starts, stops = (was == shapes.TIP_START) | (was == shapes.TIP_BOTH), (was == shapes.TIP_END) | (
-            was == shapes.TIP_BOTH
+        starts, stops = (
+            (was == shapes.TIP_START) | (was == shapes.TIP_BOTH),
+            (was == shapes.TIP_END) | (was == shapes.TIP_BOTH),
         )
         new_kind[first] = np.where(starts, shapes.TIP_START, shapes.ORDINARY)[first]
         new_kind[second] = np.where(stops, shapes.TIP_END, shapes.ORDINARY)[second]

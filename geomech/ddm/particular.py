@@ -49,9 +49,7 @@ class Particular:
         strain = self.material.compliance() @ self.uniform
         ux = -(b[0] * x**2 / 2 + g[0, 0] * x**3 / 6) / m - g[0, 1] * y**3 / (6 * mu)
         uy = -(b[1] * y**2 / 2 + g[1, 1] * y**3 / 6) / m - g[1, 0] * x**3 / (6 * mu)
-        return np.column_stack(
-            [ux + strain[0] * x + 0.5 * strain[2] * y, uy + strain[1] * y + 0.5 * strain[2] * x]
-        )
+        return np.column_stack([ux + strain[0] * x + 0.5 * strain[2] * y, uy + strain[1] * y + 0.5 * strain[2] * x])
 
 
 def polygon_moments(loops: list[np.ndarray], origin: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

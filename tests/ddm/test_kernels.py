@@ -21,8 +21,8 @@ def cauchy(kind, order, zp, zm, y):
 
 
 def exact(kind, k, z, side):
-    """A_k, A_k', A_k'' by Gauss quadrature in 40 digits on a contour bent away from z (on the side z is seen from)."""
-    with mp.workdps(40):
+    """A_k, A_k', A_k'' by Gauss quadrature in 25 digits on a contour bent away from z (on the side z is seen from)."""
+    with mp.workdps(25):
         # The path from −1 to 1 passes below a point above; the integrand is analytic in between.
         mid = mp.mpc(0, -side if side else 0)
         w = WEIGHTS[kind]
@@ -44,7 +44,7 @@ def test_moments_hold_ten_digits_from_touching_to_a_million_lengths(kind):
     """1e-10 of each moment, the accuracy that the far series is cut for; p = 10 is the highest order there is."""
     for x, y in POINTS:
         a, b, d = cauchy(kind, 10, x + 1.0, x - 1.0, y)
-        for k in (0, 1, 4, 7, 10):
+        for k in (0, 5, 10):
             ref = exact(kind, k, mp.mpc(x, y), float(np.sign(y)))
             got = (a[k], b[k], d[k])
             for one, other in zip(got, ref):

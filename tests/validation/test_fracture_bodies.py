@@ -77,7 +77,10 @@ def test_uniform_stress_in_a_body_with_a_hole():
     strain = ROCK.compliance() @ stress
     u = sol.displacement(points)
     exact = np.column_stack(
-        [strain[0] * points[:, 0] + strain[2] / 2 * points[:, 1], strain[1] * points[:, 1] + strain[2] / 2 * points[:, 0]]
+        [
+            strain[0] * points[:, 0] + strain[2] / 2 * points[:, 1],
+            strain[1] * points[:, 1] + strain[2] / 2 * points[:, 0],
+        ]
     )
     # Equal but for a rigid motion: three of the numbers are free.
     gap = u - exact
@@ -120,9 +123,7 @@ def test_block_under_its_own_weight_on_a_base_pressure():
     """σ_yy = −ρg(h − y) and nothing else; 1e-8: the field is in the elements' span."""
     g = np.array([0.0, -2600 * 9.81])
     w, h = 0.5, 1.0
-    load = ddm.BodyLoad(
-        segments=[[[-w, -h], [w, -h]]], tractions=[[[0, 2 * h * 2600 * 9.81]] * 2], body_force=g
-    )
+    load = ddm.BodyLoad(segments=[[[-w, -h], [w, -h]]], tractions=[[[0, 2 * h * 2600 * 9.81]] * 2], body_force=g)
     sol = ddm.Body([rectangle(w, h)], Cracks.from_polylines([]), ROCK).solve(load)
     p = np.array([[0.1, 0.3], [-0.4, -0.9], [0.0, 0.8], [0.5, 0.1]])
     expected = np.column_stack([0 * p[:, 1], g[1] * (h - p[:, 1]), 0 * p[:, 1]])
@@ -132,9 +133,7 @@ def test_block_under_its_own_weight_on_a_base_pressure():
 def test_crack_in_a_heavy_block_feels_the_local_stress():
     """A short vertical stress gradient over a small horizontal slot: K_I = σ_yy √(πa) at its depth, 1e-3 for a/W = 0.02."""
     weight = 2600 * 9.81
-    load = ddm.BodyLoad(
-        segments=[[[-1, -1], [1, -1]]], tractions=[[[0, 2 * weight]] * 2], body_force=[0, -weight]
-    )
+    load = ddm.BodyLoad(segments=[[[-1, -1], [1, -1]]], tractions=[[[0, 2 * weight]] * 2], body_force=[0, -weight])
     sol = ddm.Body([rectangle(1, 1)], line([-0.02, 0.2], [0.02, 0.2], aperture=OPEN), ROCK).solve(load)
     assert np.allclose(sol.tips["k_i"], fracture.griffith(-0.8 * weight, 0.02), rtol=1e-3)
 
