@@ -19,7 +19,7 @@ _PUBLIC = {
 }
 _MODULES = ("criteria", "growth", "shapes")
 
-__all__ = [*_PUBLIC, *_MODULES]
+__all__ = ["Body", "BodyLoad", "NotConverged", "OutOfEquilibrium", "Solution", "criteria", "growth", "shapes"]
 
 
 def __getattr__(name: str):

@@ -44,7 +44,7 @@ class Body:
         cracks: Cracks,
         material: Material,
         settings: DdmSettings | None = None,
-        previous: "Body | None" = None,
+        previous: Body | None = None,
     ):
         self.material, self.cracks = material, cracks
         self.settings = settings = DdmSettings() if settings is None else settings
@@ -72,7 +72,7 @@ class Body:
     def nu(self) -> float:
         return self.material.effective_poissons_ratio
 
-    def _assemble(self, previous: "Body | None") -> None:
+    def _assemble(self, previous: Body | None) -> None:
         nu, tol = self.nu, self._tol
         g, c = self.boundary, self.faces
         old = previous
@@ -180,7 +180,7 @@ class Body:
         out = np.einsum("nmce,mcx->mnex", by_end, turn)
         return np.ascontiguousarray(out.reshape(len(segments), targets.n_unknowns, 4))
 
-    def _inherit_segments(self, old: "Body", c_old: np.ndarray) -> None:
+    def _inherit_segments(self, old: Body, c_old: np.ndarray) -> None:
         new = np.flatnonzero(c_old < 0)
         keys = [key for key in old._recent if key in old._segments]
         if not keys:
@@ -268,7 +268,7 @@ class Body:
 
     # Solution --------------------------------------------------------------------------------------------------------
 
-    def solve(self, load: BodyLoad, warm: "Solution | None" = None, equilibrium_tolerance: float = 1e-6) -> Solution:
+    def solve(self, load: BodyLoad, warm: Solution | None = None, equilibrium_tolerance: float = 1e-6) -> Solution:
         """The body under ``load``. ``warm``: a solution of this or an earlier body whose face states are the first guess.
 
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
@@ -317,7 +317,7 @@ class Body:
             out[:, :, component] = jump[:, :, None] * c.quadrature
         return out.reshape(3, -1) / (self.area * 2 * self.material.shear_modulus)
 
-    def compliance(self, sol: "Solution | None" = None) -> np.ndarray:
+    def compliance(self, sol: Solution | None = None) -> np.ndarray:
         """(3, 3) added compliance, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform boundary stress,
         with the face states of ``sol`` (all open if None); symmetrised. Raises ValueError in the infinite plane."""
         if not self.loops:
@@ -335,7 +335,7 @@ def _same_loops(old: list[np.ndarray], new: list[np.ndarray]) -> bool:
     return len(old) == len(new) and all(np.array_equal(a, b) for a, b in zip(old, new))
 
 
-def _fresh(cracks: Cracks, previous: "Body | None") -> np.ndarray | None:
+def _fresh(cracks: Cracks, previous: Body | None) -> np.ndarray | None:
     """(n_segments,) bool: which segments were not in ``previous``."""
     if previous is None:
         return None

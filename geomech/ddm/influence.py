@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -95,7 +96,7 @@ class ElementSet:
     def index_of(self) -> dict[bytes, int]:
         return {key: k for k, key in enumerate(self.keys)}
 
-    def found_in(self, other: "ElementSet | None") -> np.ndarray:
+    def found_in(self, other: ElementSet | None) -> np.ndarray:
         """(n,) the same element's number in ``other``, −1 where it is new."""
         if other is None or (other.order, other.family) != (self.order, self.family):
             return np.full(self.n, -1)
@@ -103,7 +104,7 @@ class ElementSet:
             return np.arange(self.n)
         return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
 
-    def take(self, which: np.ndarray) -> "ElementSet":
+    def take(self, which: np.ndarray) -> ElementSet:
         return ElementSet(
             self.start[which], self.end[which], self.kind[which], self.source[which], self.order, self.family
         )
@@ -219,8 +220,8 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
         near = (np.abs(ends) < _REACH) & (np.abs(np.abs(ends) - 1) > 1e-6)
         for e in np.flatnonzero(line & near.any(axis=0)):
             cuts = np.unique(np.concatenate([[-1.0, 1.0], np.clip(ends[near[:, e], e], -1, 1)]))
-            u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in zip(cuts[:-1], cuts[1:])])
-            w = np.concatenate([(hi - lo) * q for lo, hi in zip(cuts[:-1], cuts[1:])])
+            u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
+            w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
             points = (middle[e] + c[e] * u[:, None] * t[e])[None]
             values = _line_forces(points, t[e : e + 1], a[None], b[None], unit.shape[3] - 1, nu, tol, side)
             values = values.reshape(2, len(u), 2, -1)
@@ -265,11 +266,11 @@ def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set
     old element numbers or −1, ``compute(row_elements, column_elements)`` makes blocks of it."""
     if old is None or (rows < 0).all() or (columns < 0).all():
         return compute(np.arange(row_set.n), np.arange(column_set.n))
-    if len(old) == row_set.n_unknowns and old.shape[1] == column_set.n_unknowns:
-        if np.array_equal(rows, np.arange(row_set.n)) and np.array_equal(columns, np.arange(column_set.n)):
-            return old
+    unchanged = np.array_equal(rows, np.arange(row_set.n)) and np.array_equal(columns, np.arange(column_set.n))
+    if unchanged and old.shape == (row_set.n_unknowns, column_set.n_unknowns):
+        return old
     kept_r, new_r = np.flatnonzero(rows >= 0), np.flatnonzero(rows < 0)
-    kept_c, new_c = np.flatnonzero(columns >= 0), np.flatnonzero(columns < 0)
+    new_c = np.flatnonzero(columns < 0)
     out = np.empty((row_set.n_unknowns, column_set.n_unknowns))
     # Elements mostly keep their order: copying a few slices is several times faster than gathering.
     wr, wc = 2 * row_set.per, 2 * column_set.per

@@ -169,9 +169,8 @@ def _with_mouths(edge, fractions, mouths, ratio, layers, span) -> np.ndarray:
         before, after = fractions[k - 1], fractions[k]
         left = [f - (f - before) * g for g in _graded(ratio, layers)][::-1]
         right = [f + (after - f) * g for g in _graded(ratio, layers)]
-        at = lambda q: (1 - q) * a + q * b  # noqa: E731
         fractions[k:k] = [*left, f, *right]
-        points[k:k] = [*map(at, left), mouth, *map(at, right)]
+        points[k:k] = [*((1 - q) * a + q * b for q in left), mouth, *((1 - q) * a + q * b for q in right)]
     return np.array(points)
 
 

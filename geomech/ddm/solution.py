@@ -24,7 +24,7 @@ _NUDGE = 0.02
 
 
 def settle_faces(
-    body: "Body", load_traction: np.ndarray, pressure: np.ndarray | float, warm: "Solution | None"
+    body: Body, load_traction: np.ndarray, pressure: np.ndarray | float, warm: Solution | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Slip and opening (times 2μ), closed unknowns (bool), traction on the faces and the number of solves."""
     c = body.faces
@@ -78,7 +78,7 @@ class Solution:
 
     def __init__(
         self,
-        body: "Body",
+        body: Body,
         load: BodyLoad,
         particular: Particular,
         edge_densities: np.ndarray | None,

@@ -198,7 +198,10 @@ def test_answer_does_not_depend_on_place_or_size():
     """Scaled by 1e-3 and moved 30 sizes away, K scales with √size; 1e-9: digits lost to the place."""
     lines = [np.array([[-0.5, -0.2], [-0.1, 0.2]])]
     a = ddm.Body([SQUARE], Cracks.from_polylines(lines, aperture=math.inf), ROCK).solve(pressed(1.0))
-    move = lambda x: 1e-3 * (np.asarray(x) + [30.0, -20.0])  # noqa: E731
+
+    def move(x):
+        return 1e-3 * (np.asarray(x) + [30.0, -20.0])
+
     load = pressed(1.0)
     b = ddm.Body([move(SQUARE)], Cracks.from_polylines([move(lines[0])], aperture=math.inf), ROCK).solve(
         ddm.BodyLoad(move(load.segments), load.tractions)
