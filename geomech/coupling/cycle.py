@@ -53,6 +53,8 @@ class Coupling:
         self.number = 0
         self.load_step = 0
         self.bodies: dict[int, object] = {}
+        self.solutions: dict[int, object] = {}
+        self.compliances: dict[int, tuple] = {}
         self._take_blocks()
 
     # -- the generator -------------------------------------------------------------------------------------------
@@ -152,8 +154,10 @@ class Coupling:
                         body_force=load.body_force,
                         body_force_gradient=load.body_force_gradient,
                         about=load.about,
-                    )
+                    ),
+                    warm=self.solutions.get(b),
                 )
+        self.solutions = solutions
         return solutions, loads
 
     def _edge_tractions(self, now: float) -> dict[int, list[tuple[int, np.ndarray]]]:
@@ -171,7 +175,7 @@ class Coupling:
             for b, solution in solutions.items():
                 body = self.bodies[b]
                 s, e = crack_response(
-                    body.compliance(solution), solution.crack_strain, state.stress[b], float(state.rotation[b])
+                    self._compliance(b, body, solution), solution.crack_strain, state.stress[b], float(state.rotation[b])
                 )
                 found, assumed = e + s @ state.stress[b], state.crack_strain[b]
                 material = self.problem.materials[self.blocks.material[b]]
@@ -182,6 +186,14 @@ class Coupling:
                 compliance[b], offset[b] = s, e
         self.response = dda.CrackResponse(compliance, offset)
         return worst
+
+    def _compliance(self, block: int, body, solution) -> np.ndarray:
+        """S in the block's own axes; it changes with the geometry and with which faces are closed, not with the load."""
+        closed = solution.closed.tobytes()
+        known = self.compliances.get(block)
+        if known is None or known[0] is not body or known[1] != closed:
+            known = self.compliances[block] = (body, closed, body.compliance(solution))
+        return known[2]
 
     def _tips(self, solutions: dict) -> np.ndarray:
         """TIP rows of all bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
@@ -292,6 +304,7 @@ class Coupling:
         n = self.blocks.n_blocks
         self.response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))
         self.bodies, self.nodes_of = {}, {}
+        self.solutions, self.compliances = {}, {}
         self._take_bodies()
 
     def _take_bodies(self) -> None:

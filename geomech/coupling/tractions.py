@@ -23,6 +23,9 @@ from ..model import Blocks, Motion
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = np.radians(10.0)
 
+#: A face that ends within this part of its edge's length of the edge's end ends there.
+SNAP = 1e-9
+
 #: A lone contact spreads over this part of its edge (of the corner's shorter edge).
 LONE_SPREAD = 1.0 / 20.0
 
@@ -176,6 +179,10 @@ def _add_face(pieces, blocks, motion, block, edge, rows, turn_back) -> None:
     places = np.array([(motion.reference(block, row["point"]) - start) @ along for row in rows])
     forces = np.array([turn_back @ _force_on(block, row) for row in rows])
     first, last = max(places.min(), 0.0), min(places.max(), length)
+    # Round-off of the mapping must not make a new load segment every step: the body keeps what it knows of a segment.
+    # The pressure below has the force and moment of the contacts on whatever length it is given.
+    first = 0.0 if first < SNAP * length else first
+    last = length if last > (1 - SNAP) * length else last
     push, shear = forces @ inward, forces @ along
     total, moment = push.sum(), push @ (places - first)
     a, b, p_a, p_b = linear_pressure(last - first, total, moment)
@@ -186,7 +193,7 @@ def _add_face(pieces, blocks, motion, block, edge, rows, turn_back) -> None:
         q_a = q_b = shear.sum() / (b - a)
     pieces.add(
         start + (first + a) * along,
-        start + (first + b) * along,
+        end if first + b >= length else start + (first + b) * along,
         p_a * inward + q_a * along,
         p_b * inward + q_b * along,
     )

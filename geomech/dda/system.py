@@ -27,6 +27,8 @@ _BLOCK_SHARE = 0.1
 _SLACK = 1e-14
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
+#: Loads on a lone block whose resultant is below this part of their size are in balance.
+_BALANCE = 1e-9
 _UNKNOWN = -2
 _NEVER = -1
 
@@ -242,6 +244,9 @@ class BlockSystem:
             compliance, offset, gravity, load, dt, damping, n_free,
         )  # fmt: skip
         vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
+        held = self._held_now(static, load, points, edges, gravity, moments)
+        if held is not None and n_free:
+            _hold(held, matrix, right, vectors, found, order)
         n_contacts = len(found["block"])
         if n_free:
             settled = settle(
@@ -306,6 +311,22 @@ class BlockSystem:
         }
         return StepResult(new_state, dt, rows, forces, acceleration, statistics), largest
 
+    def _held_now(self, static, load, points, edges, gravity, moments) -> np.ndarray | None:
+        """(n_blocks, 6) unknowns that stay zero in this step, None without any.
+
+        A lone block under loads in balance has no support, and pressed by forces that keep their direction it is not
+        even stable: in statics its rigid motion, which carries no force, is held.
+        """
+        held = self.blocks.held
+        if static and self.blocks.n_blocks == 1 and not self._fixed[0]:
+            size = sum(float(np.abs(rows["force"]).sum()) for rows in (points, edges))
+            weight = self.density[0] * moments[0, 0] * float(np.abs(gravity).sum())
+            total = np.abs(load[0, :3] / [1.0, 1.0, np.sqrt(moments[0, 0])])
+            if weight <= _BALANCE * size and (total <= _BALANCE * size).all():
+                held = np.zeros((1, 6), bool) if held is None else held.copy()
+                held[0, :3] = True
+        return held
+
     def _on(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """The contact rows carried to the new geometry (gap and forces as they are)."""
         rows = rows.copy()
@@ -332,6 +353,19 @@ class BlockSystem:
         x, y = found["geometry"][contact, 5:7]
         a, b = names[found["block"][contact]], names[found["other"][contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
+
+
+def _hold(held, matrix, right, vectors, found, order) -> None:
+    """Take the unknowns ``held`` (n_blocks, 6) out of the equations, in place: their rows say that they are zero."""
+    free = order >= 0
+    mask = np.zeros((len(matrix), 6), bool)
+    mask[order[free]] = held[free]
+    size = np.abs(matrix).max()
+    matrix[mask[:, :, None] | mask[:, None, :]] = 0.0
+    matrix[:, range(6), range(6)] += np.where(mask, size, 0.0)
+    right[mask] = 0.0
+    if len(vectors):
+        vectors *= ~np.concatenate([held[found["block"]], held[found["other"]]], axis=1)[:, None, :]
 
 
 def _unbalanced(matrix, right, vectors, found, order, settled: Settled) -> float:

@@ -26,6 +26,9 @@ JUMP = 10.0
 FORGOTTEN = 3
 #: Longest element in units of its distance to another one. Its density then still converges like 3.5^−p.
 APART = 1.25
+#: The same for opposite sides of a body: what is left of equilibrium errors in a slender one is amplified by its
+#: slenderness squared.
+ACROSS = 0.6
 #: Elements are not halved below this part of the largest extent of the geometry.
 FLOOR = 1e-5
 #: A mouth nearer to an element's end than this part of its length moves the end instead of cutting a sliver.
@@ -61,7 +64,7 @@ def mesh(loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings) -> Mesh
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     start, end, kind, source = _halved(
-        start, end, kind, source, _touching(edges, cracks, extent), settings.grading_ratio, FLOOR * extent
+        start, end, kind, source, _touching(edges, cracks, extent), len(edges), settings.grading_ratio, FLOOR * extent
     )
     on_crack = source >= len(edges)
     rest = ~on_crack
@@ -280,14 +283,14 @@ def _touching(edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
     return out
 
 
-def _halved(start, end, kind, source, touching, ratio, floor):
+def _halved(start, end, kind, source, touching, n_edges, ratio, floor):
     """Halve what stands too close, until nothing does or the ``floor`` is reached."""
     # A graded element is 1/ratio times its distance to the next but one.
     chained = max(2.5, 1.05 / ratio)
     for _ in range(20):
         tip = np.where(kind == shapes.ORDINARY, 0, kind)
         start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
-        ratios = proximity.crowding(start, end, tip, source, touching, APART, chained)
+        ratios = proximity.crowding(start, end, tip, source, touching, n_edges, APART, ACROSS, chained)
         length = np.hypot(*(end - start).T)
         cut = (ratios > 1 + 1e-9) & (length > 2 * floor)
         if not cut.any():

@@ -18,10 +18,10 @@ def _distance(px, py, ax, ay, bx, by):
 
 
 @_jit
-def crowding(start, end, tip, source, touching, apart, chained):
+def crowding(start, end, tip, source, touching, n_edges, apart, across, chained):
     """(n,) the largest length / (allowed length) of each element over all others.
 
-    Allowed is ``apart`` times the distance; ``chained`` times it where the two lie on one source or on ``touching``
+    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``), ``chained`` times it where the two lie on one source or on ``touching``
     ones, whose grading already ties sizes to distances. Elements that share an end are not compared, but for the tip at
     the other end (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
     """
@@ -35,10 +35,14 @@ def crowding(start, end, tip, source, touching, apart, chained):
         for j in range(i):
             qx, qy = 0.5 * (start[j, 0] + end[j, 0]), 0.5 * (start[j, 1] + end[j, 1])
             between = np.hypot(mx - qx, my - qy) - 0.5 * (length[i] + length[j])
-            if between * apart > max(length[i], length[j]):
+            if between * min(apart, across) > max(length[i], length[j]):
                 continue
             same = source[i] == source[j] or touching[source[i], source[j]]
-            allowed = chained if same else apart
+            allowed = apart
+            if same:
+                allowed = chained
+            elif source[i] < n_edges and source[j] < n_edges:
+                allowed = across
             shared = 0
             for p in range(2):
                 for q in range(2):

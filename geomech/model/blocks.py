@@ -22,6 +22,8 @@ class Blocks:
         block_loop    (n_blocks + 1,)   first loop of each block
         material      (n_blocks,)       index into the scene's materials
         fixed         (n_blocks,)       True: the block does not move
+        held          (n_blocks, 6)     True: that unknown (u0, v0, r0, εx, εy, γxy) of the block stays zero, as of a
+                                        guided platen; None when no unknown of a moving block is held
         edge_name     (n_vertices,)     index into ``edge_names`` (0, the empty name: nothing said)
         edge_names    tuple of str      e.g. ("", "load:top", "joint:set1")
         names         tuple of str      one name a block, for messages and files
@@ -35,6 +37,7 @@ class Blocks:
     edge_name: np.ndarray
     edge_names: tuple[str, ...] = ("",)
     names: tuple[str, ...] = ()
+    held: np.ndarray | None = None
 
     @classmethod
     def from_polygons(
@@ -43,6 +46,7 @@ class Blocks:
         *,
         material: Sequence[int] | None = None,
         fixed: Sequence[bool] | None = None,
+        held: Sequence[Sequence[bool]] | None = None,
         edge_names: Sequence[Sequence[Sequence[str]]] | None = None,
         names: Sequence[str] | None = None,
     ) -> "Blocks":
@@ -74,6 +78,7 @@ class Blocks:
             edge_name=np.concatenate(labels).astype(int) if labels else np.empty(0, int),
             edge_names=tuple(known),
             names=names,
+            held=np.asarray(held, dtype=bool) if held is not None and np.any(held) else None,
         )
 
     @property

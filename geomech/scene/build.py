@@ -33,6 +33,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         drawing.blocks,
         material=np.array([names.index(material_of(tables, zone)) for zone in drawing.zones]),
         fixed=np.array([zone in tables.zones and tables.zones[zone].fixed for zone in drawing.zones]),
+        held=_held(tables, drawing),
     )
     cracks = replace(drawing.cracks, aperture=_apertures(tables, drawing.cracks))
     joints, joint_of = _joints(tables, drawing)
@@ -68,6 +69,16 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
             for k, m in enumerate(tables.monitors)
         },
     )
+
+
+def _held(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+    """Guided blocks keep one of (u0, v0), and their strains along the axes."""
+    across = {None: [], "x": [1, 2, 5], "y": [0, 2, 5]}
+    held = np.zeros((len(drawing.zones), 6), bool)
+    for block, zone in enumerate(drawing.zones):
+        if zone in tables.zones:
+            held[block, across[tables.zones[zone].guided]] = True
+    return held if held.any() else None
 
 
 def _apertures(tables: SceneTables, cracks: Cracks) -> np.ndarray:

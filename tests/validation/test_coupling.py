@@ -33,14 +33,19 @@ def specimen(phi_deg=0.0, platens=True, end_time=3.0, cracks=None, **run):
     """The 60 × 120 mm specimen, pressed by platens or by tractions on its own ends."""
     w, h = 0.03, 0.06
     polygons = [rectangle(-w, -h, w, h)]
-    sides = ["bottom", "", "load:top", ""]
+    names = [[["", "", "", ""] if platens else ["load:bottom", "", "load:top", ""]]]
     if platens:
-        polygons += [rectangle(-w, h, w, h + 0.01), rectangle(-w, -h - 0.01, w, -h)]
-    names = [[["load:bottom" if s == "bottom" and not platens else s for s in sides]] if b == 0 else [sides] for b in range(len(polygons))]
+        # Wider than the specimen, so that its corners stay on them as it bulges; loaded over the specimen's width.
+        o = w + 0.005
+        top = np.array([[-o, h], [o, h], [o, h + 0.01], [w, h + 0.01], [-w, h + 0.01], [-o, h + 0.01]])
+        polygons += [top, rectangle(-o, -h - 0.01, o, -h)]
+        names += [[["", "", "", "load:top", "", ""]], [[""] * 4]]
+    n_blocks = len(polygons)
+    held = np.zeros((n_blocks, 6), bool)
     if platens:
-        names[0], names[2] = [[""] * 4], [[""] * 4]
+        held[1, [0, 2, 5]] = True  # guided: it comes down and does nothing else
     blocks = Blocks.from_polygons(
-        polygons, material=[0, 1, 1][: len(polygons)], fixed=[False, False, True][: len(polygons)], edge_names=names
+        polygons, material=[0, 1, 1][:n_blocks], fixed=[False, False, True][:n_blocks], held=held, edge_names=names
     )
     loads = [EdgeTraction("load:top", History.ramp([0.0, -RATE]))]
     if not platens:
