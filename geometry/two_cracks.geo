@@ -23,7 +23,7 @@ DefineConstant[
   phi_deg = {0, Min -180, Max 180, Step 5, Name "Parameters/2Cracks/phi_deg", Label "Crack 2 (lower) [deg]"},
   // The angle of crack 2 is read from crack 1 (then crack 2 stands at alpha + phi) or from the horizontal (at phi).
   phi_from = {0, Choices{0="crack1", 1="horizontal"}, Name "Parameters/2Cracks/phi_from", Label "phi is counted from"},
-  platens = {1, Choices{0="no", 1="yes"}, Name "Parameters/3Platens/platens", Label "Platens"},
+  platens = {2, Choices{0="none", 1="bottom", 2="both"}, Name "Parameters/3Platens/platens", Label "Platens"},
   platen_height_m = {0.010, Min 0.0001, Max 10, Step 0.005, Name "Parameters/3Platens/platen_height_m",
                      Label "Height [m]", Visible platens},
   platen_overhang_m = {0.005, Min 0, Max 10, Step 0.005, Name "Parameters/3Platens/platen_overhang_m",
@@ -64,12 +64,11 @@ Line(12) = {13, 14};
 Line{11, 12} In Surface{1};
 
 Physical Surface("rock") = {1};
-If (platens)
-  // Platens own their points: they touch the specimen and may part from it. Each overhangs the specimen, so that no
-  // corner of the specimen slides off as it widens; the load stands on the middle part of the upper platen, as wide
-  // as the specimen, so that the traction there is the specimen's own axial stress.
-  p = platen_height_m;
-  o = w + platen_overhang_m;
+// Platens own their points: they touch the specimen and may part from it. Each overhangs the specimen, so that no
+// corner of the specimen slides off as it widens.
+p = platen_height_m;
+o = w + platen_overhang_m;
+If (platens >= 1)
   Point(21) = {-o, -h - p, 0, size};
   Point(22) = { o, -h - p, 0, size};
   Point(23) = { o, -h,     0, size};
@@ -80,7 +79,15 @@ If (platens)
   Line(24) = {24, 21};
   Curve Loop(2) = {21, 22, 23, 24};
   Plane Surface(2) = {2};
-
+  Physical Surface("platen_bottom") = {2};
+  Physical Curve("contact:bottom") = {1, 23};
+Else
+  Physical Curve("load:bottom") = {1};
+EndIf
+If (platens == 2)
+  // The load stands on the middle part, as wide as the specimen, so that the traction there is the specimen's own
+  // axial stress. Without friction nothing keeps this platen from sliding off sideways under load: guide it in the
+  // scene, [zones.platen_top] guided = "y".
   Point(31) = {-o, h,     0, size};
   Point(32) = { o, h,     0, size};
   Point(33) = { o, h + p, 0, size};
@@ -100,14 +107,10 @@ If (platens)
     Curve Loop(3) = {31, 32, 34, 36};
   EndIf
   Plane Surface(3) = {3};
-
-  Physical Surface("platen_bottom") = {2};
   Physical Surface("platen_top") = {3};
   Physical Curve("load:top") = {34};
-  Physical Curve("contact:bottom") = {1, 23};
   Physical Curve("contact:top") = {3, 31};
 Else
-  Physical Curve("load:bottom") = {1};
   Physical Curve("load:top") = {3};
 EndIf
 Physical Curve("crack:crack1") = {11};

@@ -42,12 +42,14 @@ def test_the_specimens_are_the_published_ones():
     assert p.blocks.areas()[0] == pytest.approx(0.06 * 0.12, rel=1e-14)
     assert p.cracks.lengths == pytest.approx([0.01, 0.01], rel=1e-10)
     assert np.isinf(p.cracks.aperture).all() and p.blocks.fixed.tolist() == [False, True, False]
+    # The upper platen only comes down; without friction nothing else would keep it in place.
+    assert np.flatnonzero(p.blocks.held[2]).tolist() == [0, 2, 5] and not p.blocks.held[0].any()
     rock = p.materials[p.blocks.material[0]]
     assert (rock.youngs_modulus, rock.poissons_ratio, rock.k_ic) == (17e9, 0.21, 2e6)
     (top,) = p.loads.edge_tractions
     assert top.history.at(10.0).tolist() == [0.0, -2e6]
-    # The traction acts on as much of the platen as the specimen is wide.
     (edge,) = p.blocks.edges_named("load:top")
+    # The traction acts on as much of the platen as the specimen is wide.
     width = np.hypot(*(p.blocks.vertices[p.blocks.next_vertex[edge]] - p.blocks.vertices[edge]))
     assert width == pytest.approx(0.06, abs=1e-15)
     assert p.joints[p.joint_index("contact:top", "contact:top")].friction_angle == 0.0

@@ -47,6 +47,7 @@ def test_defaults_are_those_of_the_model(scene_file):
 FULL = """
 [zones.left]
 material = "soft"
+guided = "x"
 [zones.right]
 material = "hard"
 fixed = true
@@ -145,6 +146,8 @@ def test_every_setting_arrives(scene_file):
     assert [m.name for m in p.materials] == ["hard", "soft"]
     assert p.blocks.material.tolist() == [1, 0] and p.blocks.fixed.tolist() == [False, True]
     assert p.blocks.areas() == pytest.approx([1.0, 0.98], abs=1e-14)
+    # Guided along x: v0, r0 and γxy are held, u0 and the strains along the axes are not.
+    assert p.blocks.held.tolist() == [[False, True, True, False, False, True], [False] * 6]
     assert p.materials[1].plane == "stress" and p.materials[0].k_ic == math.inf
     assert p.cracks.aperture.tolist() == [math.inf, math.inf, 1e-4]
     names = [law.name for law in p.joints]

@@ -70,9 +70,15 @@ def test_platens_own_their_points_and_the_load_is_as_wide_as_the_specimen():
 
 
 def test_without_platens_the_specimen_has_its_own_loaded_ends():
-    blocks, _ = two_cracks(platens="no")
+    blocks, _ = two_cracks(platens="none")
     assert blocks.names == ("rock",)
     assert len(blocks.edges_named("load:top")) == len(blocks.edges_named("load:bottom")) == 1
+
+
+def test_with_a_platen_below_alone_the_load_stands_on_the_specimen():
+    blocks, _ = two_cracks(platens="bottom")
+    assert blocks.names == ("rock", "platen_bottom")
+    assert blocks.vertex_block[blocks.edges_named("load:top")].tolist() == [0]
 
 
 def test_without_overhang_the_platen_is_a_rectangle():
