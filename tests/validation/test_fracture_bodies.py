@@ -181,6 +181,17 @@ def test_partly_loaded_sides_transmit_their_resultant():
     assert abs(w @ across[:, 2]) < 2e-3 * force
 
 
+@pytest.mark.parametrize("off", [1e-7, 1e-3, 0.02, 0.05, 0.1, 0.2, 0.33, 0.4])
+def test_k_does_not_depend_on_where_a_load_ends_on_an_element(off):
+    """Default mesh against order 8 and four times the elements, the load ending anywhere on them: 5e-4 (2e-6 at an end)."""
+    square, crack = rectangle(1, 1), line([-0.3, 0], [0.3, 0.1], aperture=OPEN)
+    y = 1 - off
+    load = ddm.BodyLoad([[[-y, -1], [y, -1]], [[y, 1], [-y, 1]]], [[[0, -1.0]] * 2, [[0, 1.0]] * 2])
+    fine = DdmSettings(order=8, elements_per_side=24, grading_layers=4)
+    k, exact = (ddm.Body([square], crack, ROCK, s).solve(load).tips["k_i"] for s in (DdmSettings(), fine))
+    assert np.allclose(k, exact, rtol=1e-5 if off == 1e-7 else 5e-4)
+
+
 def test_crack_across_a_bending_stress_closes_by_a_third():
     """Frictionless contact with an unknown edge: closure point and K_I in closed form. The plate is 40 crack lengths wide;
     the closure point is known to a node's spacing, K_I to 1 %."""
