@@ -19,13 +19,17 @@ from .vtu import Collection, Grid, write_grid
 #: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
 PASS_OFFSET = 1e-6
 
+#: Interior fields cost more than everything else that is written; where no crack grows they are this much rarer.
+QUIET = 5
+
 
 class Series:
     """Observer that writes ``blocks``, ``cracks``, ``tips``, ``contacts`` and ``interior``.
 
     ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
-    last are always written. ``interior_every`` counts cycles between interior fields, which also come with every event
-    and at the end; 0 leaves them out. Raises ValueError for an unknown ``configuration``.
+    last are always written. ``interior_every`` counts cycles between interior fields while cracks grow; while none does
+    they come `QUIET` times as rarely, since there they mostly scale with the load. They also come with the first load,
+    with every event and at the end; 0 leaves them out. Raises ValueError for an unknown ``configuration``.
     """
 
     def __init__(self, *, every: int = 1, interior_every: int = 10, configuration: str = "reference") -> None:
@@ -50,7 +54,7 @@ class Series:
         self._triangles, self._meshes = Triangles(), InteriorMeshes()
         self._time = SeriesTime()
         self._pending: tuple[Cycle, float, bool] | None = None
-        self._last_interior = -1
+        self._last_interior, self._segments_then = -1, 0
 
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()
@@ -80,9 +84,12 @@ class Series:
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
 
     def _interior_wanted(self, cycle: Cycle) -> bool:
-        if not self.interior_every:
+        if not self.interior_every or cycle.number == 0:
             return False
-        return bool(cycle.events) or cycle.number - max(self._last_interior, 0) >= self.interior_every
+        if cycle.events or self._last_interior < 0:
+            return True
+        grew = cycle.cracks.n_segments != self._segments_then
+        return cycle.number - self._last_interior >= self.interior_every * (1 if grew else QUIET)
 
     def _write(self, cycle: Cycle, at: float) -> None:
         motion = Motion.of(cycle.blocks, cycle.state.vertices)
@@ -95,7 +102,7 @@ class Series:
     def _write_interior(self, cycle: Cycle, at: float) -> None:
         motion = Motion.of(cycle.blocks, cycle.state.vertices)
         self._save("interior", cycle, at, self._meshes.grid(cycle, self._materials, motion, self.configuration))
-        self._last_interior = cycle.number
+        self._last_interior, self._segments_then = cycle.number, cycle.cracks.n_segments
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
         file = f"vtk/{name}_{cycle.number:06d}.vtu"

@@ -110,7 +110,9 @@ def moments(run: Run, frames: int) -> list[int]:
     written = np.array(list(run.grids("blocks")))
     grew = set(run.history["cycle"][run.history["growing"] > 0].astype(int))
     growth = np.array([c for c in written if c in grew], dtype=int)
-    loading = np.array([c for c in written if c not in grew], dtype=int)
+    # Before growth, cycles with a stress field of their own tell more than those that borrow an older one.
+    telling = [c for c in run.grids("interior") if c not in grew]
+    loading = np.array(telling if len(telling) > 2 else [c for c in written if c not in grew], dtype=int)
 
     def spread(cycles: np.ndarray, count: int) -> np.ndarray:
         return cycles[np.unique(np.linspace(0, len(cycles) - 1, min(count, len(cycles))).round().astype(int))]
@@ -305,7 +307,15 @@ class _Painter:
             self._filled(blocks.extract_cells(plain))
         if interior is not None:
             self._filled(self._warped(interior, 1.0))
-        edges = blocks.extract_surface(algorithm="dataset_surface").extract_feature_edges(
+        # A solved block is outlined as it deforms, crack faces included; the others by their own straight edges.
+        self._outlined(blocks.extract_cells(~here))
+        if interior is not None:
+            self._outlined(interior)
+
+    def _outlined(self, grid: pv.UnstructuredGrid) -> None:
+        if not grid.n_cells:
+            return
+        edges = grid.extract_surface(algorithm="dataset_surface").extract_feature_edges(
             boundary_edges=True, feature_edges=False, non_manifold_edges=False, manifold_edges=False
         )
         edges.points += (0.0, 0.0, 2.0 * self.metres_per_pixel)
