@@ -17,6 +17,7 @@ import numpy as np
 from .. import dda
 from ..model import TIP, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
 from .compliance import crack_response
+from .path import bend_paths
 from .splitting import split_blocks
 from .tractions import BoundaryLoad, boundary_load
 
@@ -54,6 +55,7 @@ class Coupling:
         self.load_step = 0
         self.bodies: dict[int, object] = {}
         self.solutions: dict[int, object] = {}
+        self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self._take_blocks()
 
@@ -77,7 +79,7 @@ class Coupling:
         for growth_pass in range(self.problem.growth.max_passes + 1):
             self.number += 1
             result, solutions, mismatch = self._equilibrium(dt)
-            tips = self._tips(solutions)
+            tips = self._tips(solutions, self.nodes_of)
             may_grow = growth_pass < self.problem.growth.max_passes
             growth = self._growth(tips) if may_grow and not self._stops(pending) else None
             events = pending
@@ -107,20 +109,19 @@ class Coupling:
                 result = self.system.step(self.state, self.problem.loads, dt, crack=self.response)
             if not self.bodies:
                 return result, {}, {}
-            solutions, loads = self._solve_bodies(result)
+            solutions = self._solve_bodies(result)
             mismatch = self._take_response(result.state, solutions)
             if mismatch < COMPLIANCE_TOLERANCE:
                 break
-        imbalance = max(load.imbalance for load in loads.values())
+        imbalance = max(load.imbalance for load in self.loads.values())
         return result, solutions, {
             "compliance_passes": attempt + 1,
             "compliance_mismatch": mismatch,
             "traction_imbalance": imbalance,
         }
 
-    def _solve_bodies(self, result):
-        from .. import ddm
-
+    def _solve_bodies(self, result) -> dict:
+        """Every body under what the block solver's forces are on it; keeps loads and solutions."""
         loads: dict[int, BoundaryLoad] = {}
         with self._timed("tractions"):
             # Equilibrium holds on the geometry at the start of the step.
@@ -143,22 +144,27 @@ class Coupling:
                     result.acceleration[b],
                     float(result.state.velocity[b, 2]),
                 )
-        solutions = {}
+        self.loads = loads
+        self.solutions = self._solve(self.bodies, loads, self.solutions)
+        return self.solutions
+
+    def _solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
+        from .. import ddm
+
         with self._timed("ddm solve"):
-            for b, body in self.bodies.items():
-                load = loads[b]
-                solutions[b] = body.solve(
+            return {
+                b: body.solve(
                     ddm.BodyLoad(
-                        segments=load.segments,
-                        tractions=load.tractions,
-                        body_force=load.body_force,
-                        body_force_gradient=load.body_force_gradient,
-                        about=load.about,
+                        segments=loads[b].segments,
+                        tractions=loads[b].tractions,
+                        body_force=loads[b].body_force,
+                        body_force_gradient=loads[b].body_force_gradient,
+                        about=loads[b].about,
                     ),
-                    warm=self.solutions.get(b),
+                    warm=warm.get(b),
                 )
-        self.solutions = solutions
-        return solutions, loads
+                for b, body in bodies.items()
+            }
 
     def _edge_tractions(self, now: float) -> dict[int, list[tuple[int, np.ndarray]]]:
         acting: dict[int, list[tuple[int, np.ndarray]]] = {}
@@ -195,7 +201,7 @@ class Coupling:
             known = self.compliances[block] = (body, closed, body.compliance(solution))
         return known[2]
 
-    def _tips(self, solutions: dict) -> np.ndarray:
+    def _tips(self, solutions: dict, nodes_of: dict[int, np.ndarray]) -> np.ndarray:
         """TIP rows of all bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
         if not solutions:
             return np.empty(0, TIP)
@@ -205,7 +211,7 @@ class Coupling:
         rows = []
         for b, solution in solutions.items():
             tips = solution.tips.copy()
-            tips["node"] = self.nodes_of[b][tips["node"]]
+            tips["node"] = nodes_of[b][tips["node"]]
             tips["angle"], tips["k_eq"] = criterion(
                 tips["k_i"], tips["k_ii"], self.problem.materials[self.blocks.material[b]]
             )
@@ -215,14 +221,24 @@ class Coupling:
     # -- growth --------------------------------------------------------------------------------------------------
 
     def _growth(self, tips: np.ndarray):
-        """The new network when some tip has reached its toughness, else None."""
+        """The new network when some tip has reached its toughness, else None. Sets the angles that were followed."""
         k_ic = np.array([self.problem.materials[m].k_ic for m in self.blocks.material[tips["block"]]])
         if not np.any(tips["k_eq"] >= k_ic):
             return None
         from ..ddm.growth import advance
 
-        with self._timed("growth"):
-            growth = advance(self.cracks, self.blocks.loops, tips, self.problem.growth, k_ic, self.number)
+        def grow():
+            with self._timed("growth"):
+                return advance(self.cracks, self.blocks.loops, tips, self.problem.growth, k_ic, self.number)
+
+        growth = grow()
+        # A step that joins something may cut a piece off, on which there is nothing to solve.
+        if self.problem.growth.correct and not growth.joins and np.any(growth.grown > 0):
+            trial, nodes_of = self._bodies_of(growth.cracks, self.bodies)
+            ahead = self._tips(self._solve(trial, self.loads, self.solutions), nodes_of)
+            bend_paths(tips, growth.grown, ahead, growth.cracks, self.number)
+            self.bodies = trial  # most of it is what the corrected step needs
+            growth = grow()
         return growth if np.any(growth.grown > 0) or growth.joins else None
 
     def _initiations(self, tips: np.ndarray, state: State) -> tuple[Event, ...]:
@@ -308,25 +324,29 @@ class Coupling:
         self._take_bodies()
 
     def _take_bodies(self) -> None:
-        """(Re)build the elastic bodies of the blocks that hold cracks, keeping what has not changed."""
-        cracked = np.unique(self.cracks.block)
+        """The elastic bodies of the present cracks, keeping what has not changed."""
+        self.bodies, self.nodes_of = self._bodies_of(self.cracks, self.bodies)
+
+    def _bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
+        """block → body of every block that holds ``cracks``, and block → its nodes in the whole network."""
+        cracked = np.unique(cracks.block)
         if not len(cracked):
-            self.bodies = {}
-            return
+            return {}, {}
         from .. import ddm
 
-        kept, self.bodies, self.nodes_of = self.bodies, {}, {}
+        bodies, nodes_of = {}, {}
         with self._timed("ddm assembly"):
             for b in cracked.tolist():
-                segments = np.flatnonzero(self.cracks.block == b)
-                self.nodes_of[b] = np.unique(self.cracks.segments[segments])
-                self.bodies[b] = ddm.Body(
+                segments = np.flatnonzero(cracks.block == b)
+                nodes_of[b] = np.unique(cracks.segments[segments])
+                bodies[b] = ddm.Body(
                     self.blocks.loops(b),
-                    self.cracks.take(segments),
+                    cracks.take(segments),
                     self.problem.materials[self.blocks.material[b]],
                     self.problem.ddm,
                     previous=kept.get(b),
                 )
+        return bodies, nodes_of
 
     # -- records -------------------------------------------------------------------------------------------------
 

@@ -18,6 +18,9 @@ from numba import njit
 from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .contact_springs import Springs
+#: After this many iterations only the worst contacts of each block are switched: opened all at once, the contacts of a block
+#: let it fly, to be closed all at once in the next iteration.
+_ALL_AT_ONCE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +128,15 @@ def check_states(unknowns, block, other, order, vectors, partner, state, directi
     return forces, new_state, new_direction, new_bonded, violation
 
 
+def _worst_of_their_blocks(violation: np.ndarray, block: np.ndarray, other: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """(n,) True for contacts about as violated as any other contact of either of their free blocks."""
+    worst = np.zeros(len(order))
+    np.maximum.at(worst, block, violation)
+    np.maximum.at(worst, other, violation)
+    worst[order < 0] = 0.0
+    return violation >= 0.5 * np.maximum(worst[block], worst[other])
+
+
 def settle(
     pattern: assembly.Pattern,
     matrix: np.ndarray,
@@ -183,6 +195,8 @@ def settle(
             patience += 1
             seen.clear()
         seen.add(mark)
+        if patience == 0 and iteration > _ALL_AT_ONCE:
+            wrong &= _worst_of_their_blocks(violation, block, other, pattern.order)
         if patience == 1:
             wrong &= violation >= 0.5 * violation[worst]
         elif patience == 2:

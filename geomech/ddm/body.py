@@ -27,6 +27,8 @@ from .validity import check_cracks, check_outline
 
 #: A load segment may stand this far off the boundary, in units of the extent; it is put onto it.
 _OFF = 1e-6
+#: Reciprocal condition of S below which contact is not built on its inverse.
+_SAFE = 1e-11
 
 
 class Body:
@@ -117,7 +119,9 @@ class Body:
 
         self._schur = reuse(old._schur if same_boundary else None, c_old, c_old, c, c, schur)
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
-        self._segments: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+        self._column_at = np.full(c.n_unknowns, -1)
+        self._columns = np.empty((c.n_unknowns, 0))
+        self._segments: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray, bool]] = {}
         self._edge_forces: tuple[np.ndarray, np.ndarray] | None = None
         self._recent: list[bytes] = []
         if same_boundary and old._recent:
@@ -307,6 +311,49 @@ class Body:
         return self._factors[key]
 
     @cached_property
+    def _open_factor(self) -> Factor | None:
+        """Factors of S with all faces open; None when only closed faces hold a part of the body."""
+        try:
+            factor = Factor(self._schur, "cracks cut a part of the body off")
+        except np.linalg.LinAlgError:
+            return None
+        return factor if factor.rcond > _SAFE else None
+
+    def _inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n_unknowns, len(unknowns)) columns of S⁻¹; they outlast the load."""
+        missing = unknowns[self._column_at[unknowns] < 0]
+        if len(missing):
+            right = np.zeros((self.faces.n_unknowns, len(missing)), order="F")
+            right[missing, np.arange(len(missing))] = 1.0
+            self._column_at[missing] = self._columns.shape[1] + np.arange(len(missing))
+            self._columns = np.hstack([self._columns, self._open_factor.solve(right)])
+        return self._columns[:, self._column_at[unknowns]]
+
+    def constrained(self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jumps w (n,) or (n, k) with w = ``fixed`` where ``closed``, S w = ``right`` elsewhere, and what is missing in
+        the closed rows, right − S w.
+
+        One factorisation serves all contact states: closing k nodes is a k × k system in columns of S⁻¹. Raises
+        LinAlgError when cracks cut a part off and closed faces do not hold it.
+        """
+        at = np.flatnonzero(closed)
+        reaction = np.zeros_like(right)
+        if self._open_factor is not None:
+            w = self._open_factor.solve(right)
+            if len(at):
+                columns = self._inverse_columns(at)
+                reaction[at] = np.linalg.solve(columns[at], w[at] - fixed[at])
+                w = w - columns @ reaction[at]
+                w[at] = fixed[at]
+            return w, reaction
+        free, factor = self._free_factor(closed)
+        w = np.zeros_like(right)
+        w[at] = fixed[at]
+        w[free] = factor.solve((right - self._schur @ w)[free])
+        reaction[at] = (right - self._schur @ w)[at]
+        return w, reaction
+
+    @cached_property
     def strain_weights(self) -> np.ndarray:
         """(3, n_unknowns) mean strain of the cracks from nodal slip and opening (times 2μ)."""
         c = self.faces
@@ -325,9 +372,8 @@ class Body:
         if not self.faces.n:
             return np.zeros((3, 3))
         closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
-        free, factor = self._free_factor(closed)
-        right = np.column_stack([-self._uniform_on_faces(unit)[free] for unit in np.eye(3)])
-        response = self.strain_weights[:, free] @ factor.solve(right)
+        right = np.column_stack([-self._uniform_on_faces(unit) for unit in np.eye(3)])
+        response = self.strain_weights @ self.constrained(right, closed, np.zeros_like(right))[0]
         return 0.5 * (response + response.T)
 
 

@@ -48,13 +48,9 @@ def settle_faces(
     state: dict[str, np.ndarray] = {}
 
     def respond(closed):
-        free, factor = body._free_factor(closed)
-        w = np.where(closed, fixed, 0.0)
-        known = right if not closed.any() else right - body._schur @ w
-        w[free] = factor.solve(known[free])
-        traction = body._schur @ w + load_traction
-        state["w"], state["traction"] = w, traction
-        return (w + np.where(can_close, aperture, 0.0)) / gap_scale, (applied.ravel() - traction) / stress_scale
+        w, reaction = body.constrained(right, closed, fixed)
+        state["w"], state["traction"] = w, applied.ravel() - reaction
+        return (w + np.where(can_close, aperture, 0.0)) / gap_scale, reaction / stress_scale
 
     closed = np.zeros(n, bool)
     if not can_close.any():
@@ -173,8 +169,9 @@ class Solution:
     @cached_property
     def condition(self) -> float:
         """Estimated condition number of the matrices solved with, the worse one."""
-        _, factor = self.body._free_factor(self.closed) if self.body.faces.n else (None, self.body._gg_factor)
-        return 1.0 / min(factor.rcond, self.body._gg_factor.rcond)
+        body = self.body
+        factor = body._open_factor or body._free_factor(self.closed)[1]
+        return 1.0 / min(factor.rcond, body._gg_factor.rcond)
 
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.

@@ -55,6 +55,7 @@ class GrowthSettings:
     min_increment: float = 1e-4
     join_distance: float = 0.5  # in units of the increment: nearer than that to a crack or surface, a tip joins it
     max_passes: int = 200  # growth passes at one load
+    correct: bool = True  # predict a step, look how it would go on, and bend it (second order in the increment)
 
 
 @dataclass(frozen=True)

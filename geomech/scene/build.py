@@ -176,6 +176,7 @@ def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
         min_increment=0.1 * increment if g.min_increment_m is None else g.min_increment_m,
         join_distance=g.join_distance,
         max_passes=g.max_passes,
+        correct=g.correct,
     )
 
 

@@ -249,6 +249,9 @@ class GrowthTable(Table):
         0.5, description="nearer than this to a crack or a surface a tip joins it, in units of the increment"
     )
     max_passes: Annotated[int, Field(ge=1)] = Field(200, description="growth passes at one load")
+    correct: bool = Field(
+        True, description="predict each step, then bend it towards where it would go on: paths of second order"
+    )
 
 
 class RunTable(Table):
