@@ -1,0 +1,73 @@
+"""Closed forms for moving blocks: falling, sliding, spinning, vibrating, standing in columns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+
+def free_fall(time: np.ndarray, gravity: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Displacement (..., 2) m of a body thrown with ``velocity`` (2,) m/s under ``gravity`` (2,) m/s²: v t + g t²/2.
+
+    Galileo (1638), Discorsi, fourth day.
+    """
+    t = np.asarray(time, dtype=float)[..., None]
+    return t * np.asarray(velocity) + 0.5 * t**2 * np.asarray(gravity)
+
+
+def incline_acceleration(incline: float, friction_angle: float, gravity: float = 9.81) -> float:
+    """Acceleration (m/s²) down an ``incline`` (rad) of a block from rest: g (sin α − cos α tan φ), 0 while φ ≥ α.
+
+    Coulomb (1785); used for DDA by MacLaughlin & Sitar (1995) and by MacLaughlin & Doolin (2006), who review it.
+    """
+    if friction_angle >= incline:
+        return 0.0
+    return gravity * (math.sin(incline) - math.cos(incline) * math.tan(friction_angle))
+
+
+def stopping_distance(speed: float, friction_angle: float, gravity: float = 9.81) -> float:
+    """v²/(2 g tan φ), m: how far a block pushed at ``speed`` on level ground slides (work against Coulomb friction)."""
+    return speed**2 / (2 * gravity * math.tan(friction_angle))
+
+
+def shi_amplification(omega_dt: float) -> np.ndarray:
+    """(2, 2) what Shi's (1988) time step does to (x, v dt) of an undamped oscillator, Ω = ω dt.
+
+    d = v dt + a dt²/2 and v' = v + a dt with a = −ω²(x + d): Newmark's (1959) scheme with β = ½, γ = 1. Its determinant,
+    the squared modulus of the complex pair for Ω < 4, is 1/(1 + Ω²/2).
+    """
+    o = omega_dt**2
+    return np.array([[2.0, 2.0], [-2.0 * o, 2.0 - o]]) / (2.0 + o)
+
+
+def square_block_frequency(side: float, youngs_modulus: float, density: float) -> float:
+    """ω (rad/s) of the stretching of a free first-order square block with ν = 0: ω² = E A/(ρ ∫x²) = 12 E/(ρ w²)."""
+    return math.sqrt(12 * youngs_modulus / density) / side
+
+
+def spinning_square_stress(side: float, density: float, spin: float) -> float:
+    """Mean normal stress (Pa, both directions) of a square spinning at ``spin`` rad/s: ρω²w²/12.
+
+    The virial of the centrifugal force, (1/A) ∫ ρω²x² dA; exact for any linear elastic square.
+    """
+    return density * spin**2 * side**2 / 12
+
+
+def column_shortening(
+    load: np.ndarray, height: float, width: float, plane_modulus: float, contact_stiffness: float
+) -> float:
+    """Shortening (m) of a column of equal blocks, block k carrying the mean force ``load[k]`` (N/m), and of the
+    contacts under each block, which carry ``load[k]`` too if the load stands at its end: Σ F h/(w E') + Σ F/(2 p).
+
+    Hooke's law with the plane modulus E/(1−ν²) for free lateral expansion in plane strain; two springs p a joint.
+    """
+    load = np.asarray(load, dtype=float)
+    return float(np.sum(load * height / (width * plane_modulus)) + np.sum(load) / (2 * contact_stiffness))
+
+
+def plastic_impact_bounds(masses: tuple[float, float], speeds: tuple[float, float]) -> tuple[float, float]:
+    """(total momentum, least kinetic energy) of two bodies that meet head on: Newton (1687); the least is the plastic case."""
+    m, v = np.asarray(masses), np.asarray(speeds)
+    momentum = float(m @ v)
+    return momentum, momentum**2 / (2 * float(m.sum()))
