@@ -99,23 +99,22 @@ class Body:
             self._gg_factor = Factor(bordered, "the boundary equations are singular")
             self.counts["boundary_assemblies"] = self.counts["boundary_factorisations"] = int(g.n > 0)
         self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, block(c, g))
-        self._cc = reuse(old._cc if old else None, c_old, c_old, c, c, block(c, c))
-        gc = reuse(old._gc if old else None, g_old, c_old, g, c, block(g, c))
-        self._gc = gc
-        # W = A_ΓΓ⁻¹ A_ΓC, column by column of the new elements; S row and column alike.
+        # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
+        # make again, should the boundary change, than to carry along.
         everything = np.arange(g.n)
+        gc = block(g, c)
         self._w = reuse(
             old._w if same_boundary else None,
             everything,
             c_old,
             g,
             c,
-            lambda r, k: self._gg_factor.solve(np.asfortranarray(gc[:, c.unknowns(k)])),
+            lambda r, k: self._gg_factor.solve(np.asfortranarray(gc(everything, k))),
         )
+        cc = block(c, c)
 
         def schur(r, k):
-            rows, columns = c.unknowns(r), c.unknowns(k)
-            return self._cc[np.ix_(rows, columns)] - self._cg[rows] @ self._w[:, columns]
+            return cc(r, k) - self._cg[c.unknowns(r)] @ self._w[:, c.unknowns(k)]
 
         self._schur = reuse(old._schur if same_boundary else None, c_old, c_old, c, c, schur)
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}

@@ -160,8 +160,11 @@ class Solution:
     def residual(self) -> float:
         """Largest traction left over at the collocation nodes, relative to the largest applied there."""
         body = self.body
-        on_boundary = body._gg @ self._u + body._gc @ self._w + self._boundary_load
-        on_faces = body._cg @ self._u + body._cc @ self._w + self._face_load - self._traction
+        # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
+        follows = body._w @ self._w if self._w.size else np.zeros_like(self._u)
+        lifted = body._rigid @ (body._rigid_weights @ follows) / body._extent
+        on_boundary = body._gg @ (self._u + follows) + lifted + self._boundary_load
+        on_faces = body._schur @ self._w + body._cg @ (self._u + follows) + self._face_load - self._traction
         scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
         return left / scale if scale else left
