@@ -87,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("run", type=Path, metavar="RUN", help="run folder")
     render.add_argument("--out", type=Path, metavar="DIR", help="where the pictures go (default RUN/pictures)")
     render.add_argument("--component", metavar="NAME", 
-                        help="stress to fill with: xx, yy, zz, xy, principal_max, principal_min, von_mises")  # fmt: skip
+                        help="stress: xx, yy, zz, xy, principal_max, principal_min or von_mises")  # fmt: skip
     render.add_argument("--width", type=int, metavar="PX", help="width of the pictures")
     render.add_argument("--gif", action=argparse.BooleanOptionalAction, default=None, help="draw the movie")
 
@@ -167,7 +167,7 @@ def _variants(scene: Any, asked: Sequence[str]) -> list[str]:
 
 
 def default_folder(scene: Path) -> Path:
-    """``outputs/NAME`` below the working folder: NAME is the pipeline's folder, or the file's own name without suffix."""
+    """``outputs/NAME`` below the working folder: NAME is the pipeline's folder, or the file's name without suffix."""
     scene = scene.resolve()
     return Path("outputs") / (scene.parent.name if scene.name == "scene.toml" else scene.stem)
 

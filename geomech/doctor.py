@@ -133,7 +133,7 @@ def _numba() -> Check:
     if done.returncode == 0:
         return Check("numba cache", True, done.stdout.strip())
     last = (done.stderr.strip().splitlines() or ["?"])[-1]
-    return Check("numba cache", False, last, "export NUMBA_CACHE_DIR=$HOME/.cache/geomech (kernels compile anew every time)")
+    return Check("numba cache", False, last, "export NUMBA_CACHE_DIR=$HOME/.cache/geomech")
 
 
 def _rendering() -> Check:
@@ -141,7 +141,7 @@ def _rendering() -> Check:
 
     window = usable_window()
     if window is None:
-        return Check("rendering", False, "VTK can open no off-screen window: no pictures, everything else works", APT_LINE)
+        return Check("rendering", False, "no off-screen window: no pictures, all else works", APT_LINE)
     return Check("rendering", True, window)
 
 

@@ -116,7 +116,8 @@ def test_check_lists_the_keys(scene, capsys):
 
 
 def test_bad_scene_ends_with_2_and_all_its_errors(scene, capsys):
-    scene.write_text(SPECIMEN.replace("poissons_ratio = 0.21", "poissons_ratio = 0.7").replace("[run]", "[run]\nfast = true"))
+    wrong = SPECIMEN.replace("poissons_ratio = 0.21", "poissons_ratio = 0.7").replace("[run]", "[run]\nfast = true")
+    scene.write_text(wrong)
     assert main(["check", str(scene)]) == BAD_INPUT
     told = capsys.readouterr().err
     assert "poissons_ratio" in told
@@ -155,7 +156,11 @@ def test_run_hands_scene_folder_and_observers_over(scene, tmp_path, monkeypatch)
     import geomech.pipeline
 
     ran = []
-    monkeypatch.setattr(geomech.pipeline, "run", lambda scene, out, observers: ran.append((scene.title, out, len(observers))))
+
+    def runs(scene, out, observers):
+        ran.append((scene.title, out, len(observers)))
+
+    monkeypatch.setattr(geomech.pipeline, "run", runs)
     out = tmp_path / "out"
     assert main(["run", str(scene), "--out", str(out), "--quiet"]) == DONE
     assert main(["run", str(scene), "--out", str(out), "--variant", "steep"]) == DONE
@@ -187,8 +192,8 @@ def test_pipeline_folder_runs_its_script(tmp_path):
         "def main(folder, out, overrides, variants, quiet):\n"
         "    (folder / 'said.txt').write_text(repr((out.name, overrides, variants, quiet)))\n"
     )
-    arguments = ["run", str(tmp_path / "study"), "--out", str(tmp_path / "o"), "--set", "a.b=1", "--variant", "x", "--quiet"]
-    assert main(arguments) == DONE
+    wishes = ["--out", str(tmp_path / "o"), "--set", "a.b=1", "--variant", "x", "--quiet"]
+    assert main(["run", str(tmp_path / "study"), *wishes]) == DONE
     assert (tmp_path / "study" / "said.txt").read_text() == repr(("o", ["a.b=1"], ["x"], True))
 
 

@@ -1,6 +1,7 @@
 """What a run leaves behind: ParaView series, histories, a summary, a log; and how to read it back.
 
-Everything here watches the cycles of a run from outside (`Observer`) and knows the solvers only by `geomech.model.Cycle`.
+Everything here watches the cycles of a run from outside (`Observer`) and knows the solvers only by
+`geomech.model.Cycle`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,18 @@ from .record import RunLog, SceneCopy
 from .series import Series
 from .summary import Summary
 
-__all__ = ["Group", "Histories", "Observer", "Progress", "Run", "RunLog", "SceneCopy", "Series", "Summary", "standard_observers"]
+__all__ = [
+    "Group",
+    "Histories",
+    "Observer",
+    "Progress",
+    "Run",
+    "RunLog",
+    "SceneCopy",
+    "Series",
+    "Summary",
+    "standard_observers",
+]
 
 
 def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:

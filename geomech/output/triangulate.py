@@ -26,7 +26,8 @@ class Triangles:
             key = b"".join(loop.tobytes() + b"|" for loop in loops)
             triangles = self._known.get(key)
             if triangles is None:
-                triangles = _fan(loops[0]) if len(loops) == 1 and _convex(loops[0]) else _delaunay(loops, blocks.names[b])
+                simple = len(loops) == 1 and _convex(loops[0])
+                triangles = _fan(loops[0]) if simple else _delaunay(loops, blocks.names[b])
             known[key] = triangles
             cells.append(triangles + blocks.vertex_start[b])
             owner.append(np.full(len(triangles), b))

@@ -25,8 +25,9 @@ def draw(
     What is not said here the scene's ``[render]`` table says, and where that is silent too, stress yy, 800 pixels and a
     movie. Raises ValueError for a run without a cycle, KeyError for an unknown stress component, RenderingUnavailable
     where VTK can open no window."""
-    from .picture import look, picture
-    from .picture import movie as draw_movie
+    from .look import look
+    from .movie import movie as draw_movie
+    from .picture import picture
     from .plots import plots
 
     if not len(run.history):

@@ -126,7 +126,7 @@ def cycle(number: int, load_step: int, growth_pass: int, grown: int, *, turn: fl
         row["gap"], row["slip"], row["length"] = -1e-9 * k, 1e-6 * k, 0.03
     tips = np.zeros(len(network.tips), TIP)
     for k, node in enumerate(network.tips):
-        out = np.array([0.0, -1.0 if k == 0 else 1.0]) if grown else (1 if k else -1) * np.array([1.0, 1.0]) / math.sqrt(2)
+        out = (1.0 if k else -1.0) * (np.array([0.0, 1.0]) if grown else np.array([1.0, 1.0]) / math.sqrt(2))
         k_i, k_ii = -0.0626 * load, -0.0586 * load
         row = tips[k]
         row["node"], row["block"], row["point"], row["direction"] = node, 1, network.nodes[node], out

@@ -162,7 +162,8 @@ def test_interior_is_the_bodys_field_on_the_blocks_motion(tmp_path):
     # and the nodes on crack faces are looked at 1e-6 of their triangle aside.
     assert np.allclose(mesh.points[:, :2] + mesh["displacement"][:, :2], expected, rtol=0, atol=1e-8)
     # Uniaxial stress turned with the block: R σ Rᵀ of σyy = −load.
-    assert np.allclose(mesh["stress"][:, [0, 1, 3]], np.array([-s * s, -c * c, s * c]) * load, rtol=1e-6, atol=load * 1e-6)
+    turned = np.array([-s * s, -c * c, s * c]) * load
+    assert np.allclose(mesh["stress"][:, [0, 1, 3]], turned, rtol=1e-6, atol=load * 1e-6)
     assert np.allclose(mesh["von_mises"], load * math.sqrt(1 - 0.21 + 0.21**2), rtol=1e-6)
 
 
@@ -224,9 +225,8 @@ def test_collection_refuses_a_time_that_goes_back(tmp_path):
 
 def test_nothing_to_show_still_makes_valid_files(tmp_path):
     """No cracks, no tips, no contacts, no solved body: every file opens in both readers, with all its arrays."""
-    cycle = replace(
-        made.cycle(0, 1, 0, 0, contacts=0), cracks=Cracks.from_polylines([]), tips=np.zeros(0, TIP), faces=None, bodies={}
-    )
+    bare = {"cracks": Cracks.from_polylines([]), "tips": np.zeros(0, TIP), "faces": None, "bodies": {}}
+    cycle = replace(made.cycle(0, 1, 0, 0, contacts=0), **bare)
     written_alone(tmp_path, cycle)
     for name in ("cracks", "tips", "contacts"):
         file = last_file(tmp_path, name)

@@ -11,7 +11,9 @@ import synthetic_run as made
 
 from geomech.output import Histories, Run, Series, Summary
 from geomech.render import draw, offscreen
-from geomech.render.picture import COMPONENTS, _ticks, look, moments, picture
+from geomech.render.look import COMPONENTS, look, values
+from geomech.render.movie import moments
+from geomech.render.picture import _ticks, picture
 from geomech.render.plots import plots
 
 imageio = pytest.importorskip("imageio.v3")
@@ -25,7 +27,8 @@ def drawn(drawn_run, tmp_path_factory):
 
 
 def test_everything_is_drawn_at_the_scenes_width(drawn):
-    assert list(drawn) == ["specimen.png", "growth.gif", "stress_strain.png", "stress_intensity.png", "crack_length.png"]
+    curves = ["stress_strain.png", "stress_intensity.png", "crack_length.png"]
+    assert list(drawn) == ["specimen.png", "growth.gif", *curves]
     image = imageio.imread(drawn["specimen.png"])
     assert image.shape[1] == 500
     assert (image[:3] == 255).all()  # white margins
@@ -91,9 +94,8 @@ def test_a_scene_without_cracks_and_interior_is_drawn(tmp_path):
 
     from geomech.model import TIP, Cracks
 
-    cycle = replace(
-        made.cycle(0, 5, 0, 0, contacts=0), cracks=Cracks.from_polylines([]), tips=np.zeros(0, TIP), faces=None, bodies={}
-    )
+    bare = {"cracks": Cracks.from_polylines([]), "tips": np.zeros(0, TIP), "faces": None, "bodies": {}}
+    cycle = replace(made.cycle(0, 5, 0, 0, contacts=0), **bare)
     for watch in (watchers := [Histories(), Series(configuration="current"), Summary()]):
         watch.on_start(made.problem(), tmp_path)
         watch.on_cycle(cycle)
@@ -112,15 +114,12 @@ def test_opening_can_colour_the_cracks(drawn_run, tmp_path):
 
 @pytest.mark.parametrize("component", COMPONENTS)
 def test_every_component_has_values(drawn_run, component):
-    from geomech.render.picture import _values
-
     for name in ("interior", "blocks"):
-        values = _values(drawn_run.grid(name, 9), component)
-        assert np.isfinite(values).all()
+        assert np.isfinite(values(drawn_run.grid(name, 9), component)).all()
     # Uniaxial: von Mises in plane strain is σ √(1 − ν + ν²).
     if component == "von_mises":
         grid = drawn_run.grid("interior", 9)
-        assert np.allclose(_values(grid, component), np.asarray(grid["von_mises"]) / 1e6, rtol=1e-5)
+        assert np.allclose(values(grid, component), np.asarray(grid["von_mises"]) / 1e6, rtol=1e-5)
 
 
 def test_ticks_are_round_and_inside():
