@@ -4,8 +4,8 @@ A set of states makes the step linear; its solution is checked against them. A c
 tensile strength, an open one must not penetrate, a sticking one must hold less than its strength μN + cℓ, and a sliding
 one would carry more than μN if it stuck (the return mapping of an elastic-plastic spring, under which exactly one of the
 states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves cases in which none does). Every contact that fails is switched and the step solved again. If a combination of
-states returns, only the worst half of the violations is switched, and if it still returns, only the first (the
-least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
+states returns, the sliding contacts stick again and only the worst contact of each block is switched, and if one still
+returns, only the first (the least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
 """
 
 from __future__ import annotations
@@ -128,13 +128,15 @@ def check_states(unknowns, block, other, order, vectors, partner, state, directi
     return forces, new_state, new_direction, new_bonded, violation
 
 
-def _worst_of_their_blocks(violation: np.ndarray, block: np.ndarray, other: np.ndarray, order: np.ndarray) -> np.ndarray:
-    """(n,) True for contacts about as violated as any other contact of either of their free blocks."""
+def _worst_of_their_blocks(
+    violation: np.ndarray, block: np.ndarray, other: np.ndarray, order: np.ndarray, share: float
+) -> np.ndarray:
+    """(n,) True for contacts at least ``share`` times as violated as any other contact of either of their free blocks."""
     worst = np.zeros(len(order))
     np.maximum.at(worst, block, violation)
     np.maximum.at(worst, other, violation)
     worst[order < 0] = 0.0
-    return violation >= 0.5 * np.maximum(worst[block], worst[other])
+    return violation >= share * np.maximum(worst[block], worst[other])
 
 
 def settle(
@@ -194,11 +196,16 @@ def settle(
         if mark in seen and patience < 2:
             patience += 1
             seen.clear()
+            if patience == 1:
+                # A body held by sliding contacts alone has nothing but its inertia against the least imbalance: begin
+                # again from sticking, and let only the contact that is worst off slide.
+                state = np.where((state == SLIP) & (springs.friction > 0), STICK, state)
+                continue
         seen.add(mark)
         if patience == 0 and iteration > _ALL_AT_ONCE:
-            wrong &= _worst_of_their_blocks(violation, block, other, pattern.order)
+            wrong &= _worst_of_their_blocks(violation, block, other, pattern.order, 0.5)
         if patience == 1:
-            wrong &= violation >= 0.5 * violation[worst]
+            wrong &= _worst_of_their_blocks(violation, block, other, pattern.order, 1.0)
         elif patience == 2:
             wrong[int(wrong.argmax()) + 1 :] = False
         state = np.where(wrong, new_state, state)

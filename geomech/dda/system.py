@@ -27,8 +27,9 @@ _BLOCK_SHARE = 0.1
 _SLACK = 1e-14
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
-#: Loads on a lone block whose resultant is below this part of their size are in balance.
-_BALANCE = 1e-9
+#: Loads on a lone block whose resultant is below this part of their size are in balance: it strains by less, and loads
+#: that balance on the undeformed block miss by about its strain on the deformed one.
+_BALANCE = 1e-2
 _UNKNOWN = -2
 _NEVER = -1
 

@@ -1,0 +1,109 @@
+"""Which contacts are found: every arrangement's set is known by inspection."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geomech.dda.contact_search import describe_contacts, find_contacts
+from geomech.model import Blocks
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
+
+
+def search(polygons, window=0.05, turn=0.0, fixed=None):
+    blocks = Blocks.from_polygons(polygons, fixed=fixed)
+    c, s = np.cos(turn), np.sin(turn)
+    v = blocks.vertices @ np.array([[c, s], [-s, c]])
+    next_, previous = blocks.next_vertex.astype(np.int64), blocks.previous_vertex.astype(np.int64)
+    start, fixed = blocks.vertex_start.astype(np.int64), np.asarray(blocks.fixed, bool)
+    none = np.empty(0, np.int64)
+    table = find_contacts(v, next_, previous, start, fixed, window, none)
+    geometry, mate, parent = describe_contacts(table, v, next_, previous, window, none, none, np.empty((0, 2)), none)
+    return table, geometry, mate
+
+
+def pairs(table) -> set[tuple[int, int]]:
+    return {(int(v), int(e)) for v, e in table[:, :2]}
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.7, 3.1, -2.0])
+def test_equal_widths_meet_in_two_contacts_not_four(turn):
+    table, geometry, _ = search([rectangle(0, 0, 2, 1), rectangle(0, 1, 2, 2)], turn=turn)
+    assert len(table) == 2
+    assert sorted(geometry[:, 4]) == pytest.approx([1.0, 1.0])  # half the face each
+    assert geometry[:, 3] == pytest.approx([0, 0], abs=1e-14)
+    assert (table[:, 2:] == -1).all()
+
+
+def test_a_narrow_block_on_a_wide_one_brings_its_own_corners():
+    table, geometry, mate = search([rectangle(0, 0, 4, 1), rectangle(1, 1, 2, 2)])
+    assert pairs(table) == {(4, 2), (5, 2)}
+    assert geometry[:, 4] == pytest.approx([0.5, 0.5])
+    assert set(mate.tolist()) == {4}
+
+
+def test_a_wide_block_on_a_narrow_one_is_touched_by_its_corners():
+    table, _, _ = search([rectangle(1, 0, 2, 1), rectangle(0, 1, 4, 2)])
+    assert pairs(table) == {(2, 4), (3, 4)}
+
+
+def test_a_block_in_a_reentrant_corner_touches_both_walls():
+    corner = np.array([[0, 0], [4, 0], [4, 1], [1, 1], [1, 3], [0, 3.0]])
+    table, _, _ = search([corner, rectangle(1, 1, 2, 2)])
+    # Lower left corner on floor (edge 2) and wall (edge 3), lower right on the floor, upper left on the wall.
+    assert pairs(table) == {(6, 2), (6, 3), (7, 2), (9, 3)}
+    assert (table[:, 2:] == -1).all()
+
+
+def test_corner_over_corner_offers_two_lines_as_partners():
+    table, geometry, _ = search([rectangle(0, 0, 1, 1), rectangle(1.01, 1.02, 2, 2)])
+    assert len(table) == 2
+    assert table[0, 2] == 1 and table[1, 2] == 0
+    assert sorted(geometry[:, 3]) == pytest.approx([0.01, 0.02])
+
+
+def test_bricks_in_running_bond():
+    table, geometry, _ = search([rectangle(0, 0, 1, 1), rectangle(1, 0, 2, 1), rectangle(0.5, 1, 1.5, 2)])
+    # Two contacts between the lower bricks; the upper brick rests on each with its corner and on their upper corners.
+    on_top = table[(table[:, 0] >= 8) | (table[:, 1] >= 8)]
+    assert len(table) == 6 and len(on_top) == 4
+    assert sorted(geometry[:, 4]) == pytest.approx([0.25, 0.25, 0.25, 0.25, 0.5, 0.5])
+
+
+def test_nothing_is_found_beyond_the_window_or_between_fixed_blocks():
+    far = [rectangle(0, 0, 1, 1), rectangle(0, 1.2, 1, 2)]
+    assert len(search(far)[0]) == 0
+    assert len(search(far, window=0.3)[0]) == 2
+    touching = [rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)]
+    assert len(search(touching, fixed=[True, True])[0]) == 0
+
+
+def test_a_face_split_by_a_flat_node_keeps_its_length():
+    lower = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [0, 1.0]])
+    upper = np.array([[0, 1], [1, 1], [2, 1], [2, 2], [0, 2.0]])
+    table, geometry, _ = search([lower, upper])
+    assert len(table) == 3
+    assert geometry[:, 4].sum() == pytest.approx(2.0)
+
+
+def test_many_blocks_agree_with_testing_every_pair():
+    # The sweep over sorted boxes against the same narrow phase run on each pair of blocks alone.
+    rng = np.random.default_rng(3)
+    polygons = []
+    for row in range(6):
+        for column in range(6):
+            angle = np.sort(rng.uniform(0, 2 * np.pi, 3)) + 2 * np.pi * np.arange(3) / 3 / 4
+            polygons.append(np.array([column, row]) + 0.62 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    together = search(polygons, window=0.1)[0]
+    blocks = Blocks.from_polygons(polygons)
+    alone = set()
+    for a in range(len(polygons)):
+        for b in range(a + 1, len(polygons)):
+            for v, e in search([polygons[a], polygons[b]], window=0.1)[0][:, :2]:
+                new = [blocks.vertex_start[a] + v if v < 3 else blocks.vertex_start[b] + v - 3 for v in (v, e)]
+                alone.add((int(new[0]), int(new[1])))
+    assert len(alone) >= 15
+    assert pairs(together) == alone
