@@ -43,28 +43,28 @@ def run_problem(problem: Problem, folder: Path, observers: Iterable[Any]) -> dic
     began = time.perf_counter()
     group = Group(observers)
     summary: dict[str, Any] = {"title": problem.title}
-    last: Cycle | None = None
+    stopping: list[str] = []
     error: BaseException | None = None
     try:
         group.on_start(problem, folder)
-        for last in coupled(problem):
-            group.on_cycle(last)
+        for cycle in coupled(problem):
+            stopping += [event.kind for event in cycle.events if event.kind in problem.run.stop_at]
+            group.on_cycle(cycle)
     except BaseException as failure:
         error = failure
         raise
     finally:
-        summary["end"] = _end_reason(problem, last, error)
+        summary["end"] = _end_reason(stopping, error)
         summary["wall_s"] = time.perf_counter() - began
         group.on_end(summary, error)
     return summary
 
 
-def _end_reason(problem: Problem, last: Cycle | None, error: BaseException | None) -> str:
+def _end_reason(stopping: list[str], error: BaseException | None) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted"
     if error is not None:
         return f"failed: {error}"
-    stopping = [event.kind for event in last.events if event.kind in problem.run.stop_at]
     return stopping[0] if stopping else "end of the scene"
 
 

@@ -53,6 +53,7 @@ class Coupling:
         self.seconds: dict[str, float] = {}
         self.number = 0
         self.load_step = 0
+        self.known_motion: tuple[State, Motion] | None = None
         self.bodies: dict[int, object] = {}
         self.solutions: dict[int, object] = {}
         self.loads: dict[int, BoundaryLoad] = {}
@@ -76,16 +77,18 @@ class Coupling:
         """All passes at one load. Returns True when a stop event happened."""
         dt = min(self.problem.dda.time_step, self.problem.run.end_time - self.state.time)
         pending: tuple[Event, ...] = ()
+        stops = False
         for growth_pass in range(self.problem.growth.max_passes + 1):
             self.number += 1
             result, solutions, mismatch = self._equilibrium(dt)
             tips = self._tips(solutions, self.nodes_of)
             may_grow = growth_pass < self.problem.growth.max_passes
-            growth = self._growth(tips) if may_grow and not self._stops(pending) else None
-            events = pending
+            events, stops = pending, stops or self._stops(pending)
+            growth = self._growth(tips) if may_grow and not stops else None
             if growth is not None:
                 tips["grown"] = growth.grown
                 events += self._initiations(tips, result.state)
+                stops = self._stops(events)
             statistics = {**result.statistics, **mismatch}
             yield self._record(result.state, tips, solutions, events, growth_pass, statistics)
             if growth is None:
@@ -96,7 +99,7 @@ class Coupling:
                         growth_pass,
                     )
                 self.state = result.state
-                return self._stops(events)
+                return stops
             pending = self._take_growth(growth, result, solutions)
         raise AssertionError("unreachable: the last pass takes no growth")
 
@@ -125,7 +128,7 @@ class Coupling:
         loads: dict[int, BoundaryLoad] = {}
         with self._timed("tractions"):
             # Equilibrium holds on the geometry at the start of the step.
-            motion = Motion.of(self.blocks, self.state.vertices)
+            motion = self._motion(self.state)
             now = result.state.time
             gravity = self.problem.loads.gravity.at(now)
             tractions = self._edge_tractions(now)
@@ -351,7 +354,7 @@ class Coupling:
     # -- records -------------------------------------------------------------------------------------------------
 
     def _record(self, state, tips, solutions, events, growth_pass, statistics) -> Cycle:
-        motion = Motion.of(self.blocks, state.vertices)
+        motion = self._motion(state)
         return Cycle(
             number=self.number,
             load_step=self.load_step,
@@ -371,6 +374,12 @@ class Coupling:
             statistics=statistics,
             seconds=dict(self.seconds),
         )
+
+    def _motion(self, state: State) -> Motion:
+        """The blocks' motion in ``state``; the record of one step and the loads of the next ask for the same one."""
+        if self.known_motion is None or self.known_motion[0] is not state:
+            self.known_motion = state, Motion.of(self.blocks, state.vertices)
+        return self.known_motion[1]
 
     def _load(self, now: float) -> float:
         """The leading load, Pa, positive in compression."""

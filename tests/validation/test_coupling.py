@@ -76,14 +76,24 @@ def ddm_alone(problem, stress):
 @pytest.mark.parametrize("platens", [True, False])
 @pytest.mark.parametrize("phi_deg", [0.0, 90.0])
 def test_coupled_stress_intensity_is_that_of_the_crack_solver_alone(platens, phi_deg):
-    """Under the same nominal stress, before growth, DDA only carries the load: K within 1e-6 of DDM alone."""
-    problem = specimen(phi_deg, platens)
-    last = list(cycles(problem))[-1]
-    assert last.load == pytest.approx(3 * RATE, rel=1e-12)
-    alone = ddm_alone(problem, last.load).tips
-    largest = np.abs(alone["k_i"]).max()
-    assert np.abs(last.tips["k_i"] - alone["k_i"]).max() < 1e-6 * largest
-    assert np.abs(last.tips["k_ii"] - alone["k_ii"]).max() < 1e-6 * largest
+    """Under the same nominal stress, before growth, DDA only carries the load: K within 1e-6 of DDM alone.
+
+    Between platens that holds at small strain. The block solver follows the deformed geometry, where the mean shear
+    that inclined cracks bring moves the ends of the specimen apart sideways and the load becomes eccentric: at high
+    load the difference is of the size of the strain (a tenth of it is allowed, 0.07 is found), and none where nothing
+    shears (φ = 90) or the load stands on the specimen itself.
+    """
+    problem = specimen(phi_deg, platens, end_time=200.0)
+    for cycle in cycles(problem):
+        if cycle.number not in (1, 200):
+            continue
+        assert cycle.load == pytest.approx(cycle.number * RATE, rel=1e-12)
+        alone = ddm_alone(problem, cycle.load).tips
+        largest = np.abs(alone["k_i"]).max()
+        tolerance = 1e-6 if cycle.number == 1 or phi_deg == 90.0 or not platens else 0.1 * cycle.strain
+        assert np.abs(cycle.tips["k_i"] - alone["k_i"]).max() < tolerance * largest
+        assert np.abs(cycle.tips["k_ii"] - alone["k_ii"]).max() < tolerance * largest
+    assert cycle.number == 200
 
 
 def test_axial_strain_is_that_of_plane_strain_plus_the_cracks():
