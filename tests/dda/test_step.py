@@ -147,7 +147,14 @@ def test_the_same_specimen_with_friction_stays_symmetric(platens):
         state = result.state
     assert result.statistics["unbalanced"] < 1e-10
     assert state.stress[1, 0] < 0  # the platens hold the specimen's bulging back
-    assert state.vertices[[4, 7], 0] == pytest.approx(-state.vertices[[5, 6], 0], abs=1e-13)
+    shear = {(int(r["vertex"]), int(r["edge"])): r["shear_force"] for r in result.contacts}
+    force = 0.2e6 * state.time * 0.06
+    # Pairs of corners carry equal and opposite shear; between sliding contacts the body floats sideways on its inertia
+    # alone, so forces balance to 37 N/m times a drift below 1 µm, not to round-off.
+    assert shear[2, 4] == pytest.approx(-shear[3, 4], abs=1e-8 * force)
+    assert shear[9, 6] == pytest.approx(-shear[8, 6], abs=1e-8 * force)
+    corners = state.vertices[4:8, 0]
+    assert np.ptp([corners[0] + corners[1], corners[2] + corners[3]]) < 1e-9
 
 
 def test_crack_response_softens_the_block_implicitly(platens):
@@ -167,10 +174,11 @@ def test_crack_response_softens_the_block_implicitly(platens):
     assert result.state.stress[1] == pytest.approx(stress, rel=1e-7, abs=1e-1)
     assert strain == pytest.approx(expected[:2], rel=1e-7)
     assert result.state.crack_strain[1] == pytest.approx(offset[1] + compliance[1] @ stress, rel=1e-7, abs=1e-14)
-    # The same response again changes nothing: strain increments are measured from what the cracks already carry.
+    # The same response again changes nothing (but the load follows the width, 7e-5, of a strain of 2e-4 over 0.12 m):
+    # strain increments are measured from what the cracks already carry.
     again = system.step(result.state, loads, 1.0, crack=dda.CrackResponse(compliance, offset))
     assert again.state.stress[1] == pytest.approx(stress, rel=1e-4, abs=1e2)
-    assert np.ptp(again.state.vertices[4:8, 1]) == pytest.approx(np.ptp(v[:, 1]), rel=1e-9)
+    assert np.ptp(again.state.vertices[4:8, 1]) == pytest.approx(np.ptp(v[:, 1]), abs=5e-9)
     # Zeros are an ordinary block, bit for bit.
     zero = dda.CrackResponse(np.zeros((3, 3, 3)), np.zeros((3, 3)))
     a, b = system.step(State.at_rest(blocks), loads, 1.0), system.step(State.at_rest(blocks), loads, 1.0, crack=zero)
@@ -208,7 +216,7 @@ def test_cohesion_holds_until_it_fails_and_is_then_lost():
     result = system.step(system.step(state, loads, 1.0).state, loads, 1.0)
     rows = result.contacts
     assert set(rows["state"].tolist()) == {SLIP} and not rows["bonded"].any()
-    assert np.abs(rows["shear_force"]).sum() == pytest.approx(2600 * 9.81 * np.tan(np.radians(30)), rel=1e-6)
+    assert np.abs(rows["shear_force"]).sum() == pytest.approx(2600 * 9.81 * np.tan(np.radians(30)), rel=1e-5)
 
 
 def test_tensile_strength_holds_a_hanging_block_until_it_fails():
@@ -218,7 +226,7 @@ def test_tensile_strength_holds_a_hanging_block_until_it_fails():
     rock = [Material("rock", 10e9, 0.25, density=2600.0)]
     for strength, holds in ((1.01, True), (0.99, False)):
         joint = JointLaw("glue", cohesion=1e6, tensile_strength=strength * weight)
-        result = dda.BlockSystem(blocks, rock, [joint], settings=settings).step(State.at_rest(blocks), Loads(gravity=GRAVITY), 1e-2)
+        result = dda.BlockSystem(blocks, rock, [joint], settings=settings).step(State.at_rest(blocks), Loads(gravity=GRAVITY), 1.0)
         assert (result.contacts["state"] != OPEN).all() == holds
         if holds:
             assert result.contacts["normal_force"].sum() == pytest.approx(-weight, rel=1e-4)
