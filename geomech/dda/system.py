@@ -83,6 +83,7 @@ class BlockSystem:
         areas = blocks.areas()
         if (areas <= 0).any():
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
+        self._mass = self.density * areas
         self._size = float(np.ptp(vertices, axis=0).max())
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
         self._slack = _SLACK * float(np.abs(vertices).max())
@@ -226,13 +227,15 @@ class BlockSystem:
         centroid = np.ascontiguousarray(moments[:, 1:3])
         load = generalised(points, edges, centroid)
         given = crack is not None
+        # Mass stays, whatever the strain does to the area.
+        density = self._mass / moments[:, 0]
         static = self.settings.dynamic_factor == 0.0
         compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
         offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
         geometry = found["geometry"]
         damping = 0.0 if static else self.settings.damping
-        mass = np.where(self._fixed, np.inf, self.density * moments[:, 0])
+        mass = np.where(self._fixed, np.inf, self._mass)
         springs, gap = with_dashpots(
             found["springs"], np.ascontiguousarray(geometry[:, 3]), np.minimum(mass[found["block"]], mass[found["other"]]),
             damping, dt,
@@ -241,7 +244,7 @@ class BlockSystem:
         pattern = self._pattern(found["block"], found["other"]) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assembly.assemble_blocks(
-            order, moments, self.density, self._stiffness, self._compliance, carried, stress, crack_strain, given,
+            order, moments, density, self._stiffness, self._compliance, carried, stress, crack_strain, given,
             compliance, offset, gravity, load, dt, damping, n_free,
         )  # fmt: skip
         vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
@@ -282,7 +285,7 @@ class BlockSystem:
         elastic = (found["shear"] - settled.shear_force) / springs.shear
         rows["slip"] = found["slip"] + np.where(settled.state == SLIP, settled.sliding - elastic, 0.0)
 
-        body, gradient = body_forces(self.density, gravity, acceleration, carried[:, 2], self._fixed)
+        body, gradient = body_forces(density, gravity, acceleration, carried[:, 2], self._fixed)
         forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), body, gradient)
         new_state = State(
             time=time,
@@ -298,7 +301,7 @@ class BlockSystem:
             "open_close_iterations": settled.iterations,
             "dt": dt,
             "step_cuts": cuts,
-            "kinetic_energy": self._kinetic_energy(velocity, moments),
+            "kinetic_energy": self._kinetic_energy(density, velocity, moments),
             "elastic_energy": 0.5
             * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self._compliance, new_stress))),
             "contact_energy": 0.5
@@ -339,13 +342,13 @@ class BlockSystem:
         rows["normal"] = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
         return rows
 
-    def _kinetic_energy(self, velocity, moments) -> float:
+    def _kinetic_energy(self, density, velocity, moments) -> float:
         area, xx, yy, xy = moments[:, 0], moments[:, 3], moments[:, 4], moments[:, 5]
         u, v, r, ex, ey, g = velocity.T
         # ∫ |u̇|² of the linear field: ẋ = ex x + (g/2 − r) y, ẏ = (g/2 + r) x + ey y.
         p, q = 0.5 * g - r, 0.5 * g + r
         field = area * (u * u + v * v) + (ex * ex + q * q) * xx + (p * p + ey * ey) * yy + 2 * (ex * p + q * ey) * xy
-        return 0.5 * float(np.sum(np.where(self._fixed, 0.0, self.density * field)))
+        return 0.5 * float(np.sum(np.where(self._fixed, 0.0, density * field)))
 
     def _where(self, found: dict[str, np.ndarray], contact: int) -> str:
         if contact < 0:
