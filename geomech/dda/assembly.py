@@ -118,8 +118,24 @@ def _invert(first, second, out):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def assemble_blocks(order, moments, density, stiffness, compliance, carried, stress, crack_strain, crack_given,
-                    crack_compliance, crack_offset, gravity, load, dt, damping, n):
+def assemble_blocks(
+    order,
+    moments,
+    density,
+    stiffness,
+    compliance,
+    carried,
+    stress,
+    crack_strain,
+    crack_given,
+    crack_compliance,
+    crack_offset,
+    gravity,
+    load,
+    dt,
+    damping,
+    n,
+):
     """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
 
     2M/dt² d = 2M v/dt + …  (Shi's time integration, d = v dt + a dt²/2), ∫ Tᵀρg, the strain rows' share ρω²∫xx, ∫yy,
@@ -221,8 +237,27 @@ def contact_vectors(block, other, geometry, order, moments):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def assemble_contacts(data, right, matrix, base_right, stride, diagonal, upper, lower, block, other, order, vectors,
-                      state, direction, gap, normal, shear, friction, shear0):
+def assemble_contacts(
+    data,
+    right,
+    matrix,
+    base_right,
+    stride,
+    diagonal,
+    upper,
+    lower,
+    block,
+    other,
+    order,
+    vectors,
+    state,
+    direction,
+    gap,
+    normal,
+    shear,
+    friction,
+    shear0,
+):
     """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric.
 
     Normal force N = −kₙ(g + n·Δu). Stick: S = S₀ − kₛ t·Δu. Slip: S = ± μ N, with N the unknown one, which makes

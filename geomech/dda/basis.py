@@ -33,8 +33,21 @@ def material_weights(loop_vertices: np.ndarray, point: np.ndarray) -> np.ndarray
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def advance(increment, carried, dt, static, vertices, vertex_start, moments, tangent, stress0, compliance, offset,
-            crack_given, crack_strain):
+def advance(
+    increment,
+    carried,
+    dt,
+    static,
+    vertices,
+    vertex_start,
+    moments,
+    tangent,
+    stress0,
+    compliance,
+    offset,
+    crack_given,
+    crack_strain,
+):
     """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids.
 
     Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so a spinning block does not swell;

@@ -205,9 +205,7 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
                             or max(vertices[edge, 1], vertices[end, 1]) < y - window
                         ):
                             continue
-                        feasible, nx, ny, gap, along, length = _against(
-                            vertices, next_vertex, previous_vertex, v, edge
-                        )
+                        feasible, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
                         if not feasible or abs(gap) > window or along < -window or along > length + window:
                             continue
                         if (along <= window and convex[edge]) or (along >= length - window and convex[end]):
@@ -219,7 +217,9 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def describe_contacts(table, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order):
+def describe_contacts(
+    table, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
+):
     """Geometry of the rows of `find_contacts` and what they inherit.
 
     Returns (geometry, mate, parent): geometry (n, 7) = position, normal x, y, gap, tributary length, vertex x, y; mate

@@ -25,7 +25,7 @@ class JointTable:
     shear_stiffness: np.ndarray
 
     @classmethod
-    def of(cls, joints: Sequence[JointLaw]) -> "JointTable":
+    def of(cls, joints: Sequence[JointLaw]) -> JointTable:
         def column(get) -> np.ndarray:
             return np.array([np.nan if get(j) is None else get(j) for j in joints], dtype=float)
 

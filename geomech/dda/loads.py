@@ -29,13 +29,13 @@ EDGE_FORCE = np.dtype(
 class AppliedForces:
     """All that acts on the blocks of one step besides contacts, on the geometry on which equilibrium was assembled.
 
-        points                POINT_FORCE rows
-        edges                 EDGE_FORCE rows; the force acts through the edge's middle
-        centroid              (n_blocks, 2)     m
-        area                  (n_blocks,)       m²
-        body_force            (n_blocks, 2)     ρ(g − a) at the centroid, N/m³
-        body_force_gradient   (n_blocks, 2, 2)  ∂b/∂x: the rest of −ρ times the block's acceleration field, centrifugal
-                                                part included; b(x) = body_force + body_force_gradient (x − centroid)
+    points                POINT_FORCE rows
+    edges                 EDGE_FORCE rows; the force acts through the edge's middle
+    centroid              (n_blocks, 2)     m
+    area                  (n_blocks,)       m²
+    body_force            (n_blocks, 2)     ρ(g − a) at the centroid, N/m³
+    body_force_gradient   (n_blocks, 2, 2)  ∂b/∂x: the rest of −ρ times the block's acceleration field, centrifugal
+                                            part included; b(x) = body_force + body_force_gradient (x − centroid)
     """
 
     points: np.ndarray

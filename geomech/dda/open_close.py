@@ -18,6 +18,7 @@ from numba import njit
 from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .contact_springs import Springs
+
 #: After this many iterations only the worst contacts of each block are switched: opened all at once, the contacts of a block
 #: let it fly, to be closed all at once in the next iteration.
 _ALL_AT_ONCE = 4
@@ -60,8 +61,25 @@ def _move(unknowns, block, other, order, vectors, c, k):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def check_states(unknowns, block, other, order, vectors, partner, state, direction, bonded, gap0, normal, shear,
-                 friction, cohesion, tension, shear0, slack):
+def check_states(
+    unknowns,
+    block,
+    other,
+    order,
+    vectors,
+    partner,
+    state,
+    direction,
+    bonded,
+    gap0,
+    normal,
+    shear,
+    friction,
+    cohesion,
+    tension,
+    shear0,
+    slack,
+):
     """Forces of the present states and the states they call for.
 
     Returns (forces (n, 4): N, S, new gap, sliding in the step; new state; new direction; new bonded; violation (n,) N, 0

@@ -37,14 +37,14 @@ class CrackResponse:
 class StepResult:
     """A finished step.
 
-        state          the new State; ``state.contacts`` stand on its geometry
-        dt             s, the time it advanced (less than asked if the step was cut)
-        contacts       CONTACT rows on the geometry on which equilibrium was assembled, with the converged forces
-        forces         whatever else acted, on the same geometry
-        acceleration   (n_blocks, 6) of the unknowns during the step
-        statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
-                       worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
-                       motion over the largest force in them)
+    state          the new State; ``state.contacts`` stand on its geometry
+    dt             s, the time it advanced (less than asked if the step was cut)
+    contacts       CONTACT rows on the geometry on which equilibrium was assembled, with the converged forces
+    forces         whatever else acted, on the same geometry
+    acceleration   (n_blocks, 6) of the unknowns during the step
+    statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
+                   worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
+                   motion over the largest force in them)
     """
 
     state: State
@@ -67,4 +67,3 @@ def contact_resultants(contacts: np.ndarray, n_blocks: int, about: np.ndarray) -
         moment = arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
         np.add.at(out, block, sign * np.column_stack([force, moment]))
     return out
-

@@ -173,7 +173,11 @@ class BlockSystem:
         kn, ks = self.settings.normal_penalty, self.settings.shear_penalty
         normal_penalty = stiffest if kn is None else np.full(len(block), float(kn))
         springs = contact_springs(
-            self._table, law, geometry[:, 4], normal_penalty, normal_penalty if ks is None else np.full(len(block), float(ks))
+            self._table,
+            law,
+            geometry[:, 4],
+            normal_penalty,
+            normal_penalty if ks is None else np.full(len(block), float(ks)),
         )
         contact_state = np.zeros(len(block), np.int64)
         shear, slip = np.zeros(len(block)), np.zeros(len(block))
@@ -207,7 +211,9 @@ class BlockSystem:
             for i, j in {(int(i), int(j)) for i, j in zip(a, b, strict=True)}:
                 index = self._joint_index(names[i], names[j])
                 if index is not None and not 0 <= index < len(self.joints):
-                    raise ValueError(f"edges {names[i]!r} and {names[j]!r} have joint law {index}, out of {len(self.joints)}")
+                    raise ValueError(
+                        f"edges {names[i]!r} and {names[j]!r} have joint law {index}, out of {len(self.joints)}"
+                    )
                 self._law_of[i, j] = _NEVER if index is None else index
             law = self._law_of[a, b]
         return law

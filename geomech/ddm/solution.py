@@ -126,6 +126,7 @@ class Solution:
             if network.aperture[segment] == 0 and (opening < 0 or self.states[e, -1 if at_end else 0] != OPEN):
                 opening = 0.0
             row["node"], row["crack"], row["block"] = node, network.crack[segment], network.block[segment]
+            row["end"] = at_end
             row["point"] = network.nodes[node]
             row["direction"] = c.tangent[e] if at_end else -c.tangent[e]
             row["k_i"], row["k_ii"] = opening, slip

@@ -39,6 +39,7 @@ TIP = np.dtype(
     [
         ("node", np.int64),  # node of the crack network
         ("crack", np.int64),
+        ("end", np.int64),  # 0: grew from the start of its crack, 1: from its end
         ("block", np.int64),
         ("point", np.float64, 2),  # reference coordinates, m
         ("direction", np.float64, 2),  # unit vector out of the crack

@@ -113,6 +113,7 @@ TIPS: dict[str, str] = {
     "time": "s",
     "load": "Pa",
     "crack": "-",
+    "end": "0 the tip that grew from the crack's start, 1 from its end",
     "tip": "node of the crack network",
     "x": "m, reference",
     "y": "m, reference",

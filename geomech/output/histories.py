@@ -120,6 +120,7 @@ def tip_rows(cycle: Cycle) -> list[dict[str, Any]]:
             "time": cycle.state.time,
             "load": cycle.load,
             "crack": tip["crack"],
+            "end": tip["end"],
             "tip": tip["node"],
             "x": tip["point"][0],
             "y": tip["point"][1],

@@ -38,22 +38,20 @@ def stress_strain(axes: Axes, run: Run) -> None:
 
 
 def stress_intensity(axes: Axes, run: Run) -> None:
-    """K_I (full) and K_II (dashed) against load at the tips of the scene, up to the first growth: beyond it a tip is
-    another one."""
+    """K_I (full) and K_II (dashed) against load at every tip: growth relieves a tip, the load drives it up again."""
     tips = run.tips
-    grew = tips["cycle"][tips["grown_m"] > 0]
-    before = tips[tips["cycle"] <= (grew.min() if len(grew) else np.inf)]
-    first = before[before["cycle"] == before["cycle"].min()]
-    for k, (crack, tip) in enumerate(zip(first["crack"], first["tip"])):
-        mine = before[(before["crack"] == crack) & (before["tip"] == tip)]
+    ends = np.unique(np.stack([tips["crack"], tips["end"]], axis=1), axis=0)
+    for k, (crack, end) in enumerate(ends):
+        mine = tips[(tips["crack"] == crack) & (tips["end"] == end)]
         colour = _COLOURS[k % len(_COLOURS)]
         load = mine["load"] / 1e6
-        axes.plot(load, mine["K_I"] / 1e6, color=colour, lw=1.6, label=f"crack {int(crack)}, tip {int(tip)}")
-        axes.plot(load, mine["K_II"] / 1e6, color=colour, lw=1.3, ls="--")
+        label = f"crack {int(crack) + 1}, {'end' if end else 'start'}"
+        axes.plot(load, mine["K_I"] / 1e6, color=colour, lw=1.4, label=label)
+        axes.plot(load, mine["K_II"] / 1e6, color=colour, lw=1.0, ls="--")
     axes.plot([], [], color="#555555", lw=1.6, label=r"$K_I$")
     axes.plot([], [], color="#555555", lw=1.3, ls="--", label=r"$K_{II}$")
     axes.axhline(0, color="#999999", lw=0.6)
-    if len(first) <= 8:
+    if len(ends) <= 8:
         axes.legend(frameon=False, fontsize=8)
     axes.set(xlabel="load, MPa", ylabel="stress intensity factor, MPa√m", title=run.title)
 
