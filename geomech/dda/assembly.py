@@ -14,7 +14,7 @@ from numba import njit
 from ..model import OPEN, SLIP, STICK
 
 #: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
-DENSE_BLOCKS = 40
+DENSE_BLOCKS = 60
 #: Spring, relative to E', that holds the rigid motion of a block without mass; its force is as small beside the load.
 GROUND_RATIO = 1e-11
 #: A solution without pivoting is kept when it leaves less than this of the right side.

@@ -60,8 +60,8 @@ def contact_springs(
     face = length > 0
     kn, ks = table.normal_stiffness[law], table.shear_stiffness[law]
     return Springs(
-        normal=np.where(face & (kn == kn), kn * length, normal_penalty),
-        shear=np.where(face & (ks == ks), ks * length, shear_penalty),
+        normal=np.where(face & ~np.isnan(kn), kn * length, normal_penalty),
+        shear=np.where(face & ~np.isnan(ks), ks * length, shear_penalty),
         friction=table.friction[law],
         cohesion=table.cohesion[law] * length,
         tension=table.tension[law] * length,

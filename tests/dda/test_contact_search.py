@@ -21,7 +21,7 @@ def search(polygons, window=0.05, turn=0.0, fixed=None):
     start, fixed = blocks.vertex_start.astype(np.int64), np.asarray(blocks.fixed, bool)
     none = np.empty(0, np.int64)
     table = find_contacts(v, next_, previous, start, fixed, window, none)
-    geometry, mate, parent = describe_contacts(table, v, next_, previous, window, none, none, np.empty((0, 2)), none)
+    geometry, mate, _ = describe_contacts(table, v, next_, previous, window, none, none, np.empty((0, 2)), none)
     return table, geometry, mate
 
 
