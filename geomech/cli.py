@@ -1,4 +1,4 @@
-"""The command line: ``geomech check | run | render | report | doctor``.
+"""The command line: ``geomech check | run | render | report | bench | doctor``.
 
 Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input. Nothing heavy is imported before a
 verb asks for it.
@@ -21,6 +21,7 @@ for _library in ("OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+BENCHMARKS = ("ddm", "startup")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -97,6 +98,13 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     report.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="run folders, or folders of run folders")
     report.add_argument("--csv", action="store_true", help="write the table as CSV")
+
+    bench = verb(
+        "bench", _bench, "measure what things cost and how right they are (run it in the project's folder)",
+        "geomech bench startup\ngeomech bench --quick",
+    )  # fmt: skip
+    bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(BENCHMARKS)} (default: all)")
+    bench.add_argument("--quick", action="store_true", help="fewer repetitions, nothing compiled anew")
 
     verb("doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
          "geomech doctor")  # fmt: skip
@@ -215,6 +223,17 @@ def _open_run(run: Callable[[Path], Any], folder: Path) -> Any:
         return run(folder)
     except FileNotFoundError as error:
         raise BadInput(str(error)) from None
+
+
+def _bench(options: argparse.Namespace) -> int:
+    from .bench import topic
+
+    unknown = [name for name in options.topics if name not in BENCHMARKS]
+    if unknown:
+        raise BadInput(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
+    for name in options.topics or BENCHMARKS:
+        print(topic(name)(options.quick), end="\n\n", flush=True)
+    return DONE
 
 
 def _doctor(options: argparse.Namespace) -> int:

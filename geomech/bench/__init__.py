@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib import import_module
 
 #: Topic → module with ``measure(quick: bool) -> str``, the printed table.
-TOPICS = {"startup": "geomech.bench.startup", "ddm": "geomech.bench.crack_accuracy"}
+TOPICS = {"ddm": "geomech.bench.crack_accuracy", "startup": "geomech.bench.startup"}
 
 
 def topic(name: str) -> Callable[[bool], str]:

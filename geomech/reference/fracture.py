@@ -19,13 +19,6 @@ CENTRE_CRACK_HALF = {3.0: 1.186671, 1.0: 1.33371}
 #: Star of three equal arms of length 1 under uniform pressure 1: K_I/√π at every tip (computed).
 THREE_ARMED_STAR = 0.941499
 
-#: Specimen of Haeri et al. (2014), 60 × 120 mm, two open slots of 10 mm with centres on the axis 20 mm apart, the upper
-#: at 45° and the lower at 45° + φ: φ in degrees → (K_I, K_II) / σ of the four tips in √m, σ the compression (computed).
-TWO_SLOTS = {
-    0: ((-0.062592, -0.065498, -0.065498, -0.062592), (-0.058550, -0.060707, -0.060707, -0.058550)),
-    90: ((-0.059253, -0.061952, -0.061952, -0.059253), (-0.060251, -0.060131, 0.060131, 0.060251)),
-}
-
 
 def griffith(stress: float, half_length: float) -> float:
     """K_I = σ√(πa) of a crack 2a across a tension σ (Griffith 1921; Irwin 1957)."""

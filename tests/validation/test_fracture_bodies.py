@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import fracture
+from geomech.reference import fracture, two_cracks
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21, density=2600.0)
 OPEN = math.inf
@@ -44,17 +44,14 @@ def test_edge_crack(depth):
     assert k[0] / fracture.griffith(1, depth) == pytest.approx(fracture.EDGE_CRACK[depth], rel=2e-4)
 
 
-@pytest.mark.parametrize("phi", fracture.TWO_SLOTS)
+@pytest.mark.parametrize("phi", two_cracks.OPEN_SLOT_K_I)
 def test_two_slot_specimen(phi):
     """1e-5 of the largest: the digits of the reference. Default settings."""
-    cracks = []
-    for y, degrees in ((0.01, 45), (-0.01, 45 + phi)):
-        u = 0.005 * np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
-        cracks.append(np.array([[0, y] - u, [0, y] + u]))
-    body = ddm.Body([rectangle(0.03, 0.06)], Cracks.from_polylines(cracks, aperture=OPEN), ROCK)
-    tips = body.solve(pull(0.03, 0.06, -1.0)).tips
-    for got, expected in zip((tips["k_i"], tips["k_ii"]), fracture.TWO_SLOTS[phi]):
-        assert np.abs(got - expected).max() < 1e-5 * 0.0655
+    cracks = Cracks.from_polylines(two_cracks.crack_ends(phi), aperture=OPEN)
+    tips = ddm.Body([rectangle(0.03, 0.06)], cracks, ROCK).solve(pull(0.03, 0.06, -1.0)).tips
+    largest = np.abs(two_cracks.OPEN_SLOT_K_I[phi]).max()
+    for name, table in (("k_i", two_cracks.OPEN_SLOT_K_I), ("k_ii", two_cracks.OPEN_SLOT_K_II)):
+        assert np.abs(tips[name] - table[phi]).max() < 1e-5 * largest
 
 
 def uniform_load(loops, stress):
