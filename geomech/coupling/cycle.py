@@ -145,7 +145,7 @@ class Coupling:
                     self.problem.materials[self.blocks.material[b]].density,
                     gravity,
                     result.acceleration[b],
-                    float(result.state.velocity[b, 2]),
+                    self.problem.dda.dynamic_factor * float(self.state.velocity[b, 2]),
                 )
         self.loads = loads
         self.solutions = self._solve(self.bodies, loads, self.solutions)
