@@ -17,7 +17,7 @@ import numpy as np
 from .. import dda
 from ..model import TIP, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
 from .compliance import crack_response
-from .path import bend_paths
+from .path import Chords
 from .splitting import split_blocks
 from .tractions import BoundaryLoad, boundary_load
 
@@ -77,10 +77,14 @@ class Coupling:
         """All passes at one load. Returns True when a stop event happened."""
         dt = min(self.problem.dda.time_step, self.problem.run.end_time - self.state.time)
         pending: tuple[Event, ...] = ()
-        stops = False
+        stops, load_time = False, None
+        static = self.problem.dda.dynamic_factor == 0.0
         for growth_pass in range(self.problem.growth.max_passes + 1):
             self.number += 1
-            result, solutions, mismatch = self._equilibrium(dt)
+            result, solutions, mismatch = self._equilibrium(dt, load_time)
+            if static:
+                # The passes of a step share its load, also when one of them has to take a shorter step.
+                load_time = result.state.time
             tips = self._tips(solutions, self.nodes_of)
             may_grow = growth_pass < self.problem.growth.max_passes
             events, stops = pending, stops or self._stops(pending)
@@ -105,11 +109,16 @@ class Coupling:
 
     # -- one pass ------------------------------------------------------------------------------------------------
 
-    def _equilibrium(self, dt: float):
-        """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds."""
+    def _equilibrium(self, dt: float, load_time: float | None):
+        """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds.
+
+        ``load_time``: when the loads are those of that time, whatever step the blocks take; it then is the new time.
+        """
         for attempt in range(COMPLIANCE_PASSES):
             with self._timed("dda"):
-                result = self.system.step(self.state, self.problem.loads, dt, crack=self.response)
+                result = self.system.step(self.state, self.problem.loads, dt, self.response, load_time)
+                if load_time is not None and result.state.time != load_time:
+                    result = replace(result, state=replace(result.state, time=load_time))
             if not self.bodies:
                 return result, {}, {}
             solutions = self._solve_bodies(result)
@@ -235,11 +244,13 @@ class Coupling:
                 return advance(self.cracks, self.blocks.loops, tips, self.problem.growth, k_ic, self.number)
 
         growth = grow()
+        chords = Chords(tips)
+        settled = not self.problem.growth.correct
         # A step that joins something may cut a piece off, on which there is nothing to solve.
-        if self.problem.growth.correct and not growth.joins and np.any(growth.grown > 0):
+        while not settled and not growth.joins and np.any(growth.grown > 0):
             trial, nodes_of = self._bodies_of(growth.cracks, self.bodies)
             ahead = self._tips(self._solve(trial, self.loads, self.solutions), nodes_of)
-            bend_paths(tips, growth.grown, ahead, growth.cracks, self.number)
+            settled = chords.bend(tips, growth.grown, ahead, growth.cracks, self.number)
             self.bodies = trial  # most of it is what the corrected step needs
             growth = grow()
         return growth if np.any(growth.grown > 0) or growth.joins else None

@@ -1,9 +1,15 @@
 """Curved crack paths from straight steps: predict, look ahead, bend.
 
-A step taken along the tangent at its start errs by the turn that the path makes within it, and zigzags about a path
-that it overshoots. The chord of a smooth path leaves its start at half the turn, so once the step has been tried and
-the criterion asked where it would go on, the step is taken again bent by half of that: second order in the increment.
-Out of a sharp kink a path starts like y ∝ x^(3/2) (Amestoy & Leblond 1992), whose chord has two thirds of the turn.
+A step along the tangent at its start errs by the turn that the path makes within it. The chord of a smooth path leaves
+its start at half the turn between the tangents at its ends, so a step is tried, the criterion is asked where it would
+go on, and the step is taken again, bent: second order in the increment. Out of a sharp kink a path starts like
+y ∝ x^(3/2) (Amestoy & Leblond 1992), whose chord has two thirds of the turn.
+
+Compression σ along a crack makes this stiff. A step that leaves its line by ω meets a shear of its own of about
+σ ω √(πΔa), so that the turn the criterion asks for next falls by more than ω: by (1 + κ) ω, κ ~ |σ| √(πΔa) / K_I. This
+is what holds wing cracks to the line of the load (Cotterell & Rice 1980). From κ = 2 on, a single correction throws
+back as far as the trial went out, and a crack would go straight on with any K_II. So where the look ahead turns
+back against the trial, the condition on the chord is solved, not corrected once: an implicit rule, stable for all κ.
 """
 
 from __future__ import annotations
@@ -15,23 +21,61 @@ from ..model import Cracks
 #: A step that turns by more than this starts at a kink.
 KINK = np.radians(20.0)
 SMOOTH_SHARE, KINK_SHARE = 1 / 2, 2 / 3
+#: A chord is good when its direction is off its condition by less than this: K_II of about 1 % of K_I.
+TOLERANCE = np.radians(1.0)
+#: Looks ahead at most. Secants need two or three; what is left then is of the order of the tolerance.
+LOOKS = 5
+#: Bounds of the slope of the condition: −1 − κ times the share, for no stress along the crack −1. Beyond them two trials
+#: lie too close together to tell it.
+SLOPES = (-20.0, -0.5)
 
 
-def bend_paths(tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> None:
-    """Set ``tips["angle"]`` of the tips that have ``grown`` (n_tips,) to that of their chords.
+class Chords:
+    """The directions of one growth step's chords, looked for tip by tip: the steps of all tips are tried together.
 
-    ``ahead``: TIP rows of the predicted network ``cracks`` with their growth angles; its segments of birth ``cycle``
-    are the steps that were tried.
+    With θ the angle of the chord, θ₀ that of the criterion at its start, a(θ) the one that the criterion asks for at
+    its end and s the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀.
     """
+
+    def __init__(self, tips: np.ndarray) -> None:
+        self.start = tips["angle"].copy()
+        self.share = np.where(np.abs(self.start) > KINK, KINK_SHARE, SMOOTH_SHARE)
+        self.looks = 0
+        self.last_angle = np.full(len(tips), np.nan)
+        self.last_rest = np.full(len(tips), np.nan)
+
+    def bend(self, tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> bool:
+        """Better ``tips["angle"]`` of the tips that have ``grown`` (n_tips,); True when no further look is needed.
+
+        ``ahead``: TIP rows of the tried network ``cracks`` with their growth angles; its segments of birth ``cycle``
+        are the steps that were tried.
+        """
+        self.looks += 1
+        turns = _turns_ahead(tips, grown, ahead, cracks, cycle)
+        angle = tips["angle"].copy()
+        rest = self.share * turns - (1 - self.share) * (angle - self.start)
+        off = np.abs(rest) > TOLERANCE  # not where there is nothing ahead, nan
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = (rest - self.last_rest) / (angle - self.last_angle)
+        slope = np.where(np.isfinite(slope), np.clip(slope, *SLOPES), -1.0)
+        known = np.isfinite(rest)
+        tips["angle"][known] = (angle - rest / slope)[known]
+        first = self.looks == 1
+        # A first look that turns on the way the trial did needs no second one: the path is smooth.
+        unsettled = off & (rest * self.start < 0) if first else off
+        self.last_angle, self.last_rest = angle, rest
+        return self.looks == LOOKS or not unsettled.any()
+
+
+def _turns_ahead(tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> np.ndarray:
+    """(n_tips,) the angle that the criterion gives at the end of each tip's new segment; nan where there is no tip."""
+    turns = np.full(len(tips), np.nan)
     new = np.flatnonzero(cracks.birth_cycle == cycle)
     turn_at = {int(tip["node"]): float(tip["angle"]) for tip in ahead}
+    at = cracks.nodes[cracks.segments[new]]  # (n, 2 ends, 2)
     for row in np.flatnonzero(grown > 0):
-        at = cracks.nodes[cracks.segments[new]]  # (n, 2 ends, 2)
         starts = np.argwhere((at == tips["point"][row]).all(axis=2))
-        if len(starts) != 1:
-            continue
-        segment, end = starts[0]
-        turn = turn_at.get(int(cracks.segments[new[segment], 1 - end]))
-        if turn is not None:
-            share = KINK_SHARE if abs(tips["angle"][row]) > KINK else SMOOTH_SHARE
-            tips["angle"][row] += share * turn
+        if len(starts) == 1:
+            segment, end = starts[0]
+            turns[row] = turn_at.get(int(cracks.segments[new[segment], 1 - end]), np.nan)
+    return turns

@@ -92,9 +92,15 @@ class BlockSystem:
         )
 
     def step(
-        self, state: State, loads: Loads, dt: float | None = None, crack: CrackResponse | None = None
+        self,
+        state: State,
+        loads: Loads,
+        dt: float | None = None,
+        crack: CrackResponse | None = None,
+        load_time: float | None = None,
     ) -> StepResult:
-        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the end of the step.
+        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the end of the step, or at
+        ``load_time`` however short the step becomes.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun again
         from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
@@ -114,7 +120,7 @@ class BlockSystem:
         cuts = 0
         while True:
             try:
-                result, largest = self._attempt(state, vertices, carried, moments, loads, dt, crack, found, cuts)
+                result, largest = self._attempt(state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time)
             except Unsettled as failure:
                 reason = f"{failure}{self._where(found, failure.contact)}"
                 shorter = 0.5 * dt
@@ -129,7 +135,7 @@ class BlockSystem:
                     found = self._search(state, vertices, _WINDOW * limit)
                     continue
                 before = largest
-                shorter = dt * min(0.8, max(0.05, 0.95 * limit / largest))
+                shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
             cuts += 1
             if cuts > self.settings.max_step_cuts:
                 raise NotConverged(
@@ -149,7 +155,7 @@ class BlockSystem:
         speed = float(np.sqrt(np.max(vx * vx + vy * vy)))
         g = float(np.hypot(*loads.gravity.at(time + dt)))
         # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
-        return min(dt, 2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit)))
+        return min(dt, float(2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit))))
 
     def _search(self, state: State, vertices: np.ndarray, window: float) -> dict[str, np.ndarray]:
         old = state.contacts
@@ -226,10 +232,11 @@ class BlockSystem:
             self._sparse = key, assembly.sparse_pattern(self._free, block, other)
         return self._sparse[1]
 
-    def _attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts) -> tuple[StepResult, float]:
+    def _attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> tuple[StepResult, float]:
         time = state.time + dt
-        gravity = loads.gravity.at(time)
-        points, edges = self._load_map.rows(loads, time, vertices)
+        acting = time if load_time is None else load_time
+        gravity = loads.gravity.at(acting)
+        points, edges = self._load_map.rows(loads, acting, vertices)
         centroid = np.ascontiguousarray(moments[:, 1:3])
         load = generalised(points, edges, centroid)
         given = crack is not None

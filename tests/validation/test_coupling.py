@@ -123,3 +123,39 @@ def test_symmetric_specimen_grows_symmetrically():
     assert grown.tips["grown"] == pytest.approx(grown.tips["grown"][::-1], abs=1e-9)
     # LEFM for open slots with K_Ic = 2 MPa √m puts initiation between 47 and 50 MPa.
     assert 47e6 < grown.load < 50e6
+
+
+def test_a_crack_across_a_plate_in_tension_splits_it():
+    """Unstable growth at one load: first growth at K_Ic (within a load step of the finite-width closed form, Feddersen
+    1966: K = σ√(πa sec(πa/W))), both ends reach the sides, two blocks with the plate's area and no force between."""
+    w, h, half, step = 0.03, 0.06, 0.005, 0.05e6
+    brittle = Material("rock", 17e9, 0.21, 2200.0, 1e6)
+    blocks = Blocks.from_polygons([rectangle(-w, -h, w, h)], edge_names=[[["load:bottom", "", "load:top", ""]]])
+    problem = Problem(
+        title="plate",
+        blocks=blocks,
+        cracks=Cracks.from_polylines([np.array([[-half, 0.0], [half, 0.0]])]),
+        materials=(brittle,),
+        joints=(JointLaw("joint"),),
+        loads=Loads(
+            edge_tractions=(
+                EdgeTraction("load:top", History.ramp([0.0, step])),
+                EdgeTraction("load:bottom", History.ramp([0.0, -step])),
+            )
+        ),
+        growth=GrowthSettings(increment=2e-3),
+        run=RunSettings(end_time=300.0, stop_at=("split",)),
+        load_edge="load:top",
+    )
+    seen = list(cycles(problem))
+    events = [event for cycle in seen for event in cycle.events]
+    assert [event.kind for event in events] == ["initiation"] * 2 + ["daylighting"] * 2 + ["split"]
+    strength = brittle.k_ic / np.sqrt(np.pi * half / np.cos(np.pi * half / (2 * w)))
+    assert -events[0].load == pytest.approx(strength, abs=step)
+    assert len({event.load for event in events}) == 1
+    last = seen[-1]
+    assert last.blocks.n_blocks == 2 and not last.bodies
+    assert last.blocks.areas() == pytest.approx([2 * w * h] * 2, rel=1e-9)
+    assert (last.state.contacts["normal_force"] == 0).all()
+    # Straight on: nothing in this plate turns the crack.
+    assert np.abs(last.blocks.vertices[np.abs(last.blocks.vertices[:, 1]) < 0.9 * h, 1]).max() < 1e-6
