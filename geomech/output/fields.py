@@ -6,6 +6,7 @@ All stresses are tension positive; see `geomech.conventions` for the signs of co
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,11 +137,19 @@ EVENTS: dict[str, str] = {
 }
 
 
-def conform(series: str, place: str, count: int, arrays: dict[str, np.ndarray]) -> dict[str, tuple[Field, np.ndarray]]:
+#: (series, place) → name → field.
+_DECLARED = {
+    (series, place): {f.name: f for f in fields if f.place == place}
+    for series, fields in SERIES.items()
+    for place in ("point", "cell")
+}
+
+
+def conform(series: str, place: str, count: int, arrays: Mapping[str, np.ndarray]) -> dict[str, tuple[Field, np.ndarray]]:
     """``arrays`` as declared: name → (field, contiguous array of the declared dtype and ``count`` rows).
 
     Raises ValueError naming a missing, an undeclared or a wrongly shaped array."""
-    declared = {f.name: f for f in SERIES[series] if f.place == place}
+    declared = _DECLARED[series, place]
     if arrays.keys() != declared.keys():
         missing, extra = sorted(declared.keys() - arrays.keys()), sorted(arrays.keys() - declared.keys())
         raise ValueError(f"{series}: {place} arrays missing {missing}, undeclared {extra}")

@@ -20,7 +20,7 @@ from geomech.model import TIP, CrackFaces, Cracks
 from geomech.output import Series
 from geomech.output.fields import SERIES
 from geomech.output.series import PASS_OFFSET, SeriesTime
-from geomech.output.vtu import Collection, Grid, read_collection, write_grid
+from geomech.output.vtu import SMALL, Collection, Grid, read_collection, write_grid
 
 pv = pytest.importorskip("pyvista")
 
@@ -304,14 +304,18 @@ def test_every_leaves_out_quiet_cycles_but_no_growth_and_not_the_last(tmp_path):
     assert len(list((tmp_path / "vtk").glob("blocks_*.vtu"))) == 3
 
 
-def test_arrays_larger_than_a_piece_survive(tmp_path):
-    """Arrays of several compressed pieces, with and without a partial last one, read back bit for bit."""
-    for n in (1 << 16, (1 << 16) + 12345):
+def test_arrays_of_any_length_survive(tmp_path):
+    """A grid left as it is, the last such and the first compressed one, several compressed pieces with and
+    without a partial last one: all read back bit for bit."""
+    row = sum(8 * (*f.shape, 1)[0] if f.dtype == "float64" else 4 for f in SERIES["tips"]) + 41
+    last = (SMALL - 8) // row
+    for n in (1, 7, last, last + 1, 1 << 16, (1 << 16) + 12345):
         rng = np.random.default_rng(n)
         names = {f.name: rng.random((n, *f.shape)) for f in SERIES["tips"] if f.dtype == "float64"}
         names |= {f.name: rng.integers(0, 99, n) for f in SERIES["tips"] if f.dtype == "int32"}
         grid = Grid(rng.random((n, 2)), np.arange(n), np.arange(n) + 1, np.ones(n), names)
         write_grid(tmp_path / "tips.vtu", "tips", grid, {"CYCLE": 1})
+        assert (b"compressor" in (tmp_path / "tips.vtu").read_bytes()[:200]) == (n > last)
         mesh, other = pv.read(tmp_path / "tips.vtu"), meshio.read(tmp_path / "tips.vtu")
         for name, data in names.items():
             assert np.array_equal(mesh[name], data)
