@@ -6,7 +6,11 @@ from collections.abc import Callable
 from importlib import import_module
 
 #: Topic → module with ``measure(quick: bool) -> str``, the printed table.
-TOPICS = {"ddm": "geomech.bench.crack_accuracy", "startup": "geomech.bench.startup"}
+TOPICS = {
+    "accuracy": "geomech.bench.accuracy",
+    "ddm": "geomech.bench.crack_accuracy",
+    "startup": "geomech.bench.startup",
+}
 
 
 def topic(name: str) -> Callable[[bool], str]:

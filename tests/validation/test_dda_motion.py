@@ -33,14 +33,16 @@ def march(system: dda.BlockSystem, state: State, loads: Loads, end: float, dt: f
 
 
 def incline(
-    angle: float, friction: float, *, speed: float = 0.0, ratio: float = 0.05, damping: float = 0.05, poisson=0.25
-):
+    angle: float, friction: float, *, speed: float = 0.0, ratio: float = 0.05, damping: float = 0.05, poisson=0.25,
+    youngs_modulus: float = 10e9,
+):  # fmt: skip
     """A unit block on a long fixed incline: system, state with ``speed`` down the slope, slope direction."""
     blocks = Blocks.from_polygons(
         [turned(rectangle(-20, -1, 20, 0), angle), turned(rectangle(4, 0, 5, 1), angle)], fixed=[True, False]
     )
     system = dda.BlockSystem(
-        blocks, [Material("rock", 10e9, poisson, density=2600.0)], [JointLaw("joint", friction_angle=friction)],
+        blocks, [Material("rock", youngs_modulus, poisson, density=2600.0)],
+        [JointLaw("joint", friction_angle=friction)],
         settings=DdaSettings(dynamic_factor=1.0, max_displacement_ratio=ratio, damping=damping),
     )  # fmt: skip
     down = -np.array([np.cos(angle), np.sin(angle)])
@@ -86,6 +88,20 @@ def test_incline_with_friction(friction_deg):
     end = march(system, state, WEIGHT, 0.5, 1e-3)
     expected = 0.5 * exact.incline_acceleration(np.radians(30), np.radians(friction_deg)) * 0.5**2
     assert travel(system, end, down) == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("dt", [8e-3, 1e-3])
+def test_friction_on_an_incline_converges_to_the_rigid_block(dt):
+    # What is left beside the closed form is the block's elastic shortening: first order in 1/E, the same at every dt.
+    slope, friction = np.radians(30), np.radians(15)
+    expected = 0.5 * exact.incline_acceleration(slope, friction) * 0.5**2
+    errors = []
+    for youngs_modulus in (1e9, 10e9, 100e9):
+        system, state, down = incline(slope, friction, youngs_modulus=youngs_modulus)
+        errors.append(abs(travel(system, march(system, state, WEIGHT, 0.5, dt), down) / expected - 1))
+    orders = np.log10(np.array(errors[:-1]) / errors[1:])
+    assert orders == pytest.approx([1.0, 1.0], abs=0.02)
+    assert errors[1] < 1e-6
 
 
 @pytest.mark.parametrize("dt", [0.1, 0.01, 1e-3, 5e-4])
