@@ -183,15 +183,20 @@ class Solution:
         On a boundary it is the rock's, on a crack that of the upper face; at the ends of elements (corners, crack tips,
         crack nodes), where the discrete field has no value, that at a hundredth of the element's length beside.
         """
-        return self._fields(points)[0]
+        return self._total(points)[0]
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) displacement at ``points`` (n, 2), m. The mean displacement and mean rotation of the outline are zero; in
         the infinite plane cracks add to the uniform strain about the origin."""
-        points = np.asarray(points, dtype=float).reshape(-1, 2)
-        return self._fields(points)[1] - _rigid(self._motion, self.body.centroid, points)
+        return self.fields(points)[1]
 
-    def _fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`stress` and `displacement` at ``points`` (n, 2) in the time of one of them."""
+        points = np.asarray(points, dtype=float).reshape(-1, 2)
+        stress, displacement = self._total(points)
+        return stress, displacement - _rigid(self._motion, self.body.centroid, points)
+
+    def _total(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         body = self.body
         points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
         where = self._off_ends(points)
@@ -241,14 +246,21 @@ class Solution:
         moved = points.copy()
         tree = cKDTree(ends)
         distance, nearest = tree.query(points)
-        for i in np.flatnonzero(distance < reach[nearest]):
-            here = tree.query_ball_point(ends[nearest[i]], 1e-12 * body._extent)
-            way = inward[here].sum(axis=0)
-            if distance[i] > 1e-3 * reach[nearest[i]]:
-                way = (points[i] - ends[nearest[i]]) / distance[i]
-            elif np.hypot(*way) < 1e-6:
-                way = inward[nearest[i]]
-            moved[i] = ends[nearest[i]] + way / np.hypot(*way) * reach[here].min()
+        close = np.flatnonzero(distance < reach[nearest])
+        if not len(close):
+            return moved
+        at, which = np.unique(nearest[close], return_inverse=True)
+        # All ends that meet where the nearest one is.
+        meeting = tree.query_ball_point(ends[at], 1e-12 * body._extent)
+        here = np.concatenate(meeting).astype(int)
+        first = np.cumsum([0, *map(len, meeting[:-1])])
+        way = np.add.reduceat(inward[here], first)[which]
+        least = np.minimum.reduceat(reach[here], first)[which]
+        beside = distance[close] > 1e-3 * reach[nearest[close]]
+        way[beside] = points[close[beside]] - ends[nearest[close[beside]]]
+        lost = ~beside & (np.hypot(*way.T) < 1e-6)
+        way[lost] = inward[nearest[close[lost]]]
+        moved[close] = ends[nearest[close]] + way / np.hypot(*way.T)[:, None] * least[:, None]
         return moved
 
     @cached_property

@@ -130,8 +130,8 @@ class Cycle:
         strain      axial strain that goes with it, positive when shortening; nan where the scene names no axis
         tips        TIP rows of all blocks
         faces       the crack faces, or None when no block holds a crack
-        bodies      block index → solved elastic body with ``stress(points)``, (n, 3), and ``displacement(points)``,
-                    (n, 2), in reference coordinates, for interior fields
+        bodies      block index → solved elastic body with ``fields(points)``: stress (n, 3) and displacement (n, 2)
+                    in reference coordinates, for interior fields
         monitors    name → displacement (2,) of the monitor point, m
         statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
         seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)

@@ -64,14 +64,14 @@ class InteriorMeshes:
         mesh, look_from, weights = self._mesh(cycle, b)
         gradient = motion.gradient[b]
         turn = float(rotation(gradient))
-        own = np.asarray(body.displacement(look_from), dtype=float)
+        stress, own = body.fields(look_from)
         return {
             "points": mesh.points,
             "triangles": mesh.triangles,
             "moved": _placed(
                 mesh.points, weights, own, motion.reference_centre[b], motion.centre[b], gradient, turn
             ),
-            "stress": rotate_stress(body.stress(look_from), turn),
+            "stress": rotate_stress(stress, turn),
         }
 
     def _mesh(self, cycle: Cycle, b: int) -> tuple[Any, np.ndarray, np.ndarray]:

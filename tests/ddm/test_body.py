@@ -166,6 +166,8 @@ def test_fields_are_finite_everywhere():
     sol = body.solve(pressed(-1.0))
     ends = np.concatenate([SQUARE, body.boundary.start, body.faces.start, body.faces.end, body.cracks.nodes])
     assert np.isfinite(sol.stress(ends)).all() and np.isfinite(sol.displacement(ends)).all()
+    stress, displacement = sol.fields(ends)
+    assert np.array_equal(stress, sol.stress(ends)) and np.array_equal(displacement, sol.displacement(ends))
     whole = ddm.Body([SQUARE], NONE, ROCK).solve(pressed(-1.0))
     assert np.allclose(whole.stress(np.vstack([SQUARE, whole.body.boundary.start])), [0, -1, 0], atol=1e-6)
 

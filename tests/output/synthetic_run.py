@@ -86,10 +86,10 @@ class UniformBody:
     def __init__(self, load: float, spin: float = 3e-4) -> None:
         self.load, self.spin = load, spin
 
-    def stress(self, points: np.ndarray) -> np.ndarray:
-        out = np.zeros((len(points), 3))
-        out[:, 1] = -self.load
-        return out
+    def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        stress = np.zeros((len(points), 3))
+        stress[:, 1] = -self.load
+        return stress, self.displacement(points)
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
         xx, yy, xy = strain_of(self.load)
