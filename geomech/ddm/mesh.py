@@ -3,8 +3,9 @@
 Sides are cut to nearly equal elements, graded towards corners and crack mouths; a straight initial crack has
 ``elements_per_crack`` elements, every grown increment one. Density has weak singularities at kinks, junctions and
 mouths: there element sizes shrink geometrically. Last, elements that are long beside their distance to others are
-halved. A kink loses its grading again when the tip is three increments past it, where it no longer matters for the
-stress intensity.
+halved. A slight kink loses its grading again when the tip is three increments past it, where it no longer matters for
+the stress intensity. A sharp one keeps it: where a wing leaves a flaw, the corner carries the wedge that drives the
+wing's tip however far away (without grading its K_I was 18 % low at 1.6 flaw lengths).
 """
 
 from __future__ import annotations
@@ -20,9 +21,12 @@ from .influence import ElementSet
 
 #: A turn by more than this is a kink that is graded, rad.
 KINK = math.radians(20)
+#: A turn by more than this is a sharp kink, graded for good and by so many layers more (two of them: K_I 3.5 % → 1 %).
+SHARP_KINK = math.radians(60)
+SHARP_LAYERS = 2
 #: Neighbouring segments whose elements differ more than this in length are graded.
 JUMP = 10.0
-#: Increments between a kink and the tip from which the kink is not graded any more.
+#: Increments between a slight kink and the tip from which the kink is not graded any more.
 FORGOTTEN = 3
 #: Longest element in units of its distance to another one. Its density then still converges like 3.5^−p.
 APART = 1.25
@@ -237,7 +241,9 @@ def _node_layers(cracks: Cracks, size: np.ndarray, settings: DdmSettings) -> np.
         # Both directions away from the node: straight on means opposite.
         u, v = direction[s] * (1 - 2 * e), direction[r] * (1 - 2 * f)
         turn = math.pi - abs(math.atan2(u[0] * v[1] - u[1] * v[0], float(u @ v)))
-        if turn > KINK and not _forgotten(cracks, ends, here):
+        if turn > SHARP_KINK and full:
+            layers[s, e] = layers[r, f] = full + SHARP_LAYERS
+        elif turn > KINK and not _forgotten(cracks, ends, here):
             layers[s, e] = layers[r, f] = full
         if max(size[s], size[r]) > JUMP * min(size[s], size[r]):
             longer = (s, e) if size[s] > size[r] else (r, f)
