@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Blocks, Motion
+from ..model.polygon import area_moments
 
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = np.radians(10.0)
@@ -295,20 +296,3 @@ def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -
     moments = length / 6 * (cross(a, t_a) + 4 * cross(middle, t_middle) + cross(b, t_b))
     size = float(np.sum(length * (np.hypot(*t_a.T) + np.hypot(*t_b.T)) / 2))
     return forces.sum(axis=0), float(moments.sum()), size
-
-
-def area_moments(loops: list[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray]:
-    """(area, centroid (2,), second moments about the centroid (2, 2): [[∫x², ∫xy], [∫xy, ∫y²]]) of a polygon with
-    holes, by closed boundary sums."""
-    origin = loops[0][0]
-    area, first, second = 0.0, np.zeros(2), np.zeros((2, 2))
-    for loop in loops:
-        p = loop - origin
-        q = np.roll(p, -1, axis=0)
-        w = p[:, 0] * q[:, 1] - q[:, 0] * p[:, 1]
-        area += w.sum() / 2
-        first += ((p + q) * w[:, None]).sum(axis=0) / 6
-        outer = np.einsum("e,ei,ej->ij", w, p + q, p + q)
-        second += (outer + np.einsum("e,ei,ej->ij", w, p, p) + np.einsum("e,ei,ej->ij", w, q, q)) / 24
-    centroid = first / area
-    return float(area), origin + centroid, second - area * np.outer(centroid, centroid)

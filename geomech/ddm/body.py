@@ -17,11 +17,12 @@ from functools import cached_property
 import numpy as np
 
 from ..model import Cracks, DdmSettings, Material
+from ..model.polygon import area_moments
 from .factor import Factor
 from .influence import ElementSet, influence, line_forces, project_jumps, reuse
 from .loads import BodyLoad, check_equilibrium
 from .mesh import Mesh, mesh, outline_edges
-from .particular import Particular, polygon_moments
+from .particular import Particular
 from .solution import Solution, settle_faces
 from .validity import check_cracks, check_outline
 
@@ -60,9 +61,7 @@ class Body:
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
         if self.loops:
-            _, first, _ = polygon_moments(self.loops, self.loops[0][0])
-            self.area = polygon_moments(self.loops, self.loops[0][0])[0]
-            self.centroid = self.loops[0][0] + first / self.area
+            self.area, self.centroid, _ = area_moments(self.loops)
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
         points = np.concatenate([self.mesh.edges.reshape(-1, 2), cracks.nodes])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .particular import polygon_moments
+from ..model.polygon import polygon_moments
 
 
 class OutOfEquilibrium(ValueError):

@@ -1,4 +1,4 @@
-"""A particular solution for body forces that vary linearly, and the polygon moments their resultants need.
+"""A particular solution for body forces that vary linearly.
 
 For a force b = b0 + B X per volume, X measured from any origin, with M = λ + 2μ the cubic field
 
@@ -50,21 +50,3 @@ class Particular:
         ux = -(b[0] * x**2 / 2 + g[0, 0] * x**3 / 6) / m - g[0, 1] * y**3 / (6 * mu)
         uy = -(b[1] * y**2 / 2 + g[1, 1] * y**3 / 6) / m - g[1, 0] * x**3 / (6 * mu)
         return np.column_stack([ux + strain[0] * x + 0.5 * strain[2] * y, uy + strain[1] * y + 0.5 * strain[2] * x])
-
-
-def polygon_moments(loops: list[np.ndarray], origin: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """Area, first moments (2,) and second moments (2, 2) about ``origin``, holes (clockwise) taken out."""
-    area, first, second = 0.0, np.zeros(2), np.zeros((2, 2))
-    for loop in loops:
-        p = loop - origin
-        q = np.roll(p, -1, axis=0)
-        cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-        area += 0.5 * cross.sum()
-        first += ((p + q) * cross[:, None]).sum(axis=0) / 6
-        s = p + q
-        second += (
-            np.einsum("i,ij,ik->jk", cross, p, p)
-            + np.einsum("i,ij,ik->jk", cross, q, q)
-            + np.einsum("i,ij,ik->jk", cross, s, s)
-        ) / 24
-    return area, first, second

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from geomech.coupling.tractions import area_moments, boundary_load, linear_pressure, resultants
+from geomech.coupling.tractions import boundary_load, linear_pressure, resultants
 from geomech.model import CONTACT, SLIP, Blocks, Motion
+from geomech.model.polygon import area_moments
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -147,19 +148,3 @@ def test_turned_block_sees_its_forces_in_its_own_frame():
     here = load_of(0, blocks, upright)
     assert there.segments == pytest.approx(here.segments, abs=1e-13)
     assert there.tractions == pytest.approx(here.tractions, abs=1e-13)
-
-
-def test_area_moments_of_a_rectangle_with_a_hole_far_from_the_origin():
-    """Against bh, bh³/12 and the hole's own, at 10⁶ m from the origin."""
-    outline = np.array([[0, 0], [4, 0], [4, 2], [0, 2.0]])
-    hole = np.array([[1, 0.5], [1, 1.5], [2, 1.5], [2, 0.5]])
-    shift = np.array([1e6, -1e6])
-    area, centroid, second = area_moments([outline + shift, hole + shift])
-    assert area == pytest.approx(7.0, rel=1e-12)
-    centre = (8 * np.array([2, 1]) - np.array([1.5, 1.0])) / 7
-    assert centroid - shift == pytest.approx(centre, abs=1e-9)
-    def about(b, h, at):
-        own = np.diag([b**3 * h / 12, b * h**3 / 12])
-        return own + b * h * np.outer(np.array(at) - centre, np.array(at) - centre)
-
-    assert second == pytest.approx(about(4, 2, [2, 1]) - about(1, 1, [1.5, 1.0]), rel=1e-9, abs=1e-9)
