@@ -28,8 +28,25 @@ from .validity import check_cracks, check_outline
 
 #: A load segment may stand this far off the boundary, in units of the extent; it is put onto it.
 _OFF = 1e-6
+#: Loads on so many different segments are remembered.
+_REMEMBERED = 400
 #: Reciprocal condition of S below which contact is not built on its inverse.
 _SAFE = 1e-11
+
+
+class _UnitLoad:
+    """What unit loads do, one a column of ``applied``: tractions g on the boundary above r on the cracks.
+
+    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r − A_CΓ y) with y = A_ΓΓ⁻¹ g, of which
+    ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against`` whether they were
+    given against the boundary's direction.
+    """
+
+    def __init__(self, applied: np.ndarray, segment: np.ndarray | None = None, against: bool = False):
+        self.applied, self.segment, self.against = applied, segment, against
+        self.eliminated: np.ndarray | None = None
+        self.answered: np.ndarray | None = None
+        self.used = False
 
 
 class Body:
@@ -119,11 +136,11 @@ class Body:
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(c.n_unknowns, -1)
         self._columns = np.empty((c.n_unknowns, 0))
-        self._segments: dict[bytes, tuple[np.ndarray, np.ndarray, np.ndarray, bool]] = {}
-        self._edge_forces: tuple[np.ndarray, np.ndarray] | None = None
+        self._segments: dict[bytes, _UnitLoad] = {}
+        self._forces: _UnitLoad | None = None
         self._recent: list[bytes] = []
-        if same_boundary and old._recent:
-            self._inherit_segments(old, c_old)
+        if same_boundary:
+            self._inherit_loads(old, c_old)
 
     def _rigid_motions(self) -> tuple[np.ndarray, np.ndarray]:
         """(n, 3L) rigid motions of every loop in nodal unknowns and (3L, n) their mean over the loop."""
@@ -182,58 +199,76 @@ class Body:
         out = np.einsum("nmce,mcx->mnex", by_end, turn)
         return np.ascontiguousarray(out.reshape(len(segments), targets.n_unknowns, 4))
 
-    def _inherit_segments(self, old: Body, c_old: np.ndarray) -> None:
-        new = np.flatnonzero(c_old < 0)
+    def _inherit_loads(self, old: Body, c_old: np.ndarray) -> None:
+        n_g = self.boundary.n_unknowns
+        if old._forces is not None:
+            self._forces = self._unit_forces(old._forces.applied[:n_g])
+            self._forces.eliminated = old._forces.eliminated
         keys = [key for key in old._recent if key in old._segments]
         if not keys:
             return
-        straight = np.array([old._segments[key][2] for key in keys])
+        new, kept = np.flatnonzero(c_old < 0), np.flatnonzero(c_old >= 0)
+        straight = np.array([old._segments[key].segment for key in keys])
         fresh = self._linear_forces(self.faces.take(new), straight)
-        kept = np.flatnonzero(c_old >= 0)
-        to, fro, at = self.faces.unknowns(kept), old.faces.unknowns(c_old[kept]), self.faces.unknowns(new)
-        for key, block in zip(keys, fresh):
-            on_boundary, on_cracks, segment, against = old._segments[key]
-            rows = np.empty((self.faces.n_unknowns, 4))
-            rows[to], rows[at] = on_cracks[fro], block
-            self._segments[key] = (on_boundary, rows, segment, against)
+        to, fro, at = (
+            n_g + x for x in (self.faces.unknowns(kept), old.faces.unknowns(c_old[kept]), self.faces.unknowns(new))
+        )
+        for key, rows in zip(keys, fresh):
+            before = old._segments[key]
+            applied = np.empty((n_g + self.faces.n_unknowns, 4))
+            applied[:n_g], applied[to], applied[at] = before.applied[:n_g], before.applied[fro], rows
+            self._segments[key] = unit = _UnitLoad(applied, before.segment, before.against)
+            unit.eliminated = before.eliminated
         self._recent = keys
 
-    def _segment_response(self, load: BodyLoad) -> tuple[np.ndarray, np.ndarray]:
-        """Tractions on boundary and cracks from the load's segments."""
-        g, c = np.zeros(self.boundary.n_unknowns), np.zeros(self.faces.n_unknowns)
+    def _unit_segments(self, load: BodyLoad) -> list[tuple[_UnitLoad, np.ndarray]]:
+        """The load's segments and their (4,) tractions."""
         if load.segments is None or not len(load.segments):
-            return g, c
+            return []
         if not self.loops:
             raise ValueError("load segments need a body with an outline")
         keys = [segment.tobytes() for segment in load.segments]
         missing = [k for k, key in enumerate(keys) if key not in self._segments]
         if missing:
+            if len(self._segments) > _REMEMBERED:
+                self._segments.clear()
+                return self._unit_segments(load)
             placed = [self._on_boundary(load.segments[k], k) for k in missing]
             straight = np.array([segment for segment, _ in placed])
-            on_boundary = self._linear_forces(self.boundary, straight)
-            on_cracks = self._linear_forces(self.faces, straight)
-            if len(self._segments) > 400:
-                self._segments.clear()
-                return self._segment_response(load)
-            for k, (segment, against), a, b in zip(missing, placed, on_boundary, on_cracks):
-                self._segments[keys[k]] = (a, b, segment, against)
-        for key, ends in zip(keys, load.tractions):
-            a, b, _, against = self._segments[key]
-            ends = (ends[::-1] if against else ends).ravel()
-            g += a @ ends
-            c += b @ ends
+            parts = (self._linear_forces(targets, straight) for targets in (self.boundary, self.faces))
+            for k, (segment, against), *rows in zip(missing, placed, *parts):
+                self._segments[keys[k]] = _UnitLoad(np.concatenate(rows), segment, against)
         self._recent = keys
-        return g, c
+        units = [self._segments[key] for key in keys]
+        return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, load.tractions)]
 
-    def _particular_response(self, densities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tractions from quadratic line forces on the outline's edges, (m, 2, 3) local monomials."""
-        if self._edge_forces is None:
-            a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
-            self._edge_forces = tuple(
-                line_forces(targets, a, b, 2, self.nu, self._tol, -1.0).reshape(targets.n_unknowns, 6 * len(a))
-                for targets in (self.boundary, self.faces)
-            )
-        return tuple(matrix @ densities.ravel() for matrix in self._edge_forces)
+    def _unit_forces(self, on_boundary: np.ndarray | None = None) -> _UnitLoad:
+        """The six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy of size one; ``on_boundary`` if it is known already."""
+        one = np.eye(6)
+        units = [Particular(self.centroid, e[:2], e[2:].reshape(2, 2), np.zeros(3), self.material) for e in one]
+        densities = np.column_stack([self.edge_densities(unit).ravel() for unit in units])
+        a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
+
+        def from_edges(targets: ElementSet) -> np.ndarray:
+            forces = line_forces(targets, a, b, 2, self.nu, self._tol, -1.0)
+            return forces.reshape(targets.n_unknowns, 6 * len(a)) @ densities
+
+        points = self.faces.nodes.reshape(-1, 2)
+        inside = np.column_stack([self._uniform_on_faces(unit.stress_of_force(points)) for unit in units])
+        first = from_edges(self.boundary) if on_boundary is None else on_boundary
+        return _UnitLoad(np.concatenate([first, from_edges(self.faces) + inside]))
+
+    def _answer(self, units: list[_UnitLoad]) -> None:
+        """Work out what the ``units`` come to."""
+        n_g = self.boundary.n_unknowns
+        fresh = [unit for unit in units if unit.eliminated is None]
+        if fresh:
+            y = self._gg_factor.solve(np.asfortranarray(np.hstack([unit.applied[:n_g] for unit in fresh])))
+            for unit, part in zip(fresh, np.split(y, np.cumsum([u.applied.shape[1] for u in fresh])[:-1], axis=1)):
+                unit.eliminated = part
+        for unit in units:
+            reduced = unit.applied[n_g:] - self._cg @ unit.eliminated
+            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced])
 
     def _particular(self, load: BodyLoad) -> Particular:
         force = np.zeros(2) if load.body_force is None else load.body_force
@@ -245,7 +280,7 @@ class Body:
         uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
         return Particular(self.centroid, force, gradient, uniform, self.material)
 
-    def _edge_densities(self, particular: Particular) -> np.ndarray:
+    def edge_densities(self, particular: Particular) -> np.ndarray:
         """(m, 2, 3) monomials of −σ_p n (n outward) along every edge, local components."""
         a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
         d = b - a
@@ -281,21 +316,30 @@ class Body:
             check_equilibrium(
                 load, self.loops, self.centroid, particular.force, particular.gradient, equilibrium_tolerance
             )
-        g, r = self._segment_response(load)
-        body_force = bool(particular.force.any() or particular.gradient.any())
-        edge_densities = None
-        if body_force:
-            edge_densities = self._edge_densities(particular)
-            more_g, more_r = self._particular_response(edge_densities)
-            g, r = g + more_g, r + more_r
-            r = r + self._uniform_on_faces(particular.stress(self.faces.nodes.reshape(-1, 2)))
-        elif particular.uniform.any():
-            r = r + self._uniform_on_faces(particular.uniform)
-        y = self._gg_factor.solve(g)
-        r_faces = r - self._cg @ y if self.faces.n else r
-        w, closed, traction, solves = settle_faces(self, r_faces, load.crack_pressure, warm)
-        u = -y - self._w @ w if self.faces.n else -y
-        return Solution(self, load, particular, edge_densities, u, w, closed, traction, g, r, solves)
+        units = self._unit_segments(load)
+        if particular.force.any() or particular.gradient.any():
+            if self._forces is None:
+                self._forces = self._unit_forces()
+            units.append((self._forces, np.concatenate([particular.force, particular.gradient.ravel()])))
+        again = [unit for unit, _ in units if unit.used and unit.answered is None]
+        if again:
+            self._answer(again)
+        n_g, n = self.boundary.n_unknowns, self.boundary.n_unknowns + self.faces.n_unknowns
+        total, rest = np.zeros(2 * n), np.zeros(n)
+        for unit, size in units:
+            unit.used = True
+            if unit.answered is None:
+                rest += unit.applied @ size
+            else:
+                total += unit.answered @ size
+        if particular.uniform.any():
+            rest[n_g:] += self._uniform_on_faces(particular.uniform)
+        if rest.any():
+            y = self._gg_factor.solve(rest[:n_g])
+            total += np.concatenate([rest, y, rest[n_g:] - self._cg @ y])
+        g, r, y, reduced = np.split(total, [n_g, n, n + n_g])
+        w, closed, traction, solves = settle_faces(self, reduced, load.crack_pressure, warm)
+        return Solution(self, load, particular, y, w, closed, traction, g, r, solves)
 
     def _free_factor(self, closed: np.ndarray) -> tuple[np.ndarray, Factor]:
         """Free unknowns (indices) and factors of S restricted to them, ``closed`` (n_unknowns,) bool fixed."""
@@ -350,6 +394,17 @@ class Body:
         w[free] = factor.solve((right - self._schur @ w)[free])
         reaction[at] = (right - self._schur @ w)[at]
         return w, reaction
+
+    @cached_property
+    def closing(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(n_unknowns,) aperture (2μ, zero for slip), which unknowns can close (bool) and what they are then."""
+        c = self.faces
+        aperture = np.zeros((c.n, 2, c.per))
+        aperture[:, 1] = 2 * self.material.shear_modulus * self.cracks.aperture[c.source, None]
+        can_close = np.zeros(aperture.shape, bool)
+        can_close[:, 1] = np.isfinite(aperture[:, 1])
+        aperture[~can_close] = 0.0
+        return aperture.ravel(), can_close.ravel(), -aperture.ravel()
 
     @cached_property
     def strain_weights(self) -> np.ndarray:

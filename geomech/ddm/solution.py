@@ -32,25 +32,19 @@ def settle_faces(
     if n == 0:
         return np.zeros(0), np.zeros(0, bool), np.zeros(0), 0
     pressure = np.broadcast_to(np.asarray(pressure, dtype=float), (body.cracks.n_segments,))
-    normal = np.zeros((c.n, 2, c.per), bool)
-    normal[:, 1] = True
-    normal = normal.ravel()
     applied = np.zeros((c.n, 2, c.per))
     applied[:, 1] = -pressure[c.source, None]
-    right = applied.ravel() - load_traction
-    aperture = np.zeros((c.n, 2, c.per))
-    aperture[:, 1] = 2 * body.material.shear_modulus * body.cracks.aperture[c.source, None]
-    aperture = aperture.ravel()
-    can_close = normal & np.isfinite(aperture)
-    fixed = np.where(can_close, -aperture, 0.0)
+    applied = applied.ravel()
+    right = applied - load_traction
+    aperture, can_close, fixed = body.closing
     stress_scale = max(float(np.abs(right).max()), np.finfo(float).tiny)
     gap_scale = stress_scale * float(c.length.max())
     state: dict[str, np.ndarray] = {}
 
     def respond(closed):
         w, reaction = body.constrained(right, closed, fixed)
-        state["w"], state["traction"] = w, applied.ravel() - reaction
-        return (w + np.where(can_close, aperture, 0.0)) / gap_scale, reaction / stress_scale
+        state["w"], state["traction"] = w, applied - reaction
+        return (w + aperture) / gap_scale, reaction / stress_scale
 
     closed = np.zeros(n, bool)
     if not can_close.any():
@@ -77,8 +71,7 @@ class Solution:
         body: Body,
         load: BodyLoad,
         particular: Particular,
-        edge_densities: np.ndarray | None,
-        boundary_displacement: np.ndarray,
+        eliminated: np.ndarray,
         jumps: np.ndarray,
         closed: np.ndarray,
         traction: np.ndarray,
@@ -88,9 +81,14 @@ class Solution:
     ):
         self.body, self.load, self.solves = body, load, solves
         self.closed = closed
-        self._particular, self._edge_densities = particular, edge_densities
-        self._u, self._w, self._traction = boundary_displacement, jumps, traction
+        self._particular, self._eliminated = particular, eliminated
+        self._w, self._traction = jumps, traction
         self._boundary_load, self._face_load = boundary_load, face_load
+
+    @cached_property
+    def _u(self) -> np.ndarray:
+        """(n_unknowns,) 2μ times the displacement of the boundary."""
+        return -self._eliminated - self.body._w @ self._w
 
     @cached_property
     def states(self) -> np.ndarray:
@@ -212,9 +210,9 @@ class Solution:
         if self.load.segments is not None and len(self.load.segments):
             start, end, density = self._line_forces
             add(start, end, np.zeros(len(start), np.int64), density, 2e-6 * body._extent, True)
-        if self._edge_densities is not None:
-            edges = body.mesh.edges
-            add(edges[:, 0], edges[:, 1], np.zeros(len(edges), np.int64), self._edge_densities, body._tol, True)
+        if self._particular.force.any() or self._particular.gradient.any():
+            edges, density = body.mesh.edges, body.edge_densities(self._particular)
+            add(edges[:, 0], edges[:, 1], np.zeros(len(edges), np.int64), density, body._tol, True)
         shift /= 2 * body.material.shear_modulus
         return stress + self._particular.stress(where), shift + self._particular.displacement(where)
 

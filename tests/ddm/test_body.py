@@ -59,6 +59,35 @@ def test_reuse_agrees_with_a_fresh_body():
             assert np.allclose(kept.stress(p), fresh.stress(p), rtol=1e-10)
 
 
+def test_loads_that_come_again_are_answered_as_new_ones():
+    """Tractions and body forces of changing size on the same segments, one against the boundary's direction, and after
+    growth: 1e-12 of the largest K, stress and displacement to the round-off of their sums."""
+    rng = np.random.default_rng(7)
+    segments = np.stack([SQUARE, np.roll(SQUARE, -1, axis=0)], axis=1)
+    segments[1] = segments[1, ::-1]
+    points = np.array([[0.5, 0.4], [-0.8, 0.1]])
+    body = None
+    for n in (0, 1, 2):
+        body = ddm.Body([SQUARE], grown(n, aperture=math.inf), ROCK, previous=body)
+        for _ in range(4):
+            # A uniform pressure, and tractions that hold a uniform body force.
+            b = rng.normal(size=2)
+            push = rng.normal() * 5
+            tractions = np.array([[[0, push]] * 2, [[0, 0]] * 2, [[0, -push]] * 2, [[0, 0]] * 2])
+            tractions[2] += -4 * b / 2
+            tractions[1] += [[0.0, -b[0]], [0.0, -b[0]]]
+            tractions[3] += [[0.0, b[0]], [0.0, b[0]]]
+            load = ddm.BodyLoad(segments=segments, tractions=tractions, body_force=b, about=np.zeros(2))
+            again = body.solve(load)
+            fresh = ddm.Body([SQUARE], body.cracks, ROCK).solve(load)
+            scale = np.abs(np.concatenate([fresh.tips["k_i"], fresh.tips["k_ii"]])).max()
+            for name in ("k_i", "k_ii"):
+                assert np.abs(again.tips[name] - fresh.tips[name]).max() < 1e-12 * scale
+            for got, want in zip(again.fields(points), fresh.fields(points)):
+                assert np.allclose(got, want, rtol=0, atol=1e-11 * np.abs(want).max())
+            assert abs(again.residual - fresh.residual) < 1e-11
+
+
 def test_boundary_is_not_touched_by_growth_inside():
     first = ddm.Body([SQUARE], grown(0), ROCK)
     second = ddm.Body([SQUARE], grown(1), ROCK, previous=first)
