@@ -14,6 +14,17 @@ MPA = 1e6
 #: Wing lengths that the report lists, in half-lengths of the flaw.
 LISTED = (0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
+#: What the report says of itself.
+LIMITS = """\
+What this does and does not say
+  - The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a
+    third of the width. They share the fall of K_I with length (stable growth), not its size; from where the
+    wings are as far from the ends as the specimen is wide, K_I rises again and they part from them.
+  - The load at which wings run to the ends belongs to ends under uniform stress: a block with one strain gives
+    its ends no resistance to bending open, as stiff platens would. LEFM then leaves a last ligament of the
+    order of an increment standing up to higher loads, so the load of daylighting depends on the increment.
+  - Published pictures (wings that turn into the load's direction) agree in kind only: no numbers are printed."""
+
 
 @dataclass
 class Wings:
@@ -96,7 +107,7 @@ def report(wings: Wings) -> str:
     """The comparison as text."""
     if not len(wings.load):
         return f"No tip grew ({wings.end}); modulus {wings.tangent_modulus() / 1e9:.2f} GPa."
-    return "\n\n".join([_first_step(wings), _growth(wings), _lengths(wings), _stiffness(wings), _limits()])
+    return "\n\n".join([_first_step(wings), _growth(wings), _lengths(wings), _stiffness(wings), LIMITS])
 
 
 def _first_step(wings: Wings) -> str:
@@ -104,6 +115,7 @@ def _first_step(wings: Wings) -> str:
     angle, k_eq = maximum_tangential_stress(wings.k[:1, 0], wings.k[:1, 1])
     plane, factor = published.open_slot_in_plane(), published.secant_correction()
     plane_angle, _ = maximum_tangential_stress(np.array([-plane[0]]), np.array([plane[1]]))
+    plane_kink = np.degrees(abs(plane_angle[0]))
     predicted = published.K_IC * wings.load[0] / k_eq[0]
     return "\n".join(
         [
@@ -113,8 +125,7 @@ def _first_step(wings: Wings) -> str:
                 f"  |{name}|/σ √m{' ' * (5 - len(name))} {ours:8.5f}    {theirs:19.5f}    {p:14.5f}    {p * factor:10.5f}"
                 for name, ours, theirs, p in zip(("K_I", "K_II"), k, published.OPEN_SLOT, plane)
             ),
-            f"  kink, degrees  {np.degrees(abs(angle[0])):8.2f}    {published.KINK_DEG:19.1f}    "
-            f"{np.degrees(abs(plane_angle[0])):14.2f}",
+            f"  kink, degrees  {np.degrees(abs(angle[0])):8.2f}    {published.KINK_DEG:19.2f}    {plane_kink:14.2f}",
             f"  load {wings.load[0] / MPA:.2f} MPa; K_eq reaches K_Ic at {predicted / MPA:.2f} MPa",
         ]
     )
@@ -124,14 +135,14 @@ def _growth(wings: Wings) -> str:
     last = wings.run_off
     risen = wings.load[wings.stable]
     to_end = wings.height / 2 - wings.tip[last, 1]
+    load, mm = wings.load[[0, last]] / MPA, np.array([wings.arrested, wings.wing[last], to_end]) * 1e3
+    shear = np.abs(wings.k[1:, 1] / wings.k[1:, 0]).max() if len(wings.k) > 1 else np.nan
     lines = [
         "Growth",
-        f"  the first burst, at {wings.load[0] / MPA:.1f} MPa, leaves wings of {wings.arrested * 1e3:.0f} mm; then each "
-        f"needs a higher load ({len(risen) - 1} rises)",
-        f"  at {wings.load[last] / MPA:.1f} MPa, wings {wings.wing[last] * 1e3:.0f} mm long and {to_end * 1e3:.0f} mm from "
-        "the specimen's ends, they run on at that load",
-        f"  direction there {wings.direction[last]:.2f} degrees from the load; |K_II|/K_I at most "
-        f"{np.abs(wings.k[1:, 1] / wings.k[1:, 0]).max():.3f} after the kink",
+        f"  the first burst, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm",
+        f"  then each increment needs a higher load, {len(risen) - 1} times over",
+        f"  at {load[1]:.1f} MPa, {mm[1]:.0f} mm long and {mm[2]:.0f} mm from the specimen's ends, they run on at that load",
+        f"  direction there {wings.direction[last]:.2f} degrees from the load; |K_II|/K_I at most {shear:.3f} after the kink",
         f"  how the run ended: {wings.end}",
     ]
     return "\n".join(lines)
@@ -156,19 +167,4 @@ def _stiffness(wings: Wings) -> str:
     return (
         f"Stiffness before growth {wings.tangent_modulus() / 1e9:.2f} GPa; plane strain with one small open slot "
         f"{published.tangent_modulus() / 1e9:.2f} GPa"
-    )
-
-
-def _limits() -> str:
-    return "\n".join(
-        [
-            "What this does and does not say",
-            "  - The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a",
-            "    third of the width. They share the fall of K_I with length (stable growth), not its size; from where the",
-            "    wings are as far from the ends as the specimen is wide, K_I rises again and they part from them.",
-            "  - The load at which wings run to the ends belongs to ends under uniform stress: a block with one strain gives",
-            "    its ends no resistance to bending open, as stiff platens would. LEFM then leaves a last ligament of the",
-            "    order of an increment standing up to higher loads, so the load of daylighting depends on the increment.",
-            "  - Published pictures (wings that turn into the load's direction) agree in kind only: no numbers are printed.",
-        ]
     )

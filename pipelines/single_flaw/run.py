@@ -11,7 +11,7 @@ from geomech.pipeline import run
 from geomech.scene import load_scene
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_single_flaw import Wings, report  # noqa: E402
+from compare_single_flaw import Wings, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:

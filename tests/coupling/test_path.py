@@ -1,0 +1,61 @@
+"""The rule for chords, on a model of what a crack asks for at the end of a step."""
+
+import numpy as np
+import pytest
+
+from geomech.coupling.path import LOOKS, TOLERANCE, Chords
+from geomech.model import TIP, Cracks
+
+
+def chosen(ask, start_deg: float) -> tuple[float, int]:
+    """The chord's angle, degrees, when the criterion asks ``start_deg`` at the start of the step and ``ask(θ)`` at the
+    end of one along θ, and how many looks ahead that took."""
+    tips = np.zeros(1, TIP)
+    tips["angle"] = np.radians(start_deg)
+    chords = Chords(tips)
+    for look in range(1, LOOKS + 1):
+        angle = float(tips["angle"][0])
+        ends = np.array([[-1.0, 0.0], [0.0, 0.0], [np.cos(angle), np.sin(angle)]])
+        grown = Cracks(
+            nodes=ends,
+            segments=np.array([[0, 1], [1, 2]]),
+            crack=np.zeros(2, int),
+            block=np.zeros(2, int),
+            birth_cycle=np.array([0, 7]),
+            aperture=np.zeros(2),
+            surface=np.zeros(3, bool),
+        )
+        ahead = np.zeros(1, TIP)
+        ahead["node"], ahead["angle"] = 2, np.radians(ask(np.degrees(angle)))
+        if chords.bend(tips, np.ones(1), ahead, grown, 7):
+            break
+    return float(np.degrees(tips["angle"][0])), look
+
+
+def test_chord_of_an_arc_has_half_its_turn():
+    """An arc that turns by 8 degrees a step: whichever way the step went, its end asks for the arc's own direction."""
+    angle, looks = chosen(lambda theta: 8.0 - theta, 0.0)
+    assert angle == pytest.approx(4.0, abs=1e-12)
+    assert looks == 1
+
+
+def test_chord_out_of_a_kink_has_two_thirds_of_the_rest():
+    """y ∝ x^(3/2): slope at the end 3/2 of the chord's (Amestoy & Leblond 1992)."""
+    angle, looks = chosen(lambda theta: 76.0 - theta, 70.0)
+    assert angle == pytest.approx(74.0, abs=1e-12)
+    assert looks == 1
+
+
+@pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
+@pytest.mark.parametrize("start", [3.0, -10.0, 40.0])
+def test_compression_along_the_crack_does_not_throw_the_path_about(start, stiffness):
+    """A straight path along a strong compression, left by a disturbance: the end of a step along θ asks for
+    start − (1 + κ) θ. The condition s (θ − start + a) = θ − start then has the solution start/(1 + s κ), and what is
+    asked for next shrinks for every κ, where a single correction lets it stand for κ = 2 and grow above. One look is
+    enough where it finds less than the tolerance."""
+    angle, looks = chosen(lambda theta: start - (1 + stiffness) * theta, start)
+    share = 2 / 3 if abs(start) > 20 else 1 / 2
+    solution = start / (1 + stiffness * share)
+    assert abs(angle - solution) < np.degrees(TOLERANCE) / (1 + stiffness * share) + 1e-9 or looks == 1
+    after = start - (1 + stiffness) * angle
+    assert abs(after) < abs(start)
