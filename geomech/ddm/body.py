@@ -37,8 +37,8 @@ _SAFE = 1e-11
 class _UnitLoad:
     """What unit loads do, one a column of ``applied``: tractions g on the boundary above r on the cracks.
 
-    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r − A_CΓ y) with y = A_ΓΓ⁻¹ g, of which
-    ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against`` whether they were
+    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹ g, of
+    which ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against`` whether they were
     given against the boundary's direction.
     """
 
@@ -136,6 +136,7 @@ class Body:
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(c.n_unknowns, -1)
         self._columns = np.empty((c.n_unknowns, 0))
+        self._closed_now: tuple[bytes, np.ndarray, Factor] | None = None
         self._segments: dict[bytes, _UnitLoad] = {}
         self._forces: _UnitLoad | None = None
         self._recent: list[bytes] = []
@@ -268,7 +269,7 @@ class Body:
                 unit.eliminated = part
         for unit in units:
             reduced = unit.applied[n_g:] - self._cg @ unit.eliminated
-            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced])
+            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, self._opened(reduced)])
 
     def _particular(self, load: BodyLoad) -> Particular:
         force = np.zeros(2) if load.body_force is None else load.body_force
@@ -324,8 +325,9 @@ class Body:
         again = [unit for unit, _ in units if unit.used and unit.answered is None]
         if again:
             self._answer(again)
-        n_g, n = self.boundary.n_unknowns, self.boundary.n_unknowns + self.faces.n_unknowns
-        total, rest = np.zeros(2 * n), np.zeros(n)
+        n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
+        n = n_g + n_c
+        total, rest = np.zeros(2 * n + n_c), np.zeros(n)
         for unit, size in units:
             unit.used = True
             if unit.answered is None:
@@ -336,9 +338,10 @@ class Body:
             rest[n_g:] += self._uniform_on_faces(particular.uniform)
         if rest.any():
             y = self._gg_factor.solve(rest[:n_g])
-            total += np.concatenate([rest, y, rest[n_g:] - self._cg @ y])
-        g, r, y, reduced = np.split(total, [n_g, n, n + n_g])
-        w, closed, traction, solves = settle_faces(self, reduced, load.crack_pressure, warm)
+            reduced = rest[n_g:] - self._cg @ y
+            total += np.concatenate([rest, y, reduced, self._opened(reduced)])
+        g, r, y, reduced, opened = np.split(total, [n_g, n, n + n_g, 2 * n])
+        w, closed, traction, solves = settle_faces(self, reduced, opened, load.crack_pressure, warm)
         return Solution(self, load, particular, y, w, closed, traction, g, r, solves)
 
     def _free_factor(self, closed: np.ndarray) -> tuple[np.ndarray, Factor]:
@@ -361,6 +364,10 @@ class Body:
             return None
         return factor if factor.rcond > _SAFE else None
 
+    def _opened(self, right: np.ndarray) -> np.ndarray:
+        """S⁻¹ ``right``; zeros where it is not to be used (no `_open_factor`)."""
+        return np.zeros_like(right) if self._open_factor is None else self._open_factor.solve(np.asfortranarray(right))
+
     def _inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
         """(n_unknowns, len(unknowns)) columns of S⁻¹; they outlast the load."""
         missing = unknowns[self._column_at[unknowns] < 0]
@@ -371,9 +378,20 @@ class Body:
             self._columns = np.hstack([self._columns, self._open_factor.solve(right)])
         return self._columns[:, self._column_at[unknowns]]
 
-    def constrained(self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _closed_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
+        """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; mostly the same faces stay closed for long."""
+        key = at.tobytes()
+        if self._closed_now is None or self._closed_now[0] != key:
+            columns = self._inverse_columns(at)
+            factor = Factor(columns[at], "closed faces leave a part of the body without hold")
+            self._closed_now = key, columns, factor
+        return self._closed_now[1:]
+
+    def constrained(
+        self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray, opened: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Jumps w (n,) or (n, k) with w = ``fixed`` where ``closed``, S w = ``right`` elsewhere, and what is missing in
-        the closed rows, right − S w.
+        the closed rows, right − S w. ``opened``: S⁻¹ right, if it is known.
 
         One factorisation serves all contact states: closing k nodes is a k × k system in columns of S⁻¹. Raises
         LinAlgError when cracks cut a part off and closed faces do not hold it.
@@ -381,11 +399,11 @@ class Body:
         at = np.flatnonzero(closed)
         reaction = np.zeros_like(right)
         if self._open_factor is not None:
-            w = self._open_factor.solve(right)
+            w = self._open_factor.solve(right) if opened is None else opened.copy()
             if len(at):
-                columns = self._inverse_columns(at)
-                reaction[at] = np.linalg.solve(columns[at], w[at] - fixed[at])
-                w = w - columns @ reaction[at]
+                columns, factor = self._closed_columns(at)
+                reaction[at] = factor.solve(w[at] - fixed[at])
+                w -= columns @ reaction[at]
                 w[at] = fixed[at]
             return w, reaction
         free, factor = self._free_factor(closed)

@@ -24,9 +24,10 @@ _NUDGE = 0.02
 
 
 def settle_faces(
-    body: Body, load_traction: np.ndarray, pressure: np.ndarray | float, warm: Solution | None
+    body: Body, load_traction: np.ndarray, opened: np.ndarray, pressure: np.ndarray | float, warm: Solution | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Slip and opening (times 2μ), closed unknowns (bool), traction on the faces and the number of solves."""
+    """Slip and opening (times 2μ), closed unknowns (bool), traction on the faces and the number of solves; ``opened`` is
+    S⁻¹ ``load_traction``."""
     c = body.faces
     n = c.n_unknowns
     if n == 0:
@@ -36,13 +37,14 @@ def settle_faces(
     applied[:, 1] = -pressure[c.source, None]
     applied = applied.ravel()
     right = applied - load_traction
+    opened = body._opened(applied) - opened if applied.any() else -opened
     aperture, can_close, fixed = body.closing
     stress_scale = max(float(np.abs(right).max()), np.finfo(float).tiny)
     gap_scale = stress_scale * float(c.length.max())
     state: dict[str, np.ndarray] = {}
 
     def respond(closed):
-        w, reaction = body.constrained(right, closed, fixed)
+        w, reaction = body.constrained(right, closed, fixed, opened)
         state["w"], state["traction"] = w, applied - reaction
         return (w + aperture) / gap_scale, reaction / stress_scale
 
