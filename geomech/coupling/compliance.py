@@ -19,15 +19,16 @@ def stress_rotation(angle: float) -> np.ndarray:
 
 
 def strain_rotation(angle: float) -> np.ndarray:
-    """The same for strain with engineering shear: Q⁻ᵀ, since σ·ε does not change."""
-    return np.linalg.inv(stress_rotation(angle)).T
+    """The same for strain with engineering shear: Q⁻ᵀ, since σ·ε does not change; Q⁻¹ turns back."""
+    return stress_rotation(-angle).T
 
 
 def turned_compliance(compliance: np.ndarray, angle: float) -> np.ndarray:
     """S (3, 3) of a body that has turned by ``angle`` rad."""
     if angle == 0.0:
         return compliance
-    return strain_rotation(angle) @ compliance @ np.linalg.inv(stress_rotation(angle))
+    back = stress_rotation(-angle)
+    return back.T @ compliance @ back
 
 
 def crack_response(

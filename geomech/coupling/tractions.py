@@ -14,10 +14,12 @@ a body force, linear in x, so that the elastic problem is in equilibrium to roun
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..conventions import normal_of
 from ..model import Blocks, Motion
 from ..model.polygon import area_moments
 
@@ -98,7 +100,9 @@ def boundary_load(
         a, b = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
         pieces.add(a, b, turn_back @ traction, turn_back @ traction)
     for point, force in point_loads:
-        _add_point_load(pieces, blocks, block, np.asarray(point, dtype=float), turn_back @ np.asarray(force, dtype=float))
+        _add_point_load(
+            pieces, blocks, block, np.asarray(point, dtype=float), turn_back @ np.asarray(force, dtype=float)
+        )
     segments, tractions = pieces.arrays()
     return _balanced(block, blocks, segments, tractions, density, gravity, acceleration, spin, turn_back)
 
@@ -111,7 +115,7 @@ class _Pieces:
         self.tractions: list[tuple[np.ndarray, np.ndarray]] = []
 
     def add(self, a: np.ndarray, b: np.ndarray, t_a: np.ndarray, t_b: np.ndarray) -> None:
-        if np.any(t_a) or np.any(t_b):
+        if t_a.any() or t_b.any():
             self.segments.append((a, b))
             self.tractions.append((t_a, t_b))
 
@@ -126,11 +130,12 @@ def _rotation(angle: float) -> np.ndarray:
 
 def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: np.ndarray) -> tuple[int, float]:
     """Which of the two edges at ``vertex`` lies against an edge with outward ``normal``, and the angle between."""
-    best = (-1, np.inf)
-    for edge in (int(vertex), int(blocks.previous_vertex[vertex])):
-        along = vertices[blocks.next_vertex[edge]] - vertices[edge]
-        outward = np.array([along[1], -along[0]]) / np.hypot(*along)
-        angle = float(np.arctan2(abs(outward[0] * normal[1] - outward[1] * normal[0]), -(outward @ normal)))
+    best = (-1, math.inf)
+    nx, ny = normal.tolist()
+    for edge in (vertex, int(blocks.previous_vertex[vertex])):
+        x, y = (vertices[blocks.next_vertex[edge]] - vertices[edge]).tolist()
+        # The outward normal of the edge is (y, −x) over its length.
+        angle = math.atan2(abs(y * ny + x * nx), x * ny - y * nx)
         if angle < best[1]:
             best = (edge, angle)
     return best
@@ -138,38 +143,43 @@ def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: np
 
 def _faces_and_lone(
     block: int, blocks: Blocks, vertices: np.ndarray, contacts: np.ndarray
-) -> tuple[dict[tuple[int, int], list], list]:
+) -> tuple[dict[tuple[int, int], np.ndarray], np.ndarray]:
     """The acting contacts of ``block``: joint faces with at least two distinct points, (own edge, other's edge) →
     rows, and the rows left alone."""
     acting = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
-    faces: dict[tuple[int, int], list] = {}
+    rows = acting[(acting["block"] == block) | (acting["other"] == block)]
+    found: dict[tuple[int, int], list[int]] = {}
     lone = []
-    for row in acting[(acting["block"] == block) | (acting["other"] == block)]:
-        edge, angle = _touching_edge(blocks, vertices, row["vertex"], row["normal"])
+    columns = (rows[name].tolist() for name in ("vertex", "edge", "block"))
+    for k, (vertex, edge, owner) in enumerate(zip(*columns, strict=True)):
+        touching, angle = _touching_edge(blocks, vertices, vertex, rows["normal"][k])
         if angle > FACE_ANGLE:
-            lone.append(row)
-        elif row["block"] == block:
-            faces.setdefault((edge, int(row["edge"])), []).append(row)
+            lone.append(k)
         else:
-            faces.setdefault((int(row["edge"]), edge), []).append(row)
-    for face in [face for face, rows in faces.items() if not _spread(rows, vertices, blocks, face[0])]:
-        lone.extend(faces.pop(face))
-    return faces, lone
+            found.setdefault((touching, edge) if owner == block else (edge, touching), []).append(k)
+    faces = {}
+    for face, members in found.items():
+        if _spread(rows["point"][members], vertices, blocks, face[0]):
+            faces[face] = rows[members]
+        else:
+            lone += members
+    return faces, rows[lone]
 
 
-def _spread(rows: list, vertices: np.ndarray, blocks: Blocks, edge: int) -> float:
-    """Distance between the outermost contact points along ``edge``, 0 when it is round-off of the edge's length."""
+def _spread(points: np.ndarray, vertices: np.ndarray, blocks: Blocks, edge: int) -> float:
+    """Distance between the outermost contact ``points`` along ``edge``, 0 when it is round-off of the edge's length."""
     along = vertices[blocks.next_vertex[edge]] - vertices[edge]
     length = np.hypot(*along)
-    places = [(row["point"] - vertices[edge]) @ along / length for row in rows]
-    reach = max(places) - min(places)
+    reach = float(np.ptp((points - vertices[edge]) @ along / length))
     return reach if reach > 1e-6 * length else 0.0
 
 
-def _force_on(block: int, row: np.ndarray) -> np.ndarray:
-    along = np.array([-row["normal"][1], row["normal"][0]])  # the edge's direction: its outward normal turned by +90°
-    force = row["normal_force"] * row["normal"] + row["shear_force"] * along
-    return force if row["block"] == block else -force
+def _force_on(block: int, rows: np.ndarray) -> np.ndarray:
+    """(..., 2) N/m of CONTACT ``rows`` on ``block``."""
+    normal = rows["normal"]
+    along = normal_of(normal)  # the edge's direction: its outward normal turned by +90°
+    force = rows["normal_force"][..., None] * normal + rows["shear_force"][..., None] * along
+    return np.where((rows["block"] == block)[..., None], force, -force)
 
 
 def _add_face(pieces, blocks, motion, block, edge, rows, turn_back) -> None:
@@ -177,8 +187,8 @@ def _add_face(pieces, blocks, motion, block, edge, rows, turn_back) -> None:
     length = np.hypot(*(end - start))
     along = (end - start) / length
     inward = np.array([-along[1], along[0]])
-    places = np.array([(motion.reference(block, row["point"]) - start) @ along for row in rows])
-    forces = np.array([turn_back @ _force_on(block, row) for row in rows])
+    places = (motion.reference(block, rows["point"]) - start) @ along
+    forces = _force_on(block, rows) @ turn_back.T
     first, last = max(places.min(), 0.0), min(places.max(), length)
     # Round-off of the mapping must not make a new load segment every step: the body keeps what it knows of a segment.
     # The pressure below has the force and moment of the contacts on whatever length it is given.
