@@ -243,17 +243,19 @@ class Coupling:
             with self._timed("growth"):
                 return advance(self.cracks, self.blocks.loops, tips, self.problem.growth, k_ic, self.number)
 
-        growth = grow()
+        growth, trial = grow(), self.bodies
         chords = Chords(tips)
         settled = not self.problem.growth.correct
         # A step that joins something may cut a piece off, on which there is nothing to solve.
         while not settled and not growth.joins and np.any(growth.grown > 0):
-            trial, nodes_of = self._bodies_of(growth.cracks, self.bodies)
+            trial, nodes_of = self._bodies_of(growth.cracks, trial)
             ahead = self._tips(self._solve(trial, self.loads, self.solutions), nodes_of)
             settled = chords.bend(tips, growth.grown, ahead, growth.cracks, self.number)
-            self.bodies = trial  # most of it is what the corrected step needs
             growth = grow()
-        return growth if np.any(growth.grown > 0) or growth.joins else None
+        if not (np.any(growth.grown > 0) or growth.joins):
+            return None
+        self.bodies = trial  # most of it is what the corrected step needs
+        return growth
 
     def _initiations(self, tips: np.ndarray, state: State) -> tuple[Event, ...]:
         """An event for every tip that grows for the first time; wings inherit their crack and end by position."""
@@ -342,8 +344,10 @@ class Coupling:
         self.bodies, self.nodes_of = self._bodies_of(self.cracks, self.bodies)
 
     def _bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
-        """block → body of every block that holds ``cracks``, and block → its nodes in the whole network."""
+        """block → body of every moving block that holds ``cracks``, and block → its nodes in the whole network. What
+        keeps a fixed block in place, and so what strains it, is not known."""
         cracked = np.unique(cracks.block)
+        cracked = cracked[~self.blocks.fixed[cracked]]
         if not len(cracked):
             return {}, {}
         from .. import ddm
