@@ -16,8 +16,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..model import Cracks, DdmSettings, Material
+from ..model import TIP, Cracks, DdmSettings, Material
 from ..model.polygon import area_moments
+from . import shapes
 from .factor import Factor
 from .influence import ElementSet, influence, line_forces, project_jumps, reuse
 from .loads import BodyLoad, check_equilibrium
@@ -412,6 +413,32 @@ class Body:
         w[free] = factor.solve((right - self._schur @ w)[free])
         reaction[at] = (right - self._schur @ w)[at]
         return w, reaction
+
+    @cached_property
+    def tip_elements(self) -> tuple[np.ndarray, ...]:
+        """What the tips' rows say of geometry (TIP, factors zero), and of each its element, the element's last node,
+        weights (n_tips, p+1) that make nodal values the coefficient of √r, and whether its faces touch unloaded."""
+        network, c = self.cracks, self.faces
+        n = len(network.tips)
+        rows, element, last = np.zeros(n, TIP), np.zeros(n, int), np.zeros(n, int)
+        lead, touching = np.zeros((n, c.per)), np.zeros(n, bool)
+        at_tip: dict[int, tuple[int, bool]] = {}
+        for e in np.flatnonzero(c.kind != shapes.ORDINARY):
+            i, j = network.segments[c.source[e]]
+            if c.kind[e] in (shapes.TIP_START, shapes.TIP_BOTH):
+                at_tip[int(i)] = int(e), False
+            if c.kind[e] in (shapes.TIP_END, shapes.TIP_BOTH):
+                at_tip[int(j)] = int(e), True
+        for k, (row, node) in enumerate(zip(rows, network.tips)):
+            e, at_end = at_tip[int(node)]
+            segment = c.source[e]
+            row["node"], row["crack"], row["block"] = node, network.crack[segment], network.block[segment]
+            row["end"], row["point"] = at_end, network.nodes[node]
+            row["direction"] = c.tangent[e] if at_end else -c.tangent[e]
+            element[k], last[k] = e, -1 if at_end else 0
+            lead[k] = shapes.leading(c.family, c.order, int(c.kind[e]), at_end) / np.sqrt(c.length[e])
+            touching[k] = network.aperture[segment] == 0
+        return rows, element, last, lead, touching
 
     @cached_property
     def closing(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

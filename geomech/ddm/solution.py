@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..conventions import normal_of
-from ..model import OPEN, SLIP, TIP, CrackFaces
+from ..model import OPEN, SLIP, CrackFaces
 from . import shapes
 from .faces import settle
 from .influence import add_fields
@@ -105,31 +105,14 @@ class Solution:
         K_I is zero where the faces next to the tip are closed, and never negative at a crack without aperture.
         """
         body, c = self.body, self.body.faces
-        network = body.cracks
-        rows = np.zeros(len(network.tips), TIP)
+        known, element, last, lead, touching = body.tip_elements
+        rows = known.copy()
         if not len(rows):
             return rows
-        w = self._w.reshape(c.n, 2, c.per)
         factor = np.sqrt(2 * np.pi) / (8 * (1 - body.nu))
-        at_tip: dict[int, tuple[int, bool]] = {}
-        for e in np.flatnonzero(c.kind != shapes.ORDINARY):
-            i, j = network.segments[c.source[e]]
-            if c.kind[e] in (shapes.TIP_START, shapes.TIP_BOTH):
-                at_tip[int(i)] = int(e), False
-            if c.kind[e] in (shapes.TIP_END, shapes.TIP_BOTH):
-                at_tip[int(j)] = int(e), True
-        for row, node in zip(rows, network.tips):
-            e, at_end = at_tip[int(node)]
-            segment = c.source[e]
-            lead = shapes.leading(c.family, c.order, int(c.kind[e]), at_end)
-            slip, opening = factor * (w[e] @ lead) / np.sqrt(c.length[e])
-            if network.aperture[segment] == 0 and (opening < 0 or self.states[e, -1 if at_end else 0] != OPEN):
-                opening = 0.0
-            row["node"], row["crack"], row["block"] = node, network.crack[segment], network.block[segment]
-            row["end"] = at_end
-            row["point"] = network.nodes[node]
-            row["direction"] = c.tangent[e] if at_end else -c.tangent[e]
-            row["k_i"], row["k_ii"] = opening, slip
+        slip, opening = factor * np.einsum("tcn,tn->ct", self._w.reshape(c.n, 2, c.per)[element], lead)
+        shut = touching & ((opening < 0) | (self.states[element, last] != OPEN))
+        rows["k_i"], rows["k_ii"] = np.where(shut, 0.0, opening), slip
         return rows
 
     @cached_property
