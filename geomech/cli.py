@@ -39,6 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return BAD_INPUT
         if options.debug:
             raise
+        if isinstance(error, OSError) and error.filename:
+            _say(f"geomech: {error.filename}: {(error.strerror or type(error).__name__).lower()}")
+            return FAILED
         _say(f"geomech: {type(error).__name__}: {error}\n(run it again with --debug before the verb for the traceback)")
         return FAILED
 
@@ -133,6 +136,7 @@ def _check(options: argparse.Namespace) -> int:
     for name in _variants(first, options.variants) or [None]:
         scene = first if name is None else load_scene(options.scene, options.overrides, name)
         problem = scene.problem()
+        _say_warnings(scene)
         cracks = f"{problem.cracks.n_cracks} cracks with {len(problem.cracks.tips)} tips"
         print(f"{problem.title}{f' [{name}]' if name else ''}: {problem.blocks.n_blocks} blocks, {cracks}: no errors")
     if first.variants and not options.variants:
@@ -161,6 +165,8 @@ def _run(options: argparse.Namespace) -> int:
     for name, scene in scenes.items():
         # One variant with --out goes into exactly that folder.
         folder = base if name is None or (options.out and len(scenes) == 1) else base / name
+        if not options.quiet:
+            _say_warnings(scene)
         run(scene, out=folder, observers=standard_observers(scene, quiet=options.quiet))
     return DONE
 
@@ -267,6 +273,11 @@ def _say_errors(error: Exception) -> None:
     for place, message, way_out in errors:
         _say(f"{place}: {message}" + (f"\n    {way_out}" if way_out else ""))
     _say(f"{len(errors)} error{'s' if len(errors) > 1 else ''}; nothing was run")
+
+
+def _say_warnings(scene: Any) -> None:
+    for place, message, way_out in scene.warnings:
+        _say(f"warning: {place}: {message}" + (f"\n    {way_out}" if way_out else ""))
 
 
 def _say(text: str) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from .model import Cycle, Problem
+
+log = logging.getLogger(__name__)
 
 
 def cycles(scene) -> Iterator[Cycle]:
@@ -22,21 +25,24 @@ def run(scene, out: str | Path | None = None, observers: Iterable[Any] | None = 
 
     ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are told of every cycle, by default
     the writers that the scene's ``[output]`` table asks for. Whatever ends the run, what was written stays readable
-    and every observer is ended; the exception is raised again. Raises SceneError on bad input,
-    `geomech.dda.NotConverged` when the blocks find no consistent contact state.
+    and every observer is ended; the exception is raised again. Raises SceneError on bad input
+    or when ``out`` is where the scene itself is kept, `geomech.dda.NotConverged` when the blocks find no consistent contact state.
     """
     scene = _loaded(scene)
-    problem = scene.problem()
     folder = Path(out) if out is not None else Path("outputs") / scene.name
+    _spare(scene, folder)
+    problem = scene.problem()
     if observers is None:
         from .output import standard_observers
 
         observers = standard_observers(scene)
-    return run_problem(problem, folder, observers)
+    return run_problem(problem, folder, observers, [str(fault) for fault in scene.warnings])
 
 
-def run_problem(problem: Problem, folder: Path, observers: Iterable[Any]) -> dict[str, Any]:
-    """The same for a problem built in Python."""
+def run_problem(
+    problem: Problem, folder: Path, observers: Iterable[Any], warnings: Iterable[str] = ()
+) -> dict[str, Any]:
+    """The same for a problem built in Python; ``warnings`` about it are logged once the run's log is open."""
     from .coupling import cycles as coupled
     from .output.observer import Group
 
@@ -47,6 +53,8 @@ def run_problem(problem: Problem, folder: Path, observers: Iterable[Any]) -> dic
     error: BaseException | None = None
     try:
         group.on_start(problem, folder)
+        for warning in warnings:
+            log.warning("%s", warning)
         for cycle in coupled(problem):
             stopping += [event.kind for event in cycle.events if event.kind in problem.run.stop_at]
             group.on_cycle(cycle)
@@ -58,6 +66,16 @@ def run_problem(problem: Problem, folder: Path, observers: Iterable[Any]) -> dic
         summary["wall_s"] = time.perf_counter() - began
         group.on_end(summary, error)
     return summary
+
+
+def _spare(scene, folder: Path) -> None:
+    """Refuse to put a run, and with it a scene.toml, where the scene itself is kept."""
+    kept = folder / "scene.toml"
+    if kept.exists() and kept.samefile(scene.path):
+        from .scene import Fault, SceneError
+
+        way_out = "name another folder: --out DIR on the command line"
+        raise SceneError([Fault(str(scene.path), "the run would write over the scene it is run from", way_out)])
 
 
 def _end_reason(stopping: list[str], error: BaseException | None) -> str:

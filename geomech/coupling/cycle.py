@@ -81,7 +81,16 @@ class Coupling:
         static = self.problem.dda.dynamic_factor == 0.0
         for growth_pass in range(self.problem.growth.max_passes + 1):
             self.number += 1
-            result, solutions, mismatch = self._equilibrium(dt, load_time)
+            try:
+                result, solutions, mismatch = self._equilibrium(dt, load_time)
+            except dda.NotConverged as failure:
+                if not (stops or self._stops(pending)):
+                    raise
+                # What ended the run has happened; that its pieces find no rest does not undo it.
+                log.warning("cycle %d shows the blocks before they moved on: %s", self.number, failure)
+                self.state = self.state if load_time is None else replace(self.state, time=load_time)
+                yield self._record(self.state, np.empty(0, TIP), {}, pending, growth_pass, {})
+                return True
             if static:
                 # The passes of a step share its load, also when one of them has to take a shorter step.
                 load_time = result.state.time

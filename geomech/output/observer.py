@@ -37,8 +37,8 @@ class Group:
 
     def on_start(self, problem: Problem, folder: Path) -> None:
         for observer in self.observers:
-            self._started.append(observer)
             observer.on_start(problem, folder)
+            self._started.append(observer)
 
     def on_cycle(self, cycle: Cycle) -> None:
         for observer in self.observers:

@@ -61,7 +61,8 @@ class Progress:
         if self._bar is not None:
             self._bar.close()
         if error is not None:
-            self._say(f"failed: {error or type(error).__name__}\n  what was written until then is in {self._folder}")
+            why = "interrupted" if isinstance(error, KeyboardInterrupt) else f"failed: {error or type(error).__name__}"
+            self._say(f"{why}\n  what was written until then is in {self._folder}")
         elif not self.quiet:
             self._say("\n".join(closing_lines(summary, self._folder)))
 

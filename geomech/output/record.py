@@ -42,7 +42,9 @@ class RunLog:
             )  # fmt: skip
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
-        if error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            _log.warning("interrupted")
+        elif error is not None:
             _log.error("the run failed", exc_info=error)
         else:
             _log.info("ended: %s", summary.get("end", "done"))

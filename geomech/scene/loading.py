@@ -175,8 +175,8 @@ def _file(path: FilePath) -> FilePath:
 
 def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
     try:
-        # Line ends as tomllib sees them, so that lines count alike.
-        text = path.read_bytes().decode("utf-8").replace("\r\n", "\n")
+        # Line ends as tomllib sees them, so that lines count alike; editors on Windows put a mark at the beginning.
+        text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
         return tomllib.loads(text), text
     except UnicodeDecodeError as error:
         raise SceneError([Fault(str(path), f"the file is not UTF-8 text ({error})", "save it as UTF-8")]) from error
