@@ -145,7 +145,9 @@ _DECLARED = {
 }
 
 
-def conform(series: str, place: str, count: int, arrays: Mapping[str, np.ndarray]) -> dict[str, tuple[Field, np.ndarray]]:
+def conform(
+    series: str, place: str, count: int, arrays: Mapping[str, np.ndarray]
+) -> dict[str, tuple[Field, np.ndarray]]:
     """``arrays`` as declared: name → (field, contiguous array of the declared dtype and ``count`` rows).
 
     Raises ValueError naming a missing, an undeclared or a wrongly shaped array."""

@@ -68,9 +68,7 @@ class InteriorMeshes:
         return {
             "points": mesh.points,
             "triangles": mesh.triangles,
-            "moved": _placed(
-                mesh.points, weights, own, motion.reference_centre[b], motion.centre[b], gradient, turn
-            ),
+            "moved": _placed(mesh.points, weights, own, motion.reference_centre[b], motion.centre[b], gradient, turn),
             "stress": rotate_stress(stress, turn),
         }
 

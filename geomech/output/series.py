@@ -136,4 +136,3 @@ class SeriesTime:
             at = max(self._last + PASS_OFFSET * self._step, math.nextafter(self._last, math.inf))
         self._last = at
         return at
-

@@ -102,7 +102,7 @@ def _xml(n_points: int, n_cells: int, compressed: bool, layout: tuple, sizes: tu
     return (
         '<?xml version="1.0"?>\n'
         f'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="{order}" header_type="UInt64"{packing}>\n'
-        f'<UnstructuredGrid>\n{text.pop("FieldData")}'
+        f"<UnstructuredGrid>\n{text.pop('FieldData')}"
         f'<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n{"".join(text.values())}</Piece>\n'
         '</UnstructuredGrid>\n<AppendedData encoding="raw">\n_'
     ).encode()
