@@ -5,9 +5,19 @@ bridges between them (displacement discontinuity method, `geomech.ddm`), and `ge
 other. `load_scene`, `cycles` and `run` are the whole pipeline; each solver also stands alone.
 """
 
+import os
+import sys
 from importlib import import_module
+from pathlib import Path
 
 __version__ = "0.1.0"
+
+# Compiled kernels are kept outside the package: beside the sources they would outlive an uninstall, and what is left
+# of a package folder shadows the next installation. Numba tells sources and versions apart within the folder, and goes
+# back to its own places where this one cannot be written.
+if "numba" not in sys.modules:
+    _cache = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(_cache).expanduser() / "geomech" / "kernels"))
 
 # Resolved on first use, so that `import geomech` costs nothing that is not asked for.
 _PUBLIC = {"load_scene": "geomech.scene", "cycles": "geomech.pipeline", "run": "geomech.pipeline"}
