@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 #: Where a field is asked for at the very end of an element it is taken this part of the element's length away: the
 #: stress of the discrete solution has no value there.
 _NUDGE = 0.02
+#: Nearer to an end than this part of that distance a point is the end itself; from farther off it is moved on the way it
+#: stands, so that of two faces that meet at a kink each is looked at from its own side.
+_AT_END = 1e-6
 
 
 def settle_faces(
@@ -239,7 +242,7 @@ class Solution:
         first = np.cumsum([0, *map(len, meeting[:-1])])
         way = np.add.reduceat(inward[here], first)[which]
         least = np.minimum.reduceat(reach[here], first)[which]
-        beside = distance[close] > 1e-3 * reach[nearest[close]]
+        beside = distance[close] > _AT_END * reach[nearest[close]]
         way[beside] = points[close[beside]] - ends[nearest[close[beside]]]
         lost = ~beside & (np.hypot(*way.T) < 1e-6)
         way[lost] = inward[nearest[close[lost]]]

@@ -17,7 +17,7 @@ from .motion import rotation
 from .vtu import TRIANGLE, Grid, with_z
 
 #: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
-_ASIDE = 1e-6
+_ASIDE = 1e-3
 
 
 class InteriorMeshes:
