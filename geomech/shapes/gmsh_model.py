@@ -42,7 +42,7 @@ class Parameter:
 @dataclass(frozen=True, eq=False)
 class GmshDrawing:
     """What a model holds: ``zones`` (with named edges), ``traces``, its ``parameters`` by short name as used, and
-    ``warnings`` as (message, way out)."""
+    ``warnings`` as (message, way out): whatever is drawn and left out."""
 
     zones: tuple[Zone, ...]
     traces: tuple[Trace, ...]
@@ -176,6 +176,7 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
     warnings: list[tuple[str, str]] = []
 
     edge_name: dict[int, str] = {}
+    cracked: set[int] = set()
     traces = []
     for dim, group in gmsh.model.getPhysicalGroups(1):
         name = gmsh.model.getPhysicalName(dim, group)
@@ -186,6 +187,7 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             )
         elif name.startswith(CRACK):
             traces.append(Trace(name[len(CRACK) :], tuple(curves.chained(tags))))
+            cracked.update(tags)
         else:
             for tag in tags:
                 if edge_name.setdefault(tag, name) != name:
@@ -212,12 +214,68 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             warnings.append(
                 (f"{path.name}: surface {tag} has no physical name and is left out", "name it, or remove it")
             )
+    told: set[int] = set()
     for name in dict.fromkeys(edge_name.values()):
-        if not used & {tag for tag, its in edge_name.items() if its == name}:
+        tags = {tag for tag, its in edge_name.items() if its == name}
+        if not used & tags:
+            told |= tags
             warnings.append(
                 (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
             )
+    warnings += _lost_curves(gmsh, path, curves, zones, used | cracked | told)
+    warnings += _out_of_plane(gmsh, path, max(box[3] - box[0], box[4] - box[1]))
     return GmshDrawing(tuple(zones), tuple(traces), parameters, tuple(warnings))
+
+
+def _lost_curves(gmsh, path: Path, curves: _Curves, zones: list[Zone], known: set[int]) -> list[tuple[str, str]]:
+    """A warning a zone for curves drawn inside it that are neither its boundary nor cracks: most likely cracks that
+    were not named, of which the run would know nothing."""
+    outlines = {abs(tag) for _, tag in gmsh.model.getBoundary(gmsh.model.getEntities(2), combined=False)}
+    inside: dict[str, list[int]] = {}
+    for _, tag in gmsh.model.getEntities(1):
+        if tag in known or tag in outlines:
+            continue
+        points = curves.polyline(tag)[0]
+        middles = 0.5 * (points[1:] + points[:-1])
+        zone = next((zone for zone in zones if any(_holds(zone, middle) for middle in middles)), None)
+        if zone is not None:
+            inside.setdefault(zone.name, []).append(tag)
+    warnings = []
+    for name, tags in inside.items():
+        listed = ", ".join(map(str, tags))
+        what = f"curves {listed} lie" if len(tags) > 1 else f"curve {listed} lies"
+        message = f"{path.name}: {what} inside zone {name!r} and {'are no cracks' if len(tags) > 1 else 'is no crack'}"
+        way_out = f'name a crack Physical Curve("{CRACK}NAME") = {{{listed}}}; delete what only helped to draw'
+        warnings.append((message, way_out))
+    return warnings
+
+
+def _holds(zone: Zone, point: np.ndarray) -> bool:
+    """Whether ``point`` is inside the outline and outside the holes: a ray from it crosses the loops an odd number of
+    times."""
+    crossings = 0
+    for loop in zone.loops:
+        a, b = loop, np.roll(loop, -1, axis=0)
+        spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
+        a, b = a[spans], b[spans]
+        crossings += int((a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]) > point[0]).sum())
+    return crossings % 2 == 1
+
+
+def _out_of_plane(gmsh, path: Path, size: float) -> list[tuple[str, str]]:
+    """A warning where points stand off the plane z = 0 by more than round-off of a model of this ``size``, m."""
+    z = {tag: gmsh.model.getValue(0, tag, [])[2] for _, tag in gmsh.model.getEntities(0)}
+    off = [tag for tag, value in z.items() if abs(value) > 1e-9 * size]
+    if not off:
+        return []
+    shown = ", ".join(map(str, off[:6])) + (", …" if len(off) > 6 else "")
+    worst = max((z[tag] for tag in off), key=abs)
+    return [
+        (
+            f"{path.name}: {f'points {shown} have' if len(off) > 1 else f'point {shown} has'} z ≠ 0 (up to {worst:g} m)",
+            "the rock is plane and z is left away: draw in x and y, with z = 0",
+        )
+    ]
 
 
 class _Curves:

@@ -188,6 +188,59 @@ def test_warnings_for_what_is_left_out(tmp_path):
     assert any("'flaw' bounds no named surface" in m for m in messages)
 
 
+SQUARE = (
+    "Point(1)={0,0,0};Point(2)={1,0,0};Point(3)={1,1,0};Point(4)={0,1,0};"
+    "Line(1)={1,2};Line(2)={2,3};Line(3)={3,4};Line(4)={4,1};Curve Loop(1)={1,2,3,4};Plane Surface(1)={1};"
+    'Physical Surface("rock")={1};'
+)
+CURVES = "Point(5)={0.2,0.5,0};Point(6)={0.4,0.6,0};Point(7)={0.6,0.5,0};Line(5)={5,6};Line(6)={7,6};"
+
+
+@pytest.mark.parametrize("embedded", ["Line{5, 6} In Surface{1};", ""])
+def test_curves_inside_a_surface_that_are_no_cracks_are_told(tmp_path, embedded):
+    (warning,) = read_gmsh_model(written(tmp_path, SQUARE + CURVES + embedded)).warnings
+    assert "curves 5, 6 lie inside zone 'rock'" in warning[0] and 'Physical Curve("crack:NAME")' in warning[1]
+    (warning,) = read_gmsh_model(
+        written(tmp_path, SQUARE + CURVES + embedded + 'Physical Curve("crack:a")={6};')
+    ).warnings
+    assert "curve 5 lies inside" in warning[0]
+    assert not read_gmsh_model(
+        written(tmp_path, SQUARE + CURVES + embedded + 'Physical Curve("crack:a")={5, 6};')
+    ).warnings
+
+
+def test_a_curve_that_a_boolean_operation_put_into_the_rock_is_told(tmp_path):
+    model = (
+        'SetFactory("OpenCASCADE");Rectangle(1)={-2,-2,0,4,4};Disk(2)={0,0,0,0.5};'
+        "BooleanDifference(3)={Surface{1};Delete;}{Surface{2};Delete;};"
+        "Point(100)={-1.5,0,0};Point(101)={-1,0,0};Line(100)={100,101};"
+        'BooleanFragments{Surface{3};Delete;}{Curve{100};Delete;}Physical Surface("rock")={3};'
+    )
+    (warning,) = read_gmsh_model(written(tmp_path, model)).warnings
+    assert "lies inside zone 'rock'" in warning[0]
+
+
+def test_curves_outside_the_rock_and_in_its_holes_are_left_alone(tmp_path):
+    hole = (
+        "Point(11)={0.2,0.2,0};Point(12)={0.8,0.2,0};Point(13)={0.8,0.8,0};Point(14)={0.2,0.8,0};"
+        "Line(11)={11,12};Line(12)={12,13};Line(13)={13,14};Line(14)={14,11};Curve Loop(2)={11,12,13,14};"
+    )
+    model = SQUARE.replace("Plane Surface(1)={1};", hole + "Plane Surface(1)={1,2};") + CURVES
+    assert not read_gmsh_model(written(tmp_path, model)).warnings
+    assert not read_gmsh_model(written(tmp_path, SQUARE + CURVES.replace("={0.", "={5."))).warnings
+
+
+@pytest.mark.parametrize("model", ["two_cracks", "single_flaw"])
+@pytest.mark.parametrize("platens", ["none", "bottom", "both"])
+def test_models_of_this_folder_lose_nothing(model, platens):
+    assert read_gmsh_model(GEOMETRY / f"{model}.geo", {"platens": platens}).warnings == ()
+
+
+def test_points_off_the_plane_are_told(tmp_path):
+    (warning,) = read_gmsh_model(written(tmp_path, SQUARE.replace("Point(2)={1,0,0}", "Point(2)={1,0,0.1}"))).warnings
+    assert "point 2 has z ≠ 0 (up to 0.1 m)" in warning[0]
+
+
 def test_a_missing_system_library_points_to_the_doctor(monkeypatch):
     class Broken:
         def find_spec(self, name, path=None, target=None):
