@@ -56,7 +56,7 @@ def run_problem(
         for warning in warnings:
             log.warning("%s", warning)
         for cycle in coupled(problem):
-            stopping += [event.kind for event in cycle.events if event.kind in problem.run.stop_at]
+            stopping += [event.kind for event in cycle.events if event.kind in (*problem.run.stop_at, "collapse")]
             group.on_cycle(cycle)
     except BaseException as failure:
         error = failure

@@ -34,7 +34,7 @@ COMPLIANCE_PASSES = 4
 def cycles(problem: Problem) -> Iterator[Cycle]:
     """Run ``problem``, one `Cycle` a coupling cycle, from the initial state (number 0) to the scene's end.
 
-    The last cycle's statistics hold ``end``: 1 when a stop event ended the run. Raises `geomech.dda.NotConverged`
+    A static run also ends when a block goes out of reach, with a ``collapse`` event. Raises `geomech.dda.NotConverged`
     when the block system finds no consistent contact state even at the smallest step.
     """
     return Coupling(problem).cycles()
@@ -96,7 +96,8 @@ class Coupling:
                 load_time = result.state.time
             tips = self._tips(solutions, self.nodes_of)
             may_grow = growth_pass < self.problem.growth.max_passes
-            events, stops = pending, stops or self._stops(pending)
+            lost = self._lost(result.state) if static else ()
+            events, stops = pending + lost, stops or bool(lost) or self._stops(pending)
             growth = self._growth(tips) if may_grow and not stops else None
             if growth is not None:
                 tips["grown"] = growth.grown
@@ -115,6 +116,18 @@ class Coupling:
                 return stops
             pending = self._take_growth(growth, result, solutions)
         raise AssertionError("unreachable: the last pass takes no growth")
+
+    def _lost(self, state: State) -> tuple[Event, ...]:
+        """A collapse, when a block has gone farther than the blocks reach: in statics nothing will hold it any more, and
+        ever shorter steps would follow it for ever."""
+        moved = np.hypot(*(state.vertices - self.blocks.vertices).T)
+        farthest = int(np.argmax(moved))
+        if not moved[farthest] > np.hypot(*np.ptp(self.blocks.vertices, axis=0)):
+            return ()
+        name = self.blocks.names[self.blocks.vertex_block[farthest]]
+        detail = f"nothing holds {name}: it has moved {moved[farthest]:.3g} m"
+        log.warning("t = %g s: %s; the run ends", state.time, detail)
+        return (self._event("collapse", state, self.blocks.vertices[farthest], detail),)
 
     # -- one pass ------------------------------------------------------------------------------------------------
 

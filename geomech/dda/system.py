@@ -126,6 +126,7 @@ class BlockSystem:
                 shorter = 0.5 * dt
             else:
                 if largest <= 1.0001 * limit:
+                    self._refuse_crushed(result.state)
                     return result
                 reason = f"a vertex moves {largest:.3g} m, the limit is {limit:.3g} m"
                 if largest > 0.9 * before:
@@ -143,6 +144,13 @@ class BlockSystem:
                 )
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
+
+    def _refuse_crushed(self, state: State) -> None:
+        area = self.blocks.areas(state.vertices)
+        if not (area > 0).all():
+            crushed = int(np.argmin(area > 0))
+            name = self.blocks.names[crushed] if self.blocks.names else f"block {crushed}"
+            raise NotConverged(f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness")
 
     def _foreseen(self, vertices, carried, moments, loads, time, dt, limit) -> float:
         """``dt`` shortened where the velocity alone would carry a vertex beyond the limit."""
