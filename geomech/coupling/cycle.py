@@ -273,7 +273,12 @@ class Coupling:
             trial, nodes_of = self._bodies_of(growth.cracks, trial)
             ahead = self._tips(self._solve(trial, self.loads, self.solutions), nodes_of)
             settled = chords.bend(tips, growth.grown, ahead, growth.cracks, self.number)
-            growth = grow()
+            tried, growth = growth, grow()
+            stuck = (tried.grown > 0) & (growth.grown == 0)
+            if stuck.any():
+                # Bent, a step would not leave its tip; the criterion's own direction does.
+                tips["angle"][stuck] = chords.start[stuck]
+                growth = grow()
         if not (np.any(growth.grown > 0) or growth.joins):
             return None
         self.bodies = trial  # most of it is what the corrected step needs

@@ -28,6 +28,9 @@ LOOKS = 5
 #: Bounds of the slope of the condition: −1 − κ times the share, for no stress along the crack −1. Beyond them two trials
 #: lie too close together to tell it.
 SLOPES = (-20.0, -0.5)
+#: The chord lies between the first trial and the first correction, since the condition falls by at least as much as the
+#: chord turns; by this part of their difference it may lie outside (tension along the crack, round-off).
+OUTSIDE = 0.2
 
 
 class Chords:
@@ -43,6 +46,8 @@ class Chords:
         self.looks = 0
         self.last_angle = np.full(len(tips), np.nan)
         self.last_rest = np.full(len(tips), np.nan)
+        self.lowest = np.full(len(tips), -np.inf)
+        self.highest = np.full(len(tips), np.inf)
 
     def bend(self, tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> bool:
         """Better ``tips["angle"]`` of the tips that have ``grown`` (n_tips,); True when no further look is needed.
@@ -59,8 +64,12 @@ class Chords:
             slope = (rest - self.last_rest) / (angle - self.last_angle)
         slope = np.where(np.isfinite(slope), np.clip(slope, *SLOPES), -1.0)
         known = np.isfinite(rest)
-        tips["angle"][known] = (angle - rest / slope)[known]
         first = self.looks == 1
+        if first:
+            # Faces that close make the condition jump; secants must not run away across the jump.
+            ends = np.stack([angle - OUTSIDE * rest, angle + (1 + OUTSIDE) * rest])
+            self.lowest, self.highest = np.nanmin(ends, axis=0, initial=np.inf), np.nanmax(ends, axis=0, initial=-np.inf)
+        tips["angle"][known] = np.clip(angle - rest / slope, self.lowest, self.highest)[known]
         # A first look that turns on the way the trial did needs no second one: the path is smooth.
         unsettled = off & (rest * self.start < 0) if first else off
         self.last_angle, self.last_rest = angle, rest
