@@ -96,9 +96,12 @@ class Coupling:
                 load_time = result.state.time
             tips = self._tips(solutions, self.nodes_of)
             may_grow = growth_pass < self.problem.growth.max_passes
-            lost = self._lost(result.state) if static else ()
-            events, stops = pending + lost, stops or bool(lost) or self._stops(pending)
+            events, stops = pending, stops or self._stops(pending)
             growth = self._growth(tips) if may_grow and not stops else None
+            if growth is None and static and not stops:
+                # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
+                lost = self._lost(result.state)
+                events, stops = events + lost, bool(lost)
             if growth is not None:
                 tips["grown"] = growth.grown
                 events += self._initiations(tips, result.state)

@@ -26,6 +26,9 @@ from ..model.polygon import area_moments
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = np.radians(10.0)
 
+#: Edges lie in one line when the tangent of their angle is below this: straight sides stay straight as blocks strain.
+STRAIGHT = 1e-6
+
 #: A face that ends within this part of its edge's length of the edge's end ends there.
 SNAP = 1e-9
 
@@ -141,11 +144,27 @@ def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: np
     return best
 
 
+def _line_start(blocks: Blocks, vertices: np.ndarray, edge: int) -> int:
+    """The first of the edges that lie in one straight line with ``edge``: a vertex in a straight side, as the end of a
+    named piece, must not part what touches it into faces of their own."""
+    first = edge
+    start, end = vertices[edge].tolist(), vertices[blocks.next_vertex[edge]].tolist()
+    ax, ay = end[0] - start[0], end[1] - start[1]
+    while True:
+        before = int(blocks.previous_vertex[first])
+        x, y = vertices[before].tolist()
+        bx, by = start[0] - x, start[1] - y
+        along = ax * bx + ay * by
+        if along <= 0 or abs(ax * by - ay * bx) > STRAIGHT * along or before == edge:
+            return first
+        first, start = before, (x, y)
+
+
 def _faces_and_lone(
     block: int, blocks: Blocks, vertices: np.ndarray, contacts: np.ndarray
 ) -> tuple[dict[tuple[int, int], np.ndarray], np.ndarray]:
-    """The acting contacts of ``block``: joint faces with at least two distinct points, (own edge, other's edge) →
-    rows, and the rows left alone."""
+    """The acting contacts of ``block``: joint faces with at least two distinct points, (own edge, first edge of
+    the other's straight side) → rows, and the rows left alone."""
     acting = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
     rows = acting[(acting["block"] == block) | (acting["other"] == block)]
     found: dict[tuple[int, int], list[int]] = {}
@@ -156,7 +175,8 @@ def _faces_and_lone(
         if angle > FACE_ANGLE:
             lone.append(k)
         else:
-            found.setdefault((touching, edge) if owner == block else (edge, touching), []).append(k)
+            own, facing = (touching, edge) if owner == block else (edge, touching)
+            found.setdefault((own, _line_start(blocks, vertices, facing)), []).append(k)
     faces = {}
     for face, members in found.items():
         if _spread(rows["point"][members], vertices, blocks, face[0]):
