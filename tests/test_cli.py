@@ -107,7 +107,7 @@ def test_check_tells_what_is_there(scene, capsys):
 
 def test_check_of_all_variants(scene, capsys):
     assert main(["check", str(scene), "--variant", "all"]) == DONE
-    assert "A plate [steep]" in capsys.readouterr().out
+    assert "A plate, steep" in capsys.readouterr().out
 
 
 def test_check_lists_the_keys(scene, capsys):

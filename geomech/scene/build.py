@@ -21,8 +21,10 @@ from ..model import (
     Problem,
     RunSettings,
 )
-from .checks import Check, carrier, contact_names, gauge_carriers, joint_names, material_of
+from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
+from .edges import contact_names, joint_names
+from .errors import Check
 from .tables import ForceTable, SceneTables, TractionTable
 
 

@@ -1,58 +1,32 @@
-"""Checks across the sections of a scene: names that must exist, points that must be in rock, loads that must hold."""
+"""Checks across the sections of a scene: names that must exist, points that must be in rock, times and lengths."""
 
 from __future__ import annotations
-
-import fnmatch
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..model import Blocks
 from ..shapes import cutting_cracks
-from .drawing import Drawing
-from .errors import Fault
+from .edges import check_edges
+from .errors import Check
 from .locator import Path
 from .tables import SceneTables
 from .validation import nearest
 
 
-@dataclass(frozen=True, eq=False)
-class Check:
-    """What the checks see: tables (a section is None where it is faulty), the names in the file, the drawing."""
-
-    tables: SceneTables
-    data: dict[str, Any]
-    drawing: Drawing | None
-    place: Callable[[Path], str]
-    faults: list[Fault]
-    warnings: list[Fault]
-
-    def refuse(self, path: Path, message: str, way_out: str) -> None:
-        self.faults.append(Fault(self.place(path), message, way_out))
-
-    def warn(self, path: Path, message: str, way_out: str) -> None:
-        self.warnings.append(Fault(self.place(path), message, way_out))
-
-
-def check(tables, data, drawing, place, faults, warnings) -> None:
-    """Run every check that the sections at hand allow; add to ``faults`` and ``warnings``."""
-    c = Check(tables, data, drawing, place, faults, warnings)
+def check(c: Check) -> None:
+    """Run every check that the sections at hand allow."""
     _times(c)
     _growth_lengths(c)
     _names_once(c)
     _material_names_exist(c)
-    if drawing is not None:
+    if c.drawing is not None:
         _zones(c)
         _cracks(c)
-    if drawing is not None and drawing.blocks is not None:
+    if c.drawing is not None and c.drawing.blocks is not None:
         _whole(c)
-        _edges(c)
-        _joints(c)
+        check_edges(c)
         _points(c)
         _toughness(c)
-        _held(c)
 
 
 def _times(c: Check) -> None:
@@ -110,7 +84,9 @@ def _zones(c: Check) -> None:
         return
     for name in given:
         if name not in known:
-            c.refuse(("zones", name), f"the geometry has no zone {name!r}", nearest(name, known))
+            # A zone that has its table already is not the one that is meant.
+            free = [zone for zone in known if zone not in given]
+            c.refuse(("zones", name), f"the geometry has no zone {name!r}", nearest(name, free) if free else _are(known))
     if len(materials) > 1:
         for name in known:
             if name not in given or given[name].material is None:
@@ -126,11 +102,18 @@ def _zones(c: Check) -> None:
 
 
 def _cracks(c: Check) -> None:
-    for name in c.tables.cracks or ():
+    given = c.tables.cracks or {}
+    for name in given:
         if name != "default" and name not in c.drawing.cracks_drawn:
+            known = list(c.drawing.cracks_drawn)
+            free = [crack for crack in known if crack not in given]
             c.refuse(
-                ("cracks", name), f"the geometry has no crack {name!r}", nearest(name, list(c.drawing.cracks_drawn))
+                ("cracks", name), f"the geometry has no crack {name!r}", nearest(name, free) if free else _are(known)
             )
+
+
+def _are(known: list[str]) -> str:
+    return f"there is {', '.join(known)}" if known else "there is none"
 
 
 def _whole(c: Check) -> None:
@@ -141,87 +124,6 @@ def _whole(c: Check) -> None:
             f"crack {c.drawing.cracks.names[crack]!r} cuts a piece off zone {c.drawing.zones[block]!r}, alone or with "
             "the cracks before it",
             "draw the pieces as zones of their own: blocks part along their outlines",
-        )
-
-
-def _edge_names(c: Check) -> list[str]:
-    return [name for name in c.drawing.blocks.edge_names if name]
-
-
-def _edges(c: Check) -> None:
-    if c.tables.loads is None:
-        return
-    known = _edge_names(c)
-    way = (
-        "name edges by physical curves in the model" if c.tables.geometry.model else "name edges by [[geometry.edges]]"
-    )
-    for k, traction in enumerate(c.tables.loads.tractions):
-        if traction.edge not in known:
-            c.refuse(
-                ("loads", "tractions", k, "edge"),
-                f"the geometry has no edge {traction.edge!r}",
-                nearest(traction.edge, known) + f"; {way}",
-            )
-    leading = c.tables.loads.leading_edge
-    loaded = [traction.edge for traction in c.tables.loads.tractions]
-    if leading is not None and leading not in loaded:
-        c.refuse(
-            ("loads", "leading_edge"),
-            f"no traction acts on the leading edge {leading!r}",
-            nearest(leading, loaded) + "; it must be the edge of one of [[loads.tractions]]",
-        )
-
-
-def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
-    """The names of ``known`` that ``patterns`` mean, in order."""
-    return [name for name in known if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
-
-
-def contact_names(drawing: Drawing) -> list[str]:
-    """Names that faces in contact may have: edges as drawn, and the faces that a crack leaves when it cuts through."""
-    names = [name for name in drawing.blocks.edge_names if name]
-    return names + [f"crack:{name}" for name in drawing.cracks_drawn]
-
-
-def _joints(c: Check) -> None:
-    if c.tables.joints is None:
-        return
-    known = contact_names(c.drawing)
-    owner: dict[tuple[str, str], str] = {}
-
-    def claim(pair: tuple[str, str], law: str, path: Path) -> None:
-        first = owner.setdefault(pair, law)
-        if first != law:
-            what = f"edges {pair[1]!r}" if not pair[0] else f"edges {pair[0]!r} and {pair[1]!r}"
-            c.refuse(
-                path, f"joints {first!r} and {law!r} both claim contacts of {what}", "leave them to one of the two"
-            )
-
-    for name, joint in c.tables.joints.items():
-        if name == "default":
-            if joint.edges or joint.between:
-                c.refuse(
-                    ("joints", name), "the default joint names edges", "it rules all contacts that no other joint names"
-                )
-            continue
-        if not (joint.edges or joint.between):
-            c.refuse(("joints", name), f"joint {name!r} names no edges", 'add edges = ["…"], or call it `default`')
-        for k, pattern in enumerate(joint.edges):
-            names = joint_names((pattern,), known)
-            if not names:
-                c.refuse(("joints", name, "edges", k), f"no edge is called {pattern!r}", nearest(pattern, known))
-            for found in names:
-                claim(("", found), name, ("joints", name, "edges", k))
-        for k, pair in enumerate(joint.between):
-            for n, edge in enumerate(pair):
-                if edge not in known:
-                    c.refuse(("joints", name, "between", k, n), f"no edge is called {edge!r}", nearest(edge, known))
-            claim(tuple(sorted(pair)), name, ("joints", name, "between", k))
-    if c.drawing.blocks.n_blocks > 1 and "default" not in c.tables.joints:
-        c.warn(
-            ("joints",),
-            "there is no default joint: contacts that no joint names have neither friction nor cohesion",
-            "add [joints.default]",
         )
 
 
@@ -319,60 +221,3 @@ def _toughness(c: Check) -> None:
             f"material {name!r} has no fracture toughness, and crack {crack!r} in it may grow",
             "add k_ic_pa_sqrt_m, or set growth.enabled = false",
         )
-
-
-def _held(c: Check) -> None:
-    """Loads on blocks that nothing fixes must balance; blocks that may move must have a mass."""
-    t, blocks = c.tables, c.drawing.blocks
-    if t.zones is None or t.materials is None:
-        return
-    fixed = np.array([zone in t.zones and t.zones[zone].fixed for zone in c.drawing.zones])
-    if fixed.all():
-        c.warn(("zones",), "all blocks are fixed: nothing moves", "let a zone move")
-        return
-    for zone in dict.fromkeys(z for z, f in zip(c.drawing.zones, fixed) if not f):
-        name = material_of(t, zone)
-        if name in t.materials and t.materials[name].density_kg_m3 == 0:
-            c.refuse(
-                ("materials", name, "density_kg_m3"),
-                f"zone {zone!r} may move but its material {name!r} has no density",
-                "give the density; blocks without mass have no equation of motion",
-            )
-    if fixed.any() or t.loads is None or t.run is None or t.dda is None or t.dda.dynamic_factor > 0:
-        return
-    if any(t.loads.gravity_m_s2):
-        c.refuse(
-            ("loads", "gravity_m_s2"),
-            "gravity acts and nothing is fixed: all blocks would fall",
-            "fix a zone ([zones.NAME] fixed = true), or set dda.dynamic_factor = 1 if they are to fall",
-        )
-        return
-    if any(traction.edge not in blocks.edge_names for traction in t.loads.tractions):
-        return
-    force, moment, size = _resultant(t, blocks)
-    reach = np.ptp(blocks.vertices, axis=0).max()
-    if np.hypot(*force) > 1e-9 * size or abs(moment) > 1e-9 * size * reach:
-        c.refuse(
-            ("loads",),
-            f"the loads do not balance and nothing is fixed: at {t.run.end_time_s:g} s they leave a force of "
-            f"({force[0]:.4g}, {force[1]:.4g}) N/m and a moment of {moment:.4g} N",
-            "fix a zone ([zones.NAME] fixed = true), or add the loads that hold the rock",
-        )
-
-
-def _resultant(t: SceneTables, blocks: Blocks) -> tuple[np.ndarray, float, float]:
-    """Force, moment about the centre, and the sum of magnitudes of all loads at the end of the run."""
-    from .build import force_history, traction_history
-
-    centre = 0.5 * (blocks.vertices.min(axis=0) + blocks.vertices.max(axis=0))
-    loads = []
-    for traction in t.loads.tractions:
-        value = traction_history(traction).at(t.run.end_time_s)
-        for edge in blocks.edges_named(traction.edge):
-            a, b = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
-            loads.append((0.5 * (a + b) - centre, value * np.hypot(*(b - a))))
-    for force in t.loads.forces:
-        loads.append((np.array(force.at) - centre, force_history(force).at(t.run.end_time_s)))
-    total = sum((f for _, f in loads), np.zeros(2))
-    moment = sum(p[0] * f[1] - p[1] * f[0] for p, f in loads)
-    return total, float(moment), float(sum(np.hypot(*f) for _, f in loads))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
@@ -20,13 +20,37 @@ from .tables import CrackShape, Geometry
 class Drawing:
     """Blocks and cracks before materials and apertures are given. ``zones`` (n_blocks,) is the
     name of the zone each block belongs to, ``cracks_drawn`` the names of the cracks, ``parameters`` those of a Gmsh
-    model, as used. ``blocks`` is None where the drawing cannot be assembled."""
+    model, as used, ``choices`` the names of their values where they have such, ``model`` its file. ``blocks`` is None
+    where the drawing cannot be assembled."""
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
     blocks: Blocks | None
     cracks: Cracks | None
     parameters: dict[str, float | str] = field(default_factory=dict)
+    choices: dict[str, Mapping[str, float]] = field(default_factory=dict)
+    model: FilePath | None = None
+
+    def choices_with_edge(self, name: str) -> str:
+        """The choices of one parameter with which the model has edges called ``name``, as a scene says them; empty
+        where there are none. The model is read again for each choice: this is for messages."""
+        if self.model is None:
+            return ""
+        from ..shapes import GmshModelError, read_gmsh_model
+
+        for parameter, choices in self.choices.items():
+            found = []
+            for choice in choices:
+                try:
+                    other = read_gmsh_model(self.model, {**self.parameters, parameter: choice})
+                except GmshModelError:
+                    continue
+                labels = [zone.edge_names or () for zone in other.zones]
+                if any(name in loop for loops in labels for loop in loops):
+                    found.append(f'"{choice}"')
+            if found:
+                return f"{parameter} = {' or '.join(found)}"
+        return ""
 
 
 def draw(
@@ -38,6 +62,8 @@ def draw(
 ) -> Drawing | None:
     """Read or make the drawing; what is wrong goes to ``faults``. None where not even its names are known."""
     parameters: dict[str, float | str] = {}
+    choices: dict[str, Mapping[str, float]] = {}
+    model = None
     if geometry.model is not None:
         # Imported here: a scene drawn in TOML needs no Gmsh.
         from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
@@ -59,6 +85,8 @@ def draw(
                 return None
         warnings += [Fault(place(source), message, way_out) for message, way_out in read.warnings]
         parameters = {name: entry.value for name, entry in read.parameters.items()}
+        choices = {name: entry.choices for name, entry in read.parameters.items() if entry.choices}
+        model = folder / geometry.model
         zones, traces, edges = read.zones, read.traces, ()
     else:
         zones = [Zone(z.name, _loops(z)) for z in geometry.zones]
@@ -83,8 +111,8 @@ def draw(
             at = ("geometry", "model") if geometry.model is not None else ("geometry", flaw.part, flaw.index)
             message = flaw.message if geometry.model is None else f"{FilePath(geometry.model).name}: {flaw.message}"
             faults.append(Fault(place(at), message, flaw.way_out))
-        return Drawing(names, drawn, None, None, parameters)
-    return Drawing(names, drawn, blocks, cracks, parameters)
+        return Drawing(names, drawn, None, None, parameters, choices, model)
+    return Drawing(names, drawn, blocks, cracks, parameters, choices, model)
 
 
 def _loops(zone) -> tuple[np.ndarray, ...]:

@@ -12,14 +12,15 @@ from typing import Any
 
 from ..model import Blocks, Cracks, Problem
 from .build import build_problem
-from .checks import Check, check
+from .checks import check
 from .drawing import Drawing, draw
-from .errors import Fault, SceneError
+from .equilibrium import check_loads
+from .errors import Check, Fault, SceneError
 from .keys import describe_keys
 from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
 from .tables import OutputTable, RenderTable, SceneTables
-from .validation import nearest, validate
+from .validation import DECIMAL_COMMA, nearest, validate
 
 #: The file that a pipeline folder holds.
 SCENE_FILE = "scene.toml"
@@ -65,14 +66,18 @@ class Scene:
         return self.drawing.cracks
 
     def problem(self) -> Problem:
-        """The scene as the solvers take it."""
-        return replace(build_problem(self.tables, self.drawing, self._check), title=self.title)
+        """The scene as the solvers take it; its title names the variant."""
+        return replace(build_problem(self.tables, self.drawing, self._check), title=self._full_title)
+
+    @property
+    def _full_title(self) -> str:
+        return self.title if self.variant is None else f"{self.title}, {self.variant}"
 
     def resolved(self) -> dict[str, Any]:
         """The scene with its variant and changes applied and all defaults written out, ready for ``tomli_w``: paths are
         absolute, all parameters of a Gmsh model are given, variants are gone. Loading it gives the same problem."""
         data = self.tables.model_dump(by_alias=True, exclude_none=True, exclude={"variants"})
-        data["title"] = self.title
+        data["title"] = self._full_title
         if self.tables.geometry.model is not None:
             data["geometry"]["model"] = str((self.path.parent / self.tables.geometry.model).resolve())
             data["geometry"]["parameters"] = dict(self.drawing.parameters)
@@ -148,7 +153,9 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
     drawing = None
     if tables.geometry is not None:
         drawing = draw(tables.geometry, path.parent, places, faults, warnings)
-    check(tables, data, drawing, places, faults, warnings)
+    sections = Check(tables, data, drawing, places, faults, warnings)
+    check(sections)
+    check_loads(sections)
     if faults:
         raise SceneError(places.sorted(faults))
     # Building asks the same questions as the checks did; whatever it would find has been found.
@@ -191,10 +198,20 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
                 Fault(
                     f"{path}:{line}{column}",
                     f"not valid TOML: {message}" + (f", in `{source}`" if source else ""),
-                    "texts stand in double quotes, arrays in square brackets, each key once",
+                    _syntax_hint(source),
                 )
             ]
         ) from error
+
+
+def _syntax_hint(source: str) -> str:
+    """What to write instead of the line ``source``, which is no TOML."""
+    value = source.partition("=")[2].partition("#")[0].strip()
+    if re.fullmatch(DECIMAL_COMMA, value):
+        return f"numbers have a decimal point: {value.replace(',', '.')}"
+    if value.lower() in ("true", "false"):
+        return f"write {value.lower()} in lower case"
+    return "texts stand in double quotes, arrays in square brackets, each key once"
 
 
 def _apply_variant(data: dict[str, Any], name: str, places: _Places, faults: list[Fault]) -> None:

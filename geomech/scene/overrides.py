@@ -17,7 +17,8 @@ class OverrideError(ValueError):
 
 
 def parse_override(text: str) -> tuple[Path, Any]:
-    """("section.key=value") as path and value; what is no TOML value is a text. Raises OverrideError without "="."""
+    """("section.key=value") as path and value; what is no TOML value is a text, but for True and False, which are
+    taken as they are meant. Raises OverrideError without "="."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise OverrideError(
@@ -27,7 +28,7 @@ def parse_override(text: str) -> tuple[Path, Any]:
     try:
         return path_of(key.strip()), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
-        return path_of(key.strip()), value
+        return path_of(key.strip()), {"True": True, "False": False}.get(value, value)
 
 
 def flattened(changes: dict[str, Any]) -> list[tuple[Path, Path, Any]]:

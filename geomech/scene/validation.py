@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable
 from typing import Annotated, Any
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from .errors import Fault
-from .keys import description_at, expected_of, field_of, keys_of, table_at, written
+from .keys import description_at, expected_of, field_of, keys_of, kind_of, table_at, written
 from .locator import Path
 from .tables import SceneTables
 
@@ -19,6 +20,9 @@ _COMPARISON = {
     "less_than": ("lt", "less than"),
     "less_than_equal": ("le", "at most"),
 }
+
+#: A number with a comma where TOML wants a point.
+DECIMAL_COMMA = r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?"
 
 
 def validate(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SceneTables, list[Fault]]:
@@ -71,10 +75,7 @@ def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
         way = (f"did you mean {close[0]!r}? " if close else "") + f"keys here are {', '.join(known)}"
         return Fault(place(path), f"unknown key {path[-1]!r}", way)
     if kind == "missing" and isinstance(path[-1], str):
-        shape = (
-            f"add `{path[-1]} = …`" if field is None or table_at(path) is None else f"add [{'.'.join(map(str, path))}]"
-        )
-        return Fault(place(path), f"{path[-1]!r} is missing", f"{shape}: {meaning}")
+        return Fault(place(path), f"{path[-1]!r} is missing", f"add {_header(path)}: {meaning}")
     if kind in ("missing", "too_long", "too_short"):
         whole = path[:-1] if isinstance(path[-1], int) else path
         return Fault(place(whole), "the array has the wrong number of entries", description_at(whole))
@@ -92,6 +93,36 @@ def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
         wanted = {"model": "a table", "dict": "a table", "tuple": "an array"}
         if isinstance(path[-1], int) or table_at(path) or not what:
             what = {"float": "number", "string": "text", **wanted}.get(kind.split("_")[0], what)
-        hint = "remove the quotes: " if isinstance(given, str) and "number" in what else ""
+        hint = _hint(given, what) if isinstance(given, str) else ""
         return Fault(place(path), f"{written(given)} stands where {what or 'something else'} belongs", hint + meaning)
     return Fault(place(path), item["msg"], meaning)
+
+
+def _header(path: Path) -> str:
+    """How what belongs at ``path`` begins in the file: a table, a table with a name, one of several, or a value."""
+    table = table_at(path[:-1])
+    field = field_of(table, path[-1]) if table else None
+    kind, inner = kind_of(field.annotation) if field else ("value", None)
+    if kind in ("map", "list"):
+        kind = kind if kind_of(inner)[0] == "table" else "value"
+    dots = ".".join(map(str, path))
+    return {"table": f"[{dots}]", "map": f"[{dots}.NAME]", "list": f"[[{dots}]]"}.get(kind, f"`{path[-1]} = …`")
+
+
+def _hint(given: str, what: str) -> str:
+    """What to change where a text stands for something that is no text."""
+    if "number" in what and re.fullmatch(DECIMAL_COMMA, given.strip()):
+        return f"write a decimal point, {given.strip().replace(',', '.')}: "
+    if "number" in what and _is_number(given) or what == "true or false" and given.strip() in ("true", "false"):
+        return "remove the quotes: "
+    if what == "true or false" and given.strip().lower() in ("true", "false"):
+        return f"write {given.strip().lower()}, in lower case and without quotes: "
+    return ""
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

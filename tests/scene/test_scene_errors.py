@@ -74,8 +74,8 @@ SPOILT = [
         "where [x, y] belongs",
         "Pa/s",
     ),
-    ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [0.0, -2e5]", "loads", "do not balance", "fix a zone"),
-    ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [1e5, -1e5]", "loads", "do not balance", "fix a zone"),
+    ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [0.0, -2e5]", "loads", "do not balance", "balance the tractions"),
+    ("rate_pa_per_s = [0.0, -1e5]", "rate_pa_per_s = [1e5, -1e5]", "loads", "do not balance", "balance the tractions"),
     (
         "rate_pa_per_s = [0.0, -1e5]",
         "times_s = [0, 0]\nvalues_pa = [[0, 0], [0, 1]]",
@@ -237,6 +237,40 @@ def test_the_chosen_variant_is_named_with_its_line(errors_of):
 
 
 @pytest.mark.parametrize(
+    ("line", "way_out"),
+    [
+        ("poissons_ratio = 0,21", "numbers have a decimal point: 0.21"),
+        ("poissons_ratio = -1,5e3  # so", "numbers have a decimal point: -1.5e3"),
+        ("enabled = False", "write false in lower case"),
+        ("title = unquoted", "double quotes"),
+    ],
+)
+def test_toml_that_is_written_as_elsewhere(scene_file, line, way_out):
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file(line + "\n"))
+    assert way_out in caught.value.errors[0].way_out
+
+
+@pytest.mark.parametrize(
+    ("override", "way_out"),
+    [
+        ("materials.rock.poissons_ratio=0,21", "write a decimal point, 0.21: "),
+        ('materials.rock.poissons_ratio="0.21"', "remove the quotes: "),
+        ("materials.rock.poissons_ratio=low", "Poisson"),
+        ('growth.enabled="False"', "write false, in lower case and without quotes: "),
+        ('growth.enabled="false"', "remove the quotes: "),
+    ],
+)
+def test_texts_in_the_place_of_values(errors_of, override, way_out):
+    (error,) = errors_of(overrides=[override])
+    assert error.way_out.startswith(way_out)
+
+
+def test_python_writes_true_and_false_too(scene_file):
+    assert not load_scene(scene_file(), ["growth.enabled=False"]).tables.growth.enabled
+
+
+@pytest.mark.parametrize(
     ("text", "place", "message"),
     [
         ("a = 1\nb = [1,\nc = 2\n", ":3", "not valid TOML"),
@@ -265,6 +299,9 @@ def test_an_empty_scene_names_what_it_needs(scene_file):
         load_scene(scene_file(""))
     messages = " ".join(e.message for e in caught.value.errors)
     assert all(f"'{name}' is missing" in messages for name in ("geometry", "materials", "run"))
+    ways = {e.message.split("'")[1]: e.way_out for e in caught.value.errors}
+    assert ways["materials"].startswith("add [materials.NAME]: ")
+    assert ways["geometry"].startswith("add [geometry]: ") and ways["run"].startswith("add [run]: ")
 
 
 def test_model_and_drawing_exclude_one_another(errors_of):
@@ -322,9 +359,95 @@ def test_gravity_needs_something_fixed_unless_blocks_may_fall(scene_file):
     text = GOOD + "[loads]\n"
     text = GOOD.replace("[[loads.tractions]]", "[loads]\ngravity_m_s2 = [0.0, -9.81]\n\n[[loads.tractions]]", 1)
     (error,) = faults(scene_file, text)
-    assert "would fall" in error.message and "fixed = true" in error.way_out
+    assert "would fall" in error.message and "rest it on a zone of its own" in error.way_out
     load_scene(scene_file(text), ["dda.dynamic_factor=1"])
-    load_scene(scene_file(text), ["zones.rock.fixed=true"])
+    (error,) = faults(scene_file, text, overrides=["zones.rock.fixed=true"])
+    assert "every load acts on fixed blocks (rock)" in error.message
+    load_scene(scene_file(text + '[zones.base]\nfixed = true\n'), ["geometry.zones=" + RESTING])
+
+
+RESTING = (
+    '[{ name = "rock", rectangle = [0.0, 0.0, 1.0, 2.0] }, { name = "base", rectangle = [-1.0, -1.0, 2.0, 0.0] }]'
+)
+
+
+def test_fixing_the_loaded_specimen_is_refused_and_not_advised(scene_file):
+    """Loads on edges of different length: the advice is their ratio, by hand 0.5 m to 1 m."""
+    text = GOOD.replace("[[0.0, 0.0], [1.0, 0.0]]", "[[0.25, 0.0], [0.75, 0.0]]")
+    (error,) = faults(scene_file, text)
+    assert "(0, -5e+06) N/m" in error.message
+    assert error.way_out.startswith("balance the tractions")
+    assert "'load:bottom' (0.5 m) carries (0, 5e+06) N/m" in error.way_out and "zones.NAME" not in error.way_out
+    load_scene(scene_file(text), ["loads.tractions.1.rate_pa_per_s=[0.0, 2e5]"])
+    (error,) = faults(scene_file, text, overrides=["zones.rock.fixed=true"])
+    assert "every load acts on fixed blocks (rock)" in error.message and "zones.rock.fixed" in error.place
+
+
+def test_a_load_on_a_fixed_block_beside_a_loaded_one_is_told(scene_file):
+    scene = load_scene(scene_file(GOOD + "[zones.base]\nfixed = true\n"), [
+        "geometry.zones=" + RESTING,
+        "geometry.edges.1.line=[[-1.0, -1.0], [2.0, -1.0]]",
+    ])  # fmt: skip
+    assert ["'load:bottom' belong to fixed blocks" in w.message for w in scene.warnings].count(True) == 1
+
+
+def test_loads_that_cancel_on_one_edge_are_told(scene_file):
+    scene = load_scene(scene_file(GOOD.replace('edge = "load:bottom"', 'edge = "load:top"')))
+    assert "the tractions on 'load:top' cancel one another" in scene.warnings[0].message
+
+
+def test_no_hint_leads_to_an_edge_that_is_loaded_already(errors_of):
+    (error,) = errors_of(('name = "load:bottom"', 'name = "contact:bottom"'))
+    assert "no edge 'load:bottom'" in error.message and "did you mean" not in error.way_out
+    assert "edges are 'contact:bottom', 'load:top' (loaded already)" in error.way_out
+
+
+def test_names_that_have_their_table_are_not_suggested(errors_of):
+    (error,) = errors_of(add="[cracks.flaw]\n[cracks.flow]\n")
+    assert "no crack 'flow'" in error.message and "did you mean" not in error.way_out and "flaw" in error.way_out
+
+
+MODEL = """
+[geometry]
+model = "{model}"
+parameters = {{ platens = "both" }}
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2500
+k_ic_pa_sqrt_m = 1e6
+[zones.platen_bottom]
+fixed = true
+[joints.default]
+[[loads.tractions]]
+edge = "load:top"
+rate_pa_per_s = [0.0, -1e5]
+[run]
+end_time_s = 100.0
+"""
+
+
+@pytest.fixture
+def specimen():
+    from pathlib import Path
+
+    return MODEL.format(model=Path(__file__).parents[2] / "geometry" / "single_flaw.geo")
+
+
+def test_the_choice_that_brings_an_edge_is_named(scene_file, specimen):
+    text = specimen.replace("[run]", '[[loads.tractions]]\nedge = "load:bottom"\nvalue_pa = [0.0, 1.0]\n[run]')
+    (error,) = faults(scene_file, text)
+    assert 'the model has it with geometry.parameters.platens = "none"' in error.way_out
+    assert "did you mean 'load:top'" not in error.way_out and "'contact:bottom'" in error.way_out
+    (error,) = faults(scene_file, text.replace('edge = "load:bottom"', 'edge = "left"'))
+    assert "edge names may depend on the model's parameters" in error.way_out
+
+
+def test_physical_curves_that_nothing_uses_are_told(scene_file, specimen):
+    (warning,) = load_scene(scene_file(specimen)).warnings
+    assert "names the edges 'contact:bottom', 'contact:top'" in warning.message and "crack:NAME" in warning.way_out
+    used = specimen.replace("[joints.default]", '[joints.default]\n[joints.platens]\nedges = ["contact:*"]')
+    assert load_scene(scene_file(used)).warnings == ()
 
 
 def test_a_moment_is_unbalanced_too(scene_file):

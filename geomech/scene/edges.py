@@ -1,0 +1,135 @@
+"""Names of edges: which of them loads and joints mean, and which nobody means."""
+
+from __future__ import annotations
+
+import difflib
+import fnmatch
+
+from ..shapes.gmsh_model import CRACK
+from .drawing import Drawing
+from .errors import Check
+from .locator import Path
+from .validation import nearest
+
+
+def check_edges(c: Check) -> None:
+    """Loads and joints must name edges that there are; names that neither says are told."""
+    _tractions(c)
+    _joints(c)
+    _unused(c)
+
+
+def _edge_names(c: Check) -> list[str]:
+    return [name for name in c.drawing.blocks.edge_names if name]
+
+
+def _tractions(c: Check) -> None:
+    if c.tables.loads is None:
+        return
+    known = _edge_names(c)
+    taken = {traction.edge for traction in c.tables.loads.tractions}
+    for k, traction in enumerate(c.tables.loads.tractions):
+        if traction.edge not in known:
+            c.refuse(
+                ("loads", "tractions", k, "edge"),
+                f"the geometry has no edge {traction.edge!r}",
+                _edge_hint(c, traction.edge, known, taken),
+            )
+    leading = c.tables.loads.leading_edge
+    loaded = [traction.edge for traction in c.tables.loads.tractions]
+    if leading is not None and leading not in loaded:
+        c.refuse(
+            ("loads", "leading_edge"),
+            f"no traction acts on the leading edge {leading!r}",
+            nearest(leading, loaded) + "; it must be the edge of one of [[loads.tractions]]",
+        )
+
+
+def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
+    """What edge may be meant by ``name``. Never one that another traction acts on: two opposite loads on one edge
+    cancel. Nor one of another kind: a traction on "contact:bottom" would act between blocks."""
+    alike = [edge for edge in known if edge not in taken and edge.partition(":")[0] == name.partition(":")[0]]
+    alike = alike if ":" in name else [edge for edge in known if edge not in taken]
+    close = difflib.get_close_matches(name, alike, 1, cutoff=0.6)
+    listed = ", ".join(f"{edge!r}{' (loaded already)' if edge in taken else ''}" for edge in known)
+    parts = [
+        (f"did you mean {close[0]!r}? " if close else "") + (f"edges are {listed}" if known else "no edge has a name")
+    ]
+    if c.drawing.model is None:
+        return "; ".join([*parts, "name edges by [[geometry.edges]]"])
+    brought = c.drawing.choices_with_edge(name)
+    if brought:
+        parts.append(f"the model has it with geometry.parameters.{brought}")
+    elif c.drawing.parameters:
+        parts.append("edge names may depend on the model's parameters")
+    return "; ".join([*parts, "the model names edges by physical curves"])
+
+
+def _unused(c: Check) -> None:
+    """Names that the model gives and the scene never says: a load that is missing, or a crack without its prefix."""
+    t = c.tables
+    if c.drawing.model is None or t.loads is None or t.joints is None:
+        return
+    used = {traction.edge for traction in t.loads.tractions}
+    for joint in t.joints.values():
+        used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
+    idle = [name for name in _edge_names(c) if name not in used]
+    if idle:
+        c.warn(
+            ("geometry", "model"),
+            f"no load and no joint names the edges {', '.join(map(repr, idle))}",
+            f'they carry nothing, and follow the default joint where they touch; a crack is called "{CRACK}NAME"',
+        )
+
+
+def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
+    """The names of ``known`` that ``patterns`` mean, in order."""
+    return [name for name in known if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
+
+
+def contact_names(drawing: Drawing) -> list[str]:
+    """Names that faces in contact may have: edges as drawn, and the faces that a crack leaves when it cuts through."""
+    names = [name for name in drawing.blocks.edge_names if name]
+    return names + [f"crack:{name}" for name in drawing.cracks_drawn]
+
+
+def _joints(c: Check) -> None:
+    if c.tables.joints is None:
+        return
+    known = contact_names(c.drawing)
+    owner: dict[tuple[str, str], str] = {}
+
+    def claim(pair: tuple[str, str], law: str, path: Path) -> None:
+        first = owner.setdefault(pair, law)
+        if first != law:
+            what = f"edges {pair[1]!r}" if not pair[0] else f"edges {pair[0]!r} and {pair[1]!r}"
+            c.refuse(
+                path, f"joints {first!r} and {law!r} both claim contacts of {what}", "leave them to one of the two"
+            )
+
+    for name, joint in c.tables.joints.items():
+        if name == "default":
+            if joint.edges or joint.between:
+                c.refuse(
+                    ("joints", name), "the default joint names edges", "it rules all contacts that no other joint names"
+                )
+            continue
+        if not (joint.edges or joint.between):
+            c.refuse(("joints", name), f"joint {name!r} names no edges", 'add edges = ["…"], or call it `default`')
+        for k, pattern in enumerate(joint.edges):
+            names = joint_names((pattern,), known)
+            if not names:
+                c.refuse(("joints", name, "edges", k), f"no edge is called {pattern!r}", nearest(pattern, known))
+            for found in names:
+                claim(("", found), name, ("joints", name, "edges", k))
+        for k, pair in enumerate(joint.between):
+            for n, edge in enumerate(pair):
+                if edge not in known:
+                    c.refuse(("joints", name, "between", k, n), f"no edge is called {edge!r}", nearest(edge, known))
+            claim(tuple(sorted(pair)), name, ("joints", name, "between", k))
+    if c.drawing.blocks.n_blocks > 1 and "default" not in c.tables.joints:
+        c.warn(
+            ("joints",),
+            "there is no default joint: contacts that no joint names have neither friction nor cohesion",
+            "add [joints.default]",
+        )
