@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from geomech.conventions import normal_of
-from geomech.model import CrackFaces, Cracks, Cycle, Material
+from geomech.model import TIP, CrackFaces, Cracks, Cycle, Material
 from geomech.model.motion import Motion
 
 from .motion import carried, displacement, vertex_velocity
@@ -48,14 +48,15 @@ def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str,
 
 def cracks_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
     """Every element's sampling points joined by lines. Elements do not share points, since opening and slip jump
-    between them; segments that nobody solved for are drawn with nan."""
+    between them; segments that nobody solved for are drawn with nan, but at the start with the zeros of rock at rest."""
     faces, cracks = cycle.faces, cycle.cracks
     pieces = [] if faces is None else [_element_columns(faces)]
     solved = np.zeros(cracks.n_segments, bool)
     if faces is not None:
         solved[faces.segment] = True
     if not solved.all():
-        pieces.append(_unsolved_columns(cracks, np.flatnonzero(~solved)))
+        value = 0.0 if cycle.number == 0 else np.nan
+        pieces.append(_unsolved_columns(cracks, np.flatnonzero(~solved), value))
     lines, at = [], 0
     for piece in pieces:
         n_elements, n = piece["opening"].shape
@@ -89,8 +90,8 @@ def cracks_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
 
 
 def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
-    """Every crack tip as a point."""
-    tips = cycle.tips
+    """Every crack tip as a point; at the start, before anything is solved, with the zeros of rock at rest."""
+    tips = _tips_at_rest(cycle.cracks) if cycle.number == 0 and not len(cycle.tips) else cycle.tips
     moved = displacement(motion, tips["block"], tips["point"])
     c, s = np.cos(tips["angle"])[:, None], np.sin(tips["angle"])[:, None]
     growth = c * tips["direction"] + s * normal_of(tips["direction"])
@@ -163,6 +164,19 @@ def _cloud(points: np.ndarray, point_data: dict[str, np.ndarray]) -> Grid:
     return Grid(points, n, n + 1, np.full(len(n), VERTEX), point_data)
 
 
+def _tips_at_rest(cracks: Cracks) -> np.ndarray:
+    """TIP rows of all tips of ``cracks``, all factors zero."""
+    place = {int(node): k for k, node in enumerate(cracks.segments.ravel())}
+    at = np.array([place[int(node)] for node in cracks.tips], dtype=int)
+    segment, end = at // 2, at % 2
+    tips = np.zeros(len(at), TIP)
+    tips["node"], tips["end"], tips["point"] = cracks.tips, end, cracks.nodes[cracks.tips]
+    tips["crack"], tips["block"] = cracks.crack[segment], cracks.block[segment]
+    out = tips["point"] - cracks.nodes[cracks.segments[segment, 1 - end]]
+    tips["direction"] = out / np.hypot(*out.T)[:, None]
+    return tips
+
+
 def _element_columns(faces: CrackFaces) -> dict[str, np.ndarray]:
     return {
         "points": faces.points,
@@ -175,8 +189,8 @@ def _element_columns(faces: CrackFaces) -> dict[str, np.ndarray]:
     }
 
 
-def _unsolved_columns(cracks: Cracks, rows: np.ndarray) -> dict[str, np.ndarray]:
-    nothing = np.full((len(rows), 2), np.nan)
+def _unsolved_columns(cracks: Cracks, rows: np.ndarray, value: float) -> dict[str, np.ndarray]:
+    nothing = np.full((len(rows), 2), value)
     return {
         "points": cracks.nodes[cracks.segments[rows]],
         "segment": np.repeat(rows[:, None], 2, axis=1),

@@ -1,50 +1,76 @@
-"""Stress and displacement inside cracked blocks, on a triangle mesh whose crack faces can part."""
+"""Stress and displacement inside cracked rock, on a triangle mesh whose crack faces can part."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from geomech.conventions import rotate_stress
-from geomech.model import Cycle, Material
+from geomech.model import Cracks, Cycle, Material
 from geomech.model.motion import Motion
 
 from .grids import principal_stresses, six_components, von_mises
 from .motion import rotation
+from .triangulate import Triangles
 from .vtu import TRIANGLE, Grid, with_z
 
 #: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
-_ASIDE = 1e-3
+_ASIDE = 1e-5
+#: Cracks that turn by more than this are sharp there: stress is singular, rad.
+_SHARP = math.radians(20)
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """The mesh of a block with ``cracks`` (``key``): ``points`` (n, 2) where its nodes are looked at, ``areas`` (n,) of
+    the rock about them. Below, nodes where stress is singular: ``centres`` (k, 2) of the triangles about them and the
+    node of each, ``owner`` (k,)."""
+
+    key: bytes
+    mesh: Any
+    points: np.ndarray
+    areas: np.ndarray
+    centres: np.ndarray
+    owner: np.ndarray
 
 
 class InteriorMeshes:
     """Meshes of the cracked blocks, kept while their geometry stands, and the fields of a cycle on them.
 
     ``n_triangles`` is about how many triangles an uncracked block gets; crack tips are meshed ``tip_ratio`` times
-    finer than the rest.
+    finer than the rest. Blocks without cracks, but of a material that has been seen to crack, are there as well (what a
+    crack has cut off, above all), each with the one strain and stress that it has.
     """
 
     def __init__(self, n_triangles: int = 2000, tip_ratio: float = 15.0) -> None:
         self.n_triangles, self.tip_ratio = n_triangles, tip_ratio
-        self._kept: dict[int, tuple[bytes, Any, np.ndarray, np.ndarray]] = {}
+        self._kept: dict[int, _Kept] = {}
+        self._cracked_materials: set[int] = set()
+        self._triangles = Triangles()
 
     def grid(self, cycle: Cycle, materials: Sequence[Material], motion: Motion, configuration: str) -> Grid:
-        """The blocks of ``cycle.bodies`` as one grid; empty when there are none."""
+        """The rock of ``cycle`` as one grid; empty until some block holds a crack."""
+        blocks = cycle.blocks
+        self._cracked_materials |= {int(blocks.material[b]) for b in cycle.bodies}
+        whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
+        whole[[*cycle.bodies]] = False
         parts = [self._block(cycle, b, body, motion) for b, body in sorted(cycle.bodies.items())]
+        parts += [self._whole_blocks(cycle, whole)] if whole.any() else []
         self._kept = {b: kept for b, kept in self._kept.items() if b in cycle.bodies}
         first = np.cumsum([0, *(len(p["points"]) for p in parts)])
 
-        def joined(name: str, tail: tuple[int, ...]) -> np.ndarray:
-            return np.concatenate([p[name] for p in parts]) if parts else np.empty((0, *tail))
+        def joined(name: str, tail: tuple[int, ...] = (), kind: type = float) -> np.ndarray:
+            return np.concatenate([p[name] for p in parts]) if parts else np.empty((0, *tail), kind)
 
         points, moved = joined("points", (2,)), joined("moved", (2,))
         cells = [p["triangles"] + start for p, start in zip(parts, first)]
         cells = np.concatenate(cells) if cells else np.empty((0, 3), int)
-        owner_of_point = np.repeat(np.array([*sorted(cycle.bodies)], dtype=int), np.diff(first))
-        stress = six_components(joined("stress", (3,)), cycle.blocks.material[owner_of_point], materials)
+        owner_of_point = joined("owner", (), int)
+        stress = six_components(joined("stress", (3,)), blocks.material[owner_of_point], materials)
         principal = principal_stresses(stress)
         return Grid(
             points=points if configuration == "reference" else points + moved,
@@ -61,29 +87,82 @@ class InteriorMeshes:
         )
 
     def _block(self, cycle: Cycle, b: int, body: Any, motion: Motion) -> dict[str, np.ndarray]:
-        mesh, look_from, weights = self._mesh(cycle, b)
+        kept = self._mesh(cycle, b)
         gradient = motion.gradient[b]
         turn = float(rotation(gradient))
-        stress, own = body.fields(look_from)
+        n = len(kept.points)
+        stress, own = body.fields(np.concatenate([kept.points, kept.centres]))
+        # At a tip or a sharp corner there is no stress to give: that of the triangles about it is what the mesh resolves.
+        count = np.bincount(kept.owner, minlength=n)
+        singular = np.flatnonzero(count)
+        for k in range(3):
+            mean = np.bincount(kept.owner, weights=stress[n:, k], minlength=n)
+            stress[singular, k] = mean[singular] / count[singular]
         return {
-            "points": mesh.points,
-            "triangles": mesh.triangles,
-            "moved": _placed(mesh.points, weights, own, motion.reference_centre[b], motion.centre[b], gradient, turn),
-            "stress": rotate_stress(stress, turn),
+            "owner": np.full(n, b),
+            "points": kept.mesh.points,
+            "triangles": kept.mesh.triangles,
+            "moved": _placed(
+                kept.mesh.points, kept.areas, own[:n], motion.reference_centre[b], motion.centre[b], gradient, turn
+            ),
+            "stress": rotate_stress(stress[:n], turn),
         }
 
-    def _mesh(self, cycle: Cycle, b: int) -> tuple[Any, np.ndarray, np.ndarray]:
+    def _whole_blocks(self, cycle: Cycle, whole: np.ndarray) -> dict[str, np.ndarray]:
+        """Blocks without cracks (``whole``, a mask) have one strain and one stress each: their corners say it all."""
+        blocks, state = cycle.blocks, cycle.state
+        triangles, owner = self._triangles.of(blocks)
+        corners = np.flatnonzero(whole[blocks.vertex_block])
+        number = np.full(blocks.n_vertices, -1)
+        number[corners] = np.arange(len(corners))
+        return {
+            "owner": blocks.vertex_block[corners],
+            "points": blocks.vertices[corners],
+            "triangles": number[triangles[whole[owner]]],
+            "moved": (state.vertices - blocks.vertices)[corners],
+            "stress": state.stress[blocks.vertex_block[corners]],
+        }
+
+    def _mesh(self, cycle: Cycle, b: int) -> _Kept:
         loops, cracks = cycle.blocks.loops(b), cycle.cracks.in_block(b)
         key = b"|".join([*(loop.tobytes() for loop in loops), cracks.nodes.tobytes(), cracks.segments.tobytes()])
         kept = self._kept.get(b)
-        if kept is None or kept[0] != key:
+        if kept is None or kept.key != key:
             from geomech.shapes.meshing import mesh_interior
 
             size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self.n_triangles))
             mesh = mesh_interior(loops, cracks, size, size / self.tip_ratio)
             look_from = mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side
-            kept = self._kept[b] = (key, mesh, look_from, _node_areas(mesh))
-        return kept[1:]
+            kept = self._kept[b] = _Kept(key, mesh, look_from, _node_areas(mesh), *_about_singular(mesh, cracks))
+        return kept
+
+
+def _singular_nodes(cracks: Cracks) -> np.ndarray:
+    """Nodes of ``cracks`` where elastic stress has no bound: tips, junctions and sharp kinks."""
+    along = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
+    along = along / cracks.lengths[:, None]
+    out = np.zeros((len(cracks.nodes), 2))
+    np.add.at(out, cracks.segments[:, 0], along)
+    np.subtract.at(out, cracks.segments[:, 1], along)
+    # The two unit vectors out of a node inside a crack add up to 2 sin(turn / 2).
+    sharp = (cracks.valence == 2) & (np.hypot(*out.T) > 2 * math.sin(_SHARP / 2))
+    singular = sharp | (cracks.valence > 2)
+    singular[cracks.tips] = True
+    return np.flatnonzero(singular)
+
+
+def _about_singular(mesh: Any, cracks: Cracks) -> tuple[np.ndarray, np.ndarray]:
+    """The centres (k, 2) of the triangles about singular nodes and the node of each (k,)."""
+    from scipy.spatial import cKDTree
+
+    at = cracks.nodes[_singular_nodes(cracks)]
+    if not len(at):
+        return np.empty((0, 2)), np.empty(0, int)
+    singular = np.zeros(len(mesh.points), bool)
+    reach = 1e-9 * float(np.ptp(mesh.points, axis=0).max())
+    singular[np.concatenate(cKDTree(mesh.points).query_ball_point(at, reach)).astype(int)] = True
+    triangle, corner = np.nonzero(singular[mesh.triangles])
+    return mesh.points[mesh.triangles[triangle]].mean(axis=1), mesh.triangles[triangle, corner]
 
 
 def _local_size(mesh: Any) -> np.ndarray:

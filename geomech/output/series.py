@@ -20,7 +20,7 @@ from .vtu import Collection, Grid, write_grid
 PASS_OFFSET = 1e-6
 
 #: Interior fields cost more than everything else that is written; where no crack grows they are this much rarer.
-QUIET = 5
+QUIET = 10
 
 
 class Series:
@@ -29,7 +29,7 @@ class Series:
     ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
     last are always written. ``interior_every`` counts cycles between interior fields while cracks grow; while none does
     they come `QUIET` times as rarely, since there they mostly scale with the load. They also come with the first load,
-    with every event and at the end; 0 leaves them out. Raises ValueError for an unknown ``configuration``.
+    with every event, before and after blocks are cut and at the end; 0 leaves them out. Raises ValueError for an unknown ``configuration``.
     """
 
     def __init__(self, *, every: int = 1, interior_every: int = 10, configuration: str = "reference") -> None:
@@ -58,14 +58,15 @@ class Series:
 
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()
+        if self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks:
+            self._write_last_interior()  # of the rock while it was whole
         # Every cycle takes its time, written or not, so that the times do not depend on what is left out.
         at = self._time.of(cycle)
         happened = bool(cycle.events) or bool((cycle.tips["grown"] > 0).any())
         wanted = cycle.number == 0 or cycle.number % self.every == 0 or happened
-        interior = bool(cycle.bodies) and self._interior_wanted(cycle)
         if wanted:
             self._write(cycle, at)
-        if interior:
+        if self._interior_wanted(cycle):
             self._write_interior(cycle, at)
         self._pending = (cycle, at, wanted)
         self.seconds += time.perf_counter() - began
@@ -76,17 +77,17 @@ class Series:
             cycle, at, written = self._pending
             if not written:
                 self._write(cycle, at)
-            if self.interior_every and cycle.bodies and cycle.number != self._last_interior:
-                self._write_interior(cycle, at)
+            self._write_last_interior()
         for collection in self._collections.values():
             collection.close()
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
 
     def _interior_wanted(self, cycle: Cycle) -> bool:
-        if not self.interior_every or cycle.number == 0:
+        if not self.interior_every or cycle.number == 0 or not (cycle.bodies or self._last_interior >= 0):
             return False
-        if cycle.events or self._last_interior < 0:
+        cut = self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks
+        if cycle.events or cut or self._last_interior < 0:
             return True
         grew = cycle.cracks.n_segments != self._segments_then
         return cycle.number - self._last_interior >= self.interior_every * (1 if grew else QUIET)
@@ -98,6 +99,13 @@ class Series:
         self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape))
         self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
         self._save("contacts", cycle, at, grids.contacts_grid(cycle, shape))
+
+    def _write_last_interior(self) -> None:
+        """The interior of the last cycle that came, unless it is written or there is none."""
+        cycle, at, _ = self._pending
+        begun = bool(cycle.bodies) or self._last_interior >= 0
+        if self.interior_every and begun and cycle.number != self._last_interior:
+            self._write_interior(cycle, at)
 
     def _write_interior(self, cycle: Cycle, at: float) -> None:
         motion = Motion.of(cycle.blocks, cycle.state.vertices)

@@ -50,6 +50,13 @@ def blocks() -> Blocks:
     )
 
 
+def halves() -> tuple[np.ndarray, np.ndarray]:
+    """The specimen, notch and hole filled, cut along its axis: its left and its right half."""
+    w, h = 0.03, 0.06
+    left = np.array([[-w, -h], [0.0, -h], [0.0, h], [-w, h]])
+    return left, left + [w, 0.0]
+
+
 def cracks(grown: int = 0, increment: float = 1e-3) -> Cracks:
     """One flaw at 45° with ``grown`` vertical increments at both its tips."""
     u = np.array([math.cos(TILT), math.sin(TILT)])
