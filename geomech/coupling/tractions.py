@@ -96,7 +96,7 @@ def boundary_load(
     pieces = _Pieces()
     faces, lone = _faces_and_lone(block, blocks, vertices, contacts)
     for (edge, _), rows in faces.items():
-        _add_face(pieces, blocks, motion, block, edge, rows, turn_back)
+        _add_face(pieces, blocks, motion, block, _side(blocks, vertices, edge), rows, turn_back)
     for row in lone:
         _add_lone(pieces, blocks, motion, block, row, turn_back)
     for edge, traction in edge_tractions:
@@ -160,11 +160,19 @@ def _line_start(blocks: Blocks, vertices: np.ndarray, edge: int) -> int:
         first, start = before, (x, y)
 
 
+def _side(blocks: Blocks, vertices: np.ndarray, first: int) -> list[int]:
+    """The vertices along the straight side that begins with edge ``first``, its two ends included."""
+    side = [first, int(blocks.next_vertex[first])]
+    while side[-1] != first and _line_start(blocks, vertices, side[-1]) == first:
+        side.append(int(blocks.next_vertex[side[-1]]))
+    return side
+
+
 def _faces_and_lone(
     block: int, blocks: Blocks, vertices: np.ndarray, contacts: np.ndarray
 ) -> tuple[dict[tuple[int, int], np.ndarray], np.ndarray]:
-    """The acting contacts of ``block``: joint faces with at least two distinct points, (own edge, first edge of
-    the other's straight side) → rows, and the rows left alone."""
+    """The acting contacts of ``block``: joint faces with at least two distinct points, (first edge of the own straight
+    side, first edge of the other's) → rows, and the rows left alone."""
     acting = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
     rows = acting[(acting["block"] == block) | (acting["other"] == block)]
     found: dict[tuple[int, int], list[int]] = {}
@@ -176,7 +184,8 @@ def _faces_and_lone(
             lone.append(k)
         else:
             own, facing = (touching, edge) if owner == block else (edge, touching)
-            found.setdefault((own, _line_start(blocks, vertices, facing)), []).append(k)
+            face = _line_start(blocks, vertices, own), _line_start(blocks, vertices, facing)
+            found.setdefault(face, []).append(k)
     faces = {}
     for face, members in found.items():
         if _spread(rows["point"][members], vertices, blocks, face[0]):
@@ -202,8 +211,9 @@ def _force_on(block: int, rows: np.ndarray) -> np.ndarray:
     return np.where((rows["block"] == block)[..., None], force, -force)
 
 
-def _add_face(pieces, blocks, motion, block, edge, rows, turn_back) -> None:
-    start, end = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
+def _add_face(pieces, blocks, motion, block, side, rows, turn_back) -> None:
+    corners = blocks.vertices[side]
+    start, end = corners[0], corners[-1]
     length = np.hypot(*(end - start))
     along = (end - start) / length
     inward = np.array([-along[1], along[0]])
@@ -222,12 +232,20 @@ def _add_face(pieces, blocks, motion, block, edge, rows, turn_back) -> None:
         q_a, q_b = shear.sum() / total * p_a, shear.sum() / total * p_b
     else:
         q_a = q_b = shear.sum() / (b - a)
-    pieces.add(
-        start + (first + a) * along,
-        end if first + b >= length else start + (first + b) * along,
-        p_a * inward + q_a * along,
-        p_b * inward + q_b * along,
-    )
+    t_a, t_b = p_a * inward + q_a * along, p_b * inward + q_b * along
+    # One piece an edge of the side: a load segment lies on one edge.
+    a, b = first + a, first + b
+    marks = (corners - start) @ along
+    marks[-1] = length
+    for k in range(len(side) - 1):
+        low, high = max(a, marks[k]), min(b, marks[k + 1])
+        if high - low > SNAP * length:
+            pieces.add(
+                corners[k] if low == marks[k] else start + low * along,
+                corners[k + 1] if high == marks[k + 1] else start + high * along,
+                t_a + (low - a) / (b - a) * (t_b - t_a),
+                t_a + (high - a) / (b - a) * (t_b - t_a),
+            )
 
 
 def _add_lone(pieces, blocks, motion, block, row, turn_back) -> None:

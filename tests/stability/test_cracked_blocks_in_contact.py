@@ -157,3 +157,15 @@ def test_a_vertex_in_the_straight_side_of_a_base_changes_nothing():
     noded = last(problem([block, base], [False, True], [line]))
     assert noded.tips["k_i"] == pytest.approx(plain.tips["k_i"], rel=1e-4)
     assert noded.tips["k_ii"] == pytest.approx(plain.tips["k_ii"], rel=1e-4)
+
+
+def test_vertices_in_the_cracked_blocks_own_base_change_nothing():
+    """The same block with named pieces in its own resting side: one joint face still, one pressure over all of it. The
+    tolerance is that of the boundary's elements, which the vertices move."""
+    block, base = rectangle(-0.5, 0, 0.5, 2), rectangle(-1, -1, 1, 0)
+    line = [[-0.1, 0.5], [0.1, 0.7]]
+    plain = last(problem([block, base], [False, True], [line]))
+    block = np.insert(block, 1, [[-0.2, 0.0], [0.25, 0.0]], axis=0)
+    noded = last(problem([block, base], [False, True], [line]))
+    assert noded.tips["k_i"] == pytest.approx(plain.tips["k_i"], rel=1e-3)
+    assert noded.tips["k_ii"] == pytest.approx(plain.tips["k_ii"], rel=1e-3)
