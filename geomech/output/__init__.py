@@ -37,7 +37,7 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
     watchers: list[Observer] = [RunLog()]
     if scene is not None:
         watchers.append(SceneCopy(scene.resolved()))
-    interior_every = getattr(output, "interior_every", 10) if getattr(output, "interior", True) else 0
+    interior_every = getattr(output, "interior_every", 5) if getattr(output, "interior", True) else 0
     return [
         *watchers,
         Histories(),

@@ -10,14 +10,16 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from geomech.model import Cycle, Problem
+from geomech.model import Cycle, Problem, counted
 
 
 class Progress:
-    """Observer for people. On a terminal it draws a tqdm bar over the scene's time; the time left is what the whole
-    scene would take, and a scene that stops at an event ends sooner. ``quiet`` leaves only errors.
+    """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
+    time left is what the rest of the scene takes at the pace of its load steps so far; a scene that stops at an event
+    ends sooner. ``quiet`` leaves only where a failed run stopped.
 
-    ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal.
+    ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
+    between two with the same percentage.
     """
 
     def __init__(self, *, quiet: bool = False, stream: TextIO | None = None, interval: float = 5.0) -> None:
@@ -27,6 +29,9 @@ class Progress:
         self._out = self.stream or sys.stderr
         self._folder, self._end = Path(folder), problem.run.end_time
         self._said = time.perf_counter()
+        self._percent, self._last = -1, None
+        # (wall time, scene's time) when the first load step was done: it may have compiled kernels, and sets no pace.
+        self._paced: tuple[float, float] | None = None
         self._bar = None
         if not self.quiet and self._out.isatty():
             from tqdm import tqdm
@@ -35,36 +40,55 @@ class Progress:
                 total=self._end,
                 file=self._out,
                 desc=problem.title[:40],
-                bar_format="{desc}: {percentage:3.0f}%|{bar}| {postfix} [{elapsed}<{remaining}]",
+                bar_format="{desc}: {percentage:3.0f}%|{bar}| {postfix} [{elapsed}]",
                 postfix="starting",
                 mininterval=0.1,
                 dynamic_ncols=True,
             )
         elif not self.quiet:
-            self._say(f"{problem.title}: {problem.blocks.n_blocks} blocks, {problem.cracks.n_cracks} cracks → {folder}")
+            self._say(f"{problem.title}: {problem.inventory} → {folder}")
 
     def on_cycle(self, cycle: Cycle) -> None:
+        self._last = cycle
         if self.quiet:
             return
         now = time.perf_counter()
+        if self._paced is None and cycle.state.time > 0:
+            self._paced = now, cycle.state.time
         if self._bar is not None:
             # The text is made only as often as the bar is drawn.
             if now - self._said >= self._bar.mininterval:
                 self._said = now
-                self._bar.set_postfix_str(_told(cycle), refresh=False)
+                self._bar.set_postfix_str(_told(cycle) + self._left(cycle, now), refresh=False)
             self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
         elif now - self._said >= self.interval:
-            self._said = now
-            self._say(f"  {100 * cycle.state.time / self._end:3.0f} %  {_told(cycle)}")
+            percent = self._share(cycle)
+            if percent == self._percent and now - self._said < 2 * self.interval:
+                return
+            self._said, self._percent = now, percent
+            self._say(f"  {percent:3d} %  {_told(cycle)}{self._left(cycle, now)}")
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         if self._bar is not None:
             self._bar.close()
         if error is not None:
-            why = "interrupted" if isinstance(error, KeyboardInterrupt) else f"failed: {error or type(error).__name__}"
-            self._say(f"{why}\n  what was written until then is in {self._folder}")
+            # Why it stopped is the exception's own to say, to whoever catches it.
+            last = self._last
+            where = "before the first cycle" if last is None else f"at {self._share(last)} %, {_told(last)}"
+            self._say(f"stopped {where}\n  what was written until then is in {self._folder}")
         elif not self.quiet:
             self._say("\n".join(closing_lines(summary, self._folder)))
+
+    def _share(self, cycle: Cycle) -> int:
+        return round(100 * min(cycle.state.time, self._end) / self._end)
+
+    def _left(self, cycle: Cycle, now: float) -> str:
+        """Wall time that the rest of the scene takes at the pace so far; empty where there is no pace yet."""
+        if self._paced is None or cycle.state.time <= self._paced[1]:
+            return ""
+        began, from_time = self._paced
+        seconds = (now - began) / (cycle.state.time - from_time) * max(0.0, self._end - cycle.state.time)
+        return f", {_duration(seconds)} left at most" if seconds >= 0.5 else ""
 
     def _say(self, text: str) -> None:
         self._out.write(text + "\n")
@@ -76,14 +100,15 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
     lines = [f"{summary.get('title', 'run')}: {summary.get('end', 'done')}"]
     for kind, first in summary.get("first", {}).items():
         load = first.get("load_pa")
-        text = f"  {kind:<13}" + (f" {load / 1e6:8.3f} MPa" if load is not None else "")
+        text = f"  {kind:<13}" + (f" {abs(load) / 1e6:8.3f} MPa" if load is not None else "")
+        text += " in tension" if load is not None and load < 0 else ""
         if first.get("load_normalised") is not None:
             text += f"   σ√(πb)/K_Ic = {first['load_normalised']:.3f}"
         count = summary.get("events", {}).get(kind, 1)
         lines.append(text + (f"   (first of {count})" if count > 1 else ""))
     if "cycles" in summary:
         lines.append(
-            f"  {summary['load_steps']} load steps, {summary['growing_cycles']} cycles with growth, "
+            f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with growth, "
             f"{1e3 * summary['crack_growth_m']:.3g} mm of new crack in {summary.get('wall_s', math.nan):.2f} s"
         )
     return [*lines, f"  {folder}"]
@@ -93,3 +118,10 @@ def _told(cycle: Cycle) -> str:
     growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
     text = f"load {cycle.load / 1e6:.2f} MPa, cycle {cycle.number}"
     return text + (f", {growing} of {len(cycle.tips)} tips growing" if len(cycle.tips) else "")
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from geomech.model import Cycle, Problem
+from geomech.model import Cycle, Problem, counted
 
 _log = logging.getLogger("geomech.run")
 
@@ -29,10 +29,7 @@ class RunLog:
         logger.addHandler(self._handler)
         if logger.getEffectiveLevel() > self.level:
             logger.setLevel(self.level)
-        _log.info(
-            "%s: %d blocks, %d cracks, %d materials",
-            problem.title, problem.blocks.n_blocks, problem.cracks.n_cracks, len(problem.materials),
-        )  # fmt: skip
+        _log.info("%s: %s, %s", problem.title, problem.inventory, counted(len(problem.materials), "material"))
 
     def on_cycle(self, cycle: Cycle) -> None:
         for event in cycle.events:

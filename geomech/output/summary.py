@@ -19,8 +19,9 @@ from geomech.model import Cycle, Event, Problem
 class Summary:
     """Observer that counts, and at the end completes the run's ``summary`` and writes it as ``summary.json``.
 
-    Loads are given in Pa and, where the problem has cracks and a toughness, as σ√(πb)/K_Ic with b half the longest
-    crack of the scene, which is how strengths of different rocks compare.
+    Loads are given in Pa, positive in compression, and their magnitudes, where the problem has cracks and a toughness,
+    as |σ|√(πb)/K_Ic with b half the longest crack of the scene, which is how strengths of different rocks compare. The
+    peak is the load of the largest magnitude.
     """
 
     def on_start(self, problem: Problem, folder: Path) -> None:
@@ -30,13 +31,13 @@ class Summary:
         self._began = time.perf_counter()
         self._last: Cycle | None = None
         self._events: list[Event] = []
-        self._peak, self._load_steps, self._growth_passes, self._grown = -math.inf, -1, 0, 0.0
+        self._peak, self._load_steps, self._growth_passes, self._grown = 0.0, -1, 0, 0.0
         self._scale = normalisation(problem)
 
     def on_cycle(self, cycle: Cycle) -> None:
         self._last = cycle
         self._events += cycle.events
-        self._peak = max(self._peak, cycle.load)
+        self._peak = max(self._peak, cycle.load, key=abs)
         self._load_steps = max(self._load_steps, cycle.load_step)
         grown = float(cycle.tips["grown"].sum())
         self._growth_passes += grown > 0
@@ -74,6 +75,7 @@ class Summary:
         if self._scale is not None:
             half_length, toughness = self._scale
             summary["normalisation"] = {"half_length_m": half_length, "k_ic_pa_sqrt_m": toughness}
+        summary["cracks"] = list(self._problem.cracks.names)
         summary["versions"] = versions()
         write_json(self._path, summary)
 
@@ -81,7 +83,7 @@ class Summary:
         told = {"load_pa": _finite(event.load), "time_s": event.time, "cycle": event.cycle, "point": list(event.point)}
         if self._scale is not None:
             half_length, toughness = self._scale
-            told["load_normalised"] = _finite(event.load * math.sqrt(math.pi * half_length) / toughness)
+            told["load_normalised"] = _finite(abs(event.load) * math.sqrt(math.pi * half_length) / toughness)
         if event.detail:
             told["detail"] = event.detail
         return told

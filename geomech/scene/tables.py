@@ -278,9 +278,15 @@ class MonitorTable(Table):
 
 
 class OutputTable(Table):
-    every: Annotated[int, Field(ge=1)] = Field(1, description="write every n-th cycle (cycles with events always)")
-    interior: bool = Field(True, description="write stress inside cracked blocks (interior.pvd)")
-    interior_every: Annotated[int, Field(ge=1)] = Field(10, description="write the interior every n-th written cycle")
+    every: Annotated[int, Field(ge=1)] = Field(
+        1, description="write every n-th cycle; cycles with growth or an event, the first and the last always"
+    )
+    interior: bool = Field(True, description="write stress inside cracked rock (interior.pvd)")
+    interior_every: Annotated[int, Field(ge=1)] = Field(
+        5,
+        description="write the interior every n-th cycle while cracks grow, every 10 n-th while none does; at the first "
+        "load, with events, before and after a block is cut and at the end always",
+    )
     configuration: Literal["reference", "current"] = Field(
         "reference", description='coordinates in files: "reference" with displacement, or "current"'
     )
