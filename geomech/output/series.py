@@ -11,11 +11,10 @@ from geomech.model import Cycle, Problem
 from geomech.model.motion import Motion
 
 from . import grids
-from .disk import Disk
 from .fields import SERIES
 from .interior import InteriorMeshes
 from .triangulate import Triangles
-from .vtu import Collection, Grid, packed_grid, put
+from .vtu import Collection, Grid, write_grid
 
 #: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
 PASS_OFFSET = 1e-6
@@ -52,7 +51,6 @@ class Series:
                 old.unlink()
         names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * bool(self.interior_every)
         self._collections = {name: Collection(self._folder / f"{name}.pvd") for name in names}
-        self._disk = Disk()
         self._triangles, self._meshes = Triangles(), InteriorMeshes()
         self._time = SeriesTime()
         self._pending: tuple[Cycle, float, bool] | None = None
@@ -80,11 +78,8 @@ class Series:
             if not written:
                 self._write(cycle, at)
             self._write_last_interior()
-        try:
-            self._disk.close()
-        finally:
-            for collection in self._collections.values():
-                collection.close()
+        for collection in self._collections.values():
+            collection.close()
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
 
@@ -125,12 +120,7 @@ class Series:
             "LOAD": float(cycle.load),
             "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are the reference ones
         }
-        # Bytes are made here, where the arrays are; the file system is waited for beside the run.
-        self._disk.do(self._written, name, at, file, packed_grid(name, grid, numbers))
-
-    def _written(self, name: str, at: float, file: str, content: bytes) -> None:
-        # Listed only when it is there: whoever reads the series, also after a crash, finds all that it names.
-        put(self._folder / file, content)
+        write_grid(self._folder / file, name, grid, numbers)
         self._collections[name].add(at, file)
 
 

@@ -52,12 +52,7 @@ class Grid:
 
 
 def write_grid(path: Path, series: str, grid: Grid, numbers: Mapping[str, float | int]) -> None:
-    """Write `packed_grid` as the file ``path``."""
-    put(path, packed_grid(series, grid, numbers))
-
-
-def packed_grid(series: str, grid: Grid, numbers: Mapping[str, float | int]) -> bytes:
-    """``grid`` as a .vtu file of ``series``, with ``numbers`` as field data.
+    """Write ``grid`` as the .vtu file ``path`` of ``series``, with ``numbers`` as field data.
 
     Raises ValueError when an array is not as `geomech.output.fields` declares it."""
     n_points, n_cells = len(grid.points), len(grid.types)
@@ -84,7 +79,7 @@ def packed_grid(series: str, grid: Grid, numbers: Mapping[str, float | int]) -> 
     columns.reverse()
     packed = [(_compressed if compress else _plain)(data) for _, _, data, _ in columns]
     layout = tuple((section, name, data.dtype.str[1:], data.shape[1:], names) for section, name, data, names in columns)
-    return b"".join([_xml(n_points, n_cells, compress, layout, tuple(map(len, packed))), *packed, _TAIL])
+    _put(path, b"".join([_xml(n_points, n_cells, compress, layout, tuple(map(len, packed))), *packed, _TAIL]))
 
 
 # From cycle to cycle the text of a small grid mostly stays the same.
@@ -123,7 +118,7 @@ def with_z(vectors: np.ndarray) -> np.ndarray:
     return out
 
 
-def put(path: Path, content: bytes) -> None:
+def _put(path: Path, content: bytes) -> None:
     """A file of ``content``: three system calls, half of what a buffered file object makes."""
     handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
     try:
@@ -181,7 +176,7 @@ class Collection:
     def _save(self) -> None:
         beside = self.path.with_name(self.path.name + ".part")
         head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
-        put(beside, "".join([head, *self._entries, "</Collection></VTKFile>\n"]).encode())
+        _put(beside, "".join([head, *self._entries, "</Collection></VTKFile>\n"]).encode())
         os.replace(beside, self.path)
         self._saved = time.monotonic()
 
