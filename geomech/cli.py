@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,8 @@ for _library in ("OPENBLAS", "MKL"):
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 BENCHMARKS = ("accuracy", "ddm", "startup")
+#: Pixels, as for a scene's own render.width_px.
+LEAST_WIDTH = 64
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -127,18 +129,19 @@ def _scene_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _check(options: argparse.Namespace) -> int:
+    from .model import counted
     from .scene import load_scene
 
     first = load_scene(options.scene, options.overrides, None)
     if options.keys:
         print(first.describe_keys())
         return DONE
-    for name in _variants(first, options.variants) or [None]:
-        scene = first if name is None else load_scene(options.scene, options.overrides, name)
+    scenes = _scenes(first, options)
+    _say_warnings(scenes.values())
+    for scene in scenes.values():
         problem = scene.problem()
-        _say_warnings(scene)
-        cracks = f"{problem.cracks.n_cracks} cracks with {len(problem.cracks.tips)} tips"
-        print(f"{problem.title}{f' [{name}]' if name else ''}: {problem.blocks.n_blocks} blocks, {cracks}: no errors")
+        tips = f" with {counted(len(problem.cracks.tips), 'tip')}" if problem.cracks.n_cracks else ""
+        print("\n".join([f"{problem.title}: {problem.inventory}{tips}: no errors", *scene.overview()]))
     if first.variants and not options.variants:
         print(f"variants: {', '.join(first.variants)}")
     return DONE
@@ -147,28 +150,49 @@ def _check(options: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     place: Path = options.scene
     if place.is_dir() and (place / "run.py").is_file():
-        out = options.out or default_folder(place)
-        script = _load_script(place / "run.py")
-        asked = {"overrides": options.overrides, "variants": options.variants, "quiet": options.quiet}
-        result = script.main(place, out, **asked)
-        return DONE if result is None else int(result)
+        return _run_script(place, options)
 
     from .output import standard_observers
     from .pipeline import run
     from .scene import load_scene
 
-    first = load_scene(place, options.overrides, None)
-    names = _variants(first, options.variants)
     # Every variant is read before the first one runs: an error in the last should not cost an hour.
-    scenes = {name: load_scene(place, options.overrides, name) for name in names} or {None: first}
+    scenes = _scenes(load_scene(place, options.overrides, None), options)
+    if not options.quiet:
+        _say_warnings(scenes.values())
     base = options.out or default_folder(place)
     for name, scene in scenes.items():
         # One variant with --out goes into exactly that folder.
         folder = base if name is None or (options.out and len(scenes) == 1) else base / name
-        if not options.quiet:
-            _say_warnings(scene)
         run(scene, out=folder, observers=standard_observers(scene, quiet=options.quiet))
     return DONE
+
+
+def _run_script(place: Path, options: argparse.Namespace) -> int:
+    """Hand a pipeline's own script what the command line says, its variants by name."""
+    variants = options.variants
+    if (place / "scene.toml").is_file():
+        from .scene import load_scene
+
+        first = load_scene(place, options.overrides, None)
+        variants = _variants(first, variants)
+        if not options.quiet:
+            _say_warnings(_scenes(first, options).values())
+    elif "all" in variants:
+        raise BadInput(f"{place} holds no scene.toml that says what its variants are: name them")
+    script = _load_script(place / "run.py")
+    result = script.main(
+        place, options.out or default_folder(place), overrides=options.overrides, variants=variants, quiet=options.quiet
+    )
+    return DONE if result is None else int(result)
+
+
+def _scenes(first: Any, options: argparse.Namespace) -> dict[str | None, Any]:
+    """The scenes that are asked for, by variant; ``first``, which has none, where none is asked for."""
+    from .scene import load_scene
+
+    names = _variants(first, options.variants)
+    return {name: load_scene(options.scene, options.overrides, name) for name in names} or {None: first}
 
 
 def _variants(scene: Any, asked: Sequence[str]) -> list[str]:
@@ -200,7 +224,12 @@ def _load_script(path: Path) -> Any:
 def _render(options: argparse.Namespace) -> int:
     from .output import Run
     from .render import draw
+    from .render.look import COMPONENTS
 
+    if options.component is not None and options.component not in COMPONENTS:
+        raise BadInput(f"no stress component {options.component!r}; there are {', '.join(COMPONENTS)}")
+    if options.width is not None and options.width < LEAST_WIDTH:
+        raise BadInput(f"a width of {options.width} pixels shows nothing; give at least {LEAST_WIDTH}")
     run = _open_run(Run, options.run)
     wishes = {"component": options.component, "width": options.width, "movie": options.gif}
     for path in draw(run, options.out, **{key: value for key, value in wishes.items() if value is not None}):
@@ -228,7 +257,9 @@ def _open_run(run: Callable[[Path], Any], folder: Path) -> Any:
     try:
         return run(folder)
     except FileNotFoundError as error:
-        raise BadInput(str(error)) from None
+        below = [str(found) for found in _run_folders(folder) if found != folder]
+        listed = ", ".join(below[:12]) + (f" and {len(below) - 12} more" if len(below) > 12 else "")
+        raise BadInput(f"{error}" + (f"; runs below it: {listed}" if below else "")) from None
 
 
 def _bench(options: argparse.Namespace) -> int:
@@ -275,9 +306,10 @@ def _say_errors(error: Exception) -> None:
     _say(f"{len(errors)} error{'s' if len(errors) > 1 else ''}; nothing was run")
 
 
-def _say_warnings(scene: Any) -> None:
-    for place, message, way_out in scene.warnings:
-        _say(f"warning: {place}: {message}" + (f"\n    {way_out}" if way_out else ""))
+def _say_warnings(scenes: Iterable[Any]) -> None:
+    """A line each; what several variants share is said once."""
+    for place, message, way_out in dict.fromkeys(warning for scene in scenes for warning in scene.warnings):
+        _say(f"warning: {place}: {message}" + (f"; {way_out}" if way_out else ""))
 
 
 def _say(text: str) -> None:

@@ -101,13 +101,28 @@ def test_help_imports_nothing_heavy():
 def test_check_tells_what_is_there(scene, capsys):
     assert main(["check", str(scene)]) == DONE
     out = capsys.readouterr().out
-    assert "A plate: 1 blocks, 1 cracks with 2 tips: no errors" in out
+    assert "A plate: 1 block, 1 crack with 2 tips: no errors" in out
+    assert "0.06 × 0.12 m, 1 zone" in out and "flaw: 10 mm, 2 tips" in out and "K_Ic 2 MPa√m" in out
     assert "variants: steep" in out
 
 
 def test_check_of_all_variants(scene, capsys):
     assert main(["check", str(scene), "--variant", "all"]) == DONE
     assert "A plate, steep" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("verb", ["check", "run"])
+def test_warnings_are_said_in_a_line_each_and_once(verb, scene, tmp_path, monkeypatch, capsys):
+    import geomech.pipeline
+
+    monkeypatch.setattr(geomech.pipeline, "run", lambda scene, out, observers: None)
+    scene.write_text(SPECIMEN.replace("2e6\n", "2.0\n") + '[variants.flat]\n"geometry.cracks.0.angle_deg" = 0.0\n')
+    assert main([verb, str(scene), "--variant", "all"]) == DONE
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 1 and told[0].startswith("warning: ") and "k_ic_pa_sqrt_m" in told[0]
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", str(scene), "--quiet"]) == DONE
+    assert capsys.readouterr().err == ""
 
 
 def test_check_lists_the_keys(scene, capsys):
@@ -197,6 +212,27 @@ def test_pipeline_folder_runs_its_script(tmp_path):
     assert (tmp_path / "study" / "said.txt").read_text() == repr(("o", ["a.b=1"], ["x"], True))
 
 
+@pytest.mark.parametrize(
+    ("asked", "handed"), [([], []), (["--variant", "all"], ["steep", "flat"]), (["--variant", "flat"], ["flat"])]
+)
+def test_pipeline_scripts_are_handed_variants_by_name(tmp_path, asked, handed):
+    study = tmp_path / "study"
+    study.mkdir()
+    (study / "scene.toml").write_text(SPECIMEN + '[variants.flat]\n"geometry.cracks.0.angle_deg" = 0.0\n')
+    (study / "run.py").write_text(
+        "def main(folder, out, overrides, variants, quiet):\n    (folder / 'said.txt').write_text(repr(variants))\n"
+    )
+    assert main(["run", str(study), *asked]) == DONE
+    assert (study / "said.txt").read_text() == repr(handed)
+    assert main(["run", str(study), "--variant", "stepe"]) == BAD_INPUT
+
+
+def test_all_variants_of_a_folder_that_names_none(tmp_path, capsys):
+    (tmp_path / "run.py").write_text("def main(folder, out, overrides, variants, quiet): ...\n")
+    assert main(["run", str(tmp_path), "--variant", "all"]) == BAD_INPUT
+    assert "holds no scene.toml" in capsys.readouterr().err
+
+
 def test_default_folder_is_named_after_the_scene():
     assert default_folder(Path("pipelines/two_cracks")) == Path("outputs/two_cracks")
     assert default_folder(Path("pipelines/two_cracks/scene.toml")) == Path("outputs/two_cracks")
@@ -225,6 +261,42 @@ def test_render_prints_what_it_drew(finished, capsys):
     assert paths[0].name == "specimen.png"
     assert all(path.is_file() for path in paths)
     assert not any(path.suffix == ".gif" for path in paths)
+
+
+@pytest.mark.parametrize(
+    ("wishes", "message"),
+    [(["--component", "foo"], "there are xx, yy, zz, xy, principal_max"), (["--width", "3"], "give at least 64")],
+)
+def test_render_refuses_what_it_cannot_draw(finished, wishes, message, capsys):
+    assert main(["render", str(finished), *wishes]) == BAD_INPUT
+    assert message in capsys.readouterr().err
+    assert not (finished / "pictures").exists()
+
+
+def test_render_of_a_folder_of_runs_names_them(finished, capsys):
+    assert main(["render", str(finished.parent)]) == BAD_INPUT
+    assert f"runs below it: {finished}" in capsys.readouterr().err
+
+
+def test_a_failure_is_told_once(scene, tmp_path, monkeypatch, capsys):
+    import geomech.coupling
+
+    def fails(problem):
+        raise ArithmeticError("no equilibrium at t = 2 s")
+        yield
+
+    monkeypatch.setattr(geomech.coupling, "cycles", fails)
+    assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == FAILED
+    told = capsys.readouterr().err
+    assert told.count("no equilibrium") == 1 and "stopped before the first cycle" in told
+    assert "no equilibrium" in (tmp_path / "out" / "run.log").read_text()
+
+
+def test_a_run_folder_that_cannot_be_is_told_in_a_line(scene, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["run", str(scene), "--out", str(tmp_path / "file" / "run")]) == FAILED
+    (line,) = capsys.readouterr().err.splitlines()
+    assert str(tmp_path / "file") in line and "not a directory" in line
 
 
 def test_doctor_says_how_to_mend(monkeypatch, capsys):

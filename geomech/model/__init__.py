@@ -6,7 +6,7 @@ from .joint import JointLaw
 from .loads import EdgeTraction, History, Loads, PointLoad
 from .material import Material
 from .motion import Motion
-from .problem import DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings
+from .problem import DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, State
 
 __all__ = [
@@ -33,4 +33,5 @@ __all__ = [
     "Problem",
     "RunSettings",
     "State",
+    "counted",
 ]

@@ -90,6 +90,11 @@ class Problem:
     gauge: tuple[tuple[int, tuple[float, float]], tuple[int, tuple[float, float]]] | None = None
     monitors: dict[str, tuple[int, tuple[float, float]]] = field(default_factory=dict)
 
+    @property
+    def inventory(self) -> str:
+        """What there is, for messages: "3 blocks, 1 crack"."""
+        return f"{counted(self.blocks.n_blocks, 'block')}, {counted(self.cracks.n_cracks, 'crack')}"
+
     def joint_index(self, edge_name: str, other_name: str) -> int:
         """The joint law between two edges by their names: the pair's, else either name's alone, else the first law."""
         a, b = sorted((edge_name, other_name))
@@ -101,3 +106,8 @@ class Problem:
     def __post_init__(self) -> None:
         if self.cracks.n_segments and not np.isin(self.cracks.block, np.arange(self.blocks.n_blocks)).all():
             raise ValueError("a crack lies in a block that does not exist")
+
+
+def counted(number: int, noun: str) -> str:
+    """ "1 block", "2 blocks": for messages."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -88,7 +88,7 @@ class Progress:
             return ""
         began, from_time = self._paced
         seconds = (now - began) / (cycle.state.time - from_time) * max(0.0, self._end - cycle.state.time)
-        return f", {_duration(seconds)} left at most" if seconds >= 0.5 else ""
+        return f", about {_duration(seconds)} left" if seconds >= 0.5 else ""
 
     def _say(self, text: str) -> None:
         self._out.write(text + "\n")

@@ -19,6 +19,8 @@ from .errors import Check, Fault, SceneError
 from .keys import describe_keys
 from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
+from .overview import overview
+from .plausibility import check_plausible
 from .tables import OutputTable, RenderTable, SceneTables
 from .validation import DECIMAL_COMMA, nearest, validate
 
@@ -82,6 +84,10 @@ class Scene:
             data["geometry"]["model"] = str((self.path.parent / self.tables.geometry.model).resolve())
             data["geometry"]["parameters"] = dict(self.drawing.parameters)
         return data
+
+    def overview(self) -> list[str]:
+        """The scene in a few lines: size, zones, materials, cracks, loads and time."""
+        return overview(self.tables, self.drawing)
 
     @staticmethod
     def describe_keys() -> str:
@@ -158,6 +164,7 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
     check_loads(sections)
     if faults:
         raise SceneError(places.sorted(faults))
+    check_plausible(sections)
     # Building asks the same questions as the checks did; whatever it would find has been found.
     quiet = Check(tables, data, drawing, places, [], [])
     return Scene(path, variant, tables, drawing, names, tuple(places.sorted(warnings)), quiet)

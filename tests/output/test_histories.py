@@ -112,7 +112,9 @@ def test_a_failed_run_says_so_and_stays_readable(tmp_path):
     run = Run(tmp_path)
     assert run.summary["end"] == "failed"
     assert "no equilibrium" in run.summary["error"]
-    assert "no equilibrium" in out.getvalue()
+    # The exception itself is for whoever catches it.
+    assert "no equilibrium" not in out.getvalue()
+    assert "stopped at 3 %, load 0.60 MPa, cycle 6" in out.getvalue() and str(tmp_path) in out.getvalue()
     assert "no equilibrium" in (tmp_path / "run.log").read_text()
     assert len(run.history) == 7
 
@@ -148,12 +150,69 @@ def test_progress_is_quiet_off_a_terminal(tmp_path):
     made.write(tmp_path, [Summary(), Progress(stream=out, interval=1e9)], steps=50)
     lines = out.getvalue().splitlines()
     # One line at the start, the closing lines at the end, none between.
-    assert lines[0].startswith("Made-up specimen: 3 blocks, 1 cracks")
+    assert lines[0].startswith("Made-up specimen: 3 blocks, 1 crack →")
     assert any("initiation" in line and "9.800 MPa" in line for line in lines)
     assert len(lines) <= 6
     out = io.StringIO()
     made.write(tmp_path, [Progress(stream=out, interval=0.0)], steps=10, passes=0)
     assert sum("load" in line and "%" in line for line in out.getvalue().splitlines()) == 10
+
+
+def test_progress_tells_the_time_left_at_the_pace_of_load_steps(tmp_path, monkeypatch):
+    """One load step a wall second, the first one slow: after step k of 100, 100 − k seconds are left; growth passes at
+    one load make it longer."""
+    from geomech.output import progress as module
+
+    clock = [0.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: clock[0])
+    out = io.StringIO()
+    watch = Progress(stream=out, interval=0.5)
+    watch.on_start(made.problem(end_time=100.0), tmp_path)
+    wall = {0: 1.0, 1: 60.0, 2: 61.0, 3: 62.0, 4: 64.0, 5: 66.0}
+    for k, step, growth_pass in ((0, 0, 0), (1, 1, 0), (2, 2, 0), (3, 3, 0), (4, 3, 1), (5, 3, 2)):
+        clock[0] = wall[k]
+        watch.on_cycle(made.cycle(k, step, growth_pass, 0))
+    lines = [line for line in out.getvalue().splitlines() if "%" in line]
+    assert ["left" in line for line in lines] == [False, False, True, True, True, True]
+    # 98 % at 1 s a step; 97 % at 2 s in two steps; the same 97 % with 4 and 6 s in two steps.
+    assert [line.rpartition(", about ")[2] for line in lines[2:]] == ["98 s left", "97 s left", "3 min left", "5 min left"]
+
+
+def test_a_percentage_is_not_said_again_at_once(tmp_path, monkeypatch):
+    from geomech.output import progress as module
+
+    clock = [0.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: clock[0])
+    out = io.StringIO()
+    watch = Progress(stream=out)
+    watch.on_start(made.problem(end_time=1e6), tmp_path)
+    for k in range(60):
+        clock[0] = k + 1.0
+        watch.on_cycle(made.cycle(k, k, 0, 0))
+    # A minute at 0 %: a line after 5 s, then every 10 s.
+    assert sum("0 %" in line for line in out.getvalue().splitlines()) == 6
+
+
+def test_loads_in_tension_are_told_by_their_size(tmp_path):
+    watch = Summary()
+    watch.on_start(made.problem(), tmp_path)
+    for k in range(4):
+        cycle = made.cycle(k, k, 0, 0)
+        pulled = tuple(replace(e, load=-e.load) for e in cycle.events)
+        if k == 3:
+            pulled = (made.Event("initiation", k, 3.0, -3 * made.RATE, (0.0, 0.0)),)
+        watch.on_cycle(replace(cycle, load=-cycle.load, events=pulled))
+    summary = {}
+    watch.on_end(summary)
+    first = summary["first"]["initiation"]
+    assert first["load_pa"] == -3 * made.RATE == summary["peak_load_pa"]
+    assert first["load_normalised"] == pytest.approx(
+        3 * made.RATE * math.sqrt(math.pi * made.HALF_LENGTH) / made.ROCK.k_ic, rel=1e-12
+    )
+    from geomech.output.progress import closing_lines
+
+    (line,) = [line for line in closing_lines(summary, tmp_path) if "initiation" in line]
+    assert "0.600 MPa in tension" in line and "-" not in line
 
 
 def test_quiet_says_nothing(tmp_path):

@@ -1,0 +1,134 @@
+"""A scene in a few lines, for people to see whether it is the one they meant."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..model import Blocks, Cracks, History, counted
+from .build import force_history, traction_history
+from .checks import material_of
+from .drawing import Drawing
+from .tables import SceneTables
+
+#: Longer lists are cut after so many lines.
+SHOWN = 8
+
+
+def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
+    """Size, zones, materials, cracks, loads and time of a scene, a line each."""
+    rows = [("size", _box(drawing.blocks.vertices) + f", {counted(len(set(drawing.zones)), 'zone')}")]
+    rows += _cut("zones", _zones(tables, drawing))
+    rows += _cut("materials", _materials(tables))
+    rows += _cut("cracks", _cracks(drawing.cracks))
+    rows += _cut("loads", _loads(tables, drawing.blocks))
+    stops = f" or the first of {', '.join(tables.run.stop_at)}" if tables.run.stop_at else ""
+    rows.append(("run", f"to {tables.run.end_time_s:g} s{stops}, in steps of at most {tables.dda.time_step_s:g} s"))
+    # A label stands before the first of its lines.
+    labels = [label if k == 0 or rows[k - 1][0] != label else "" for k, (label, _) in enumerate(rows)]
+    return [f"  {label:<9} {text}" for label, (_, text) in zip(labels, rows)]
+
+
+def _cut(label: str, texts: Iterable[str]) -> list[tuple[str, str]]:
+    texts = list(texts)
+    left = len(texts) - SHOWN
+    shown = texts if left <= 1 else [*texts[:SHOWN], f"… and {left} more"]
+    return [(label, text) for text in shown]
+
+
+def _box(points: np.ndarray) -> str:
+    width, height = np.ptp(points, axis=0)
+    return f"{width:.4g} × {height:.4g} m"
+
+
+def _zones(tables: SceneTables, drawing: Drawing) -> list[str]:
+    count, lines = Counter(drawing.zones), []
+    for name, blocks in count.items():
+        own = np.isin(drawing.blocks.vertex_block, [b for b, zone in enumerate(drawing.zones) if zone == name])
+        entry = tables.zones.get(name)
+        text = f"{name}: {_box(drawing.blocks.vertices[own])}, {material_of(tables, name)}"
+        text += f", {blocks} blocks" if blocks > 1 else ""
+        if entry is not None and (entry.fixed or entry.guided):
+            text += ", fixed" if entry.fixed else f", guided along {entry.guided}"
+        lines.append(text)
+    return lines
+
+
+def _materials(tables: SceneTables) -> list[str]:
+    lines = []
+    for name, m in tables.materials.items():
+        text = f"{name}: E {_scaled(m.youngs_modulus_pa, 'Pa')}, ν {m.poissons_ratio:g}"
+        if m.k_ic_pa_sqrt_m is not None:
+            text += f", K_Ic {_scaled(m.k_ic_pa_sqrt_m, 'Pa√m')}"
+        lines.append(text)
+    return lines
+
+
+def _cracks(cracks: Cracks) -> list[str]:
+    lines, tips = [], set(cracks.tips.tolist())
+    for k, name in enumerate(cracks.names):
+        own = np.flatnonzero(cracks.crack == k)
+        nodes, times = np.unique(cracks.segments[own], return_counts=True)
+        ends = nodes[times == 1]
+        daylight = int(cracks.surface[ends].sum())
+        text = f"{name}: {_length(float(cracks.lengths[own].sum()))}, "
+        text += counted(sum(end in tips for end in ends.tolist()), "tip")
+        text += {0: "", 1: ", one end daylights"}.get(daylight, ", both ends daylight")
+        lines.append(text)
+    return lines
+
+
+def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
+    end, lines = tables.run.end_time_s, []
+    for traction in tables.loads.tractions:
+        history = traction_history(traction)
+        lines.append(f"{traction.edge}: " + _course(history, end, "Pa", _sense(blocks, traction.edge, history.at(end))))
+    for force in tables.loads.forces:
+        lines.append(f"force at ({force.at[0]:g}, {force.at[1]:g}): " + _course(force_history(force), end, "N/m", ""))
+    if any(tables.loads.gravity_m_s2):
+        x, y = tables.loads.gravity_m_s2
+        lines.append(f"gravity ({x:g}, {y:g}) m/s²")
+    return lines or ["none"]
+
+
+def _course(history: History, end: float, unit: str, sense: str) -> str:
+    """How large a load is and how it comes: magnitudes, and the direction where ``sense`` does not tell it."""
+    value = history.at(end)
+    size, direction = float(np.hypot(*value)), sense or f"along ({value[0]:.3g}, {value[1]:.3g})"
+    if size == 0.0:
+        return f"nothing at {end:g} s"
+    if history.rate is not None:
+        rate = float(np.hypot(*history.rate))
+        return f"{direction}, {_scaled(rate, unit)}/s to {_scaled(size, unit)} at {end:g} s"
+    return f"{direction}, {_scaled(size, unit)}" + ("" if len(history.times) == 1 else f" at {end:g} s")
+
+
+def _sense(blocks: Blocks, edge_name: str, traction: np.ndarray) -> str:
+    """Whether a traction presses, pulls or shears; empty where it does one here and another there."""
+    edges = blocks.edges_named(edge_name)
+    along = blocks.vertices[blocks.next_vertex[edges]] - blocks.vertices[edges]
+    size = np.hypot(*traction)
+    if not len(edges) or size == 0.0:
+        return ""
+    # Outlines run counter-clockwise, so the outward normal is to the right.
+    normal = (along[:, 1] * traction[0] - along[:, 0] * traction[1]) / (np.hypot(*along.T) * size)
+    for sense, holds in (
+        ("compression", normal < -0.999), ("tension", normal > 0.999), ("shear", np.abs(normal) < 1e-3)
+    ):  # fmt: skip
+        if holds.all():
+            return sense
+    return ""
+
+
+def _length(length: float) -> str:
+    return f"{length:.4g} m" if length >= 1 else f"{1e3 * length:.4g} mm"
+
+
+def _scaled(value: float, unit: str) -> str:
+    """``value`` with the unit's prefix that leaves one to three digits before the point."""
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if abs(value) >= factor:
+            return f"{value / factor:.4g} {prefix}{unit}"
+    return f"{value:.4g} {unit}"

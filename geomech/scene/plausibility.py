@@ -1,0 +1,107 @@
+"""What a scene may say and hardly means: lengths in millimetres, moduli in GPa, crack ends that just miss a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .build import traction_history
+from .checks import material_of
+from .errors import Check
+from .tables import SceneTables, TractionTable
+
+#: A crack end that misses an outline by less than this share of its crack's length was probably meant to reach it.
+NEAR_MISS = 0.01
+#: Largest sides of cracked specimens and outcrops that are likely, m.
+SIZES = 1e-3, 100.0
+#: Rocks are stiffer and tougher by orders of magnitude: Pa, and Pa √m. Below, the number is in GPa or MPa.
+LEAST_MODULUS, LEAST_TOUGHNESS = 1e6, 1e3
+#: Rock breaks at strains of 0.1 to 1 %, and elements and blocks here are linear elastic.
+LARGEST_STRAIN = 0.05
+
+
+def check_plausible(c: Check) -> None:
+    """Warn of what is likely to be a slip of units or of drawing; for scenes without faults."""
+    _materials(c)
+    _size(c)
+    _near_misses(c)
+    _strain(c)
+
+
+def _materials(c: Check) -> None:
+    for name, m in c.tables.materials.items():
+        if m.youngs_modulus_pa < LEAST_MODULUS:
+            c.warn(
+                ("materials", name, "youngs_modulus_pa"),
+                f"Young's modulus of {name!r} is {m.youngs_modulus_pa:g} Pa, less than that of soft rubber",
+                "the unit is Pa: 50 GPa is 50e9",
+            )
+        if m.k_ic_pa_sqrt_m is not None and m.k_ic_pa_sqrt_m < LEAST_TOUGHNESS:
+            c.warn(
+                ("materials", name, "k_ic_pa_sqrt_m"),
+                f"the fracture toughness of {name!r} is {m.k_ic_pa_sqrt_m:g} Pa √m, far below that of any rock",
+                "the unit is Pa √m: 1.2 MPa √m is 1.2e6",
+            )
+
+
+def _size(c: Check) -> None:
+    low, high = c.drawing.blocks.vertices.min(axis=0), c.drawing.blocks.vertices.max(axis=0)
+    size = (high - low).max()
+    if c.drawing.cracks.n_segments and not SIZES[0] <= size <= SIZES[1]:
+        c.warn(
+            ("geometry",),
+            f"the drawing is {high[0] - low[0]:g} × {high[1] - low[1]:g} m",
+            "are all lengths in metres?",
+        )
+
+
+def _near_misses(c: Check) -> None:
+    blocks, cracks = c.drawing.blocks, c.drawing.cracks
+    length = np.bincount(cracks.crack, cracks.lengths) if cracks.n_segments else np.empty(0)
+    owner = dict(zip(cracks.segments.ravel().tolist(), np.repeat(np.arange(cracks.n_segments), 2).tolist()))
+    for tip in cracks.tips.tolist():
+        crack, block = int(cracks.crack[owner[tip]]), int(cracks.block[owner[tip]])
+        own = np.flatnonzero(blocks.vertex_block == block)
+        gap = _distance(cracks.nodes[tip], blocks.vertices[own], blocks.vertices[blocks.next_vertex[own]])
+        if gap < NEAR_MISS * length[crack]:
+            x, y = cracks.nodes[tip]
+            c.warn(
+                ("geometry", "cracks", crack) if c.drawing.model is None else ("geometry", "model"),
+                f"crack {cracks.names[crack]!r} ends at ({x:g}, {y:g}), {gap:.2g} m from the outline of "
+                f"{blocks.names[block]!r}, without touching it",
+                "end it on the outline if it reaches the surface; the bridge left is very thin",
+            )
+
+
+def _distance(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    """From ``point`` to the nearest of the pieces from ``a`` (n, 2) to ``b`` (n, 2)."""
+    along = b - a
+    share = np.clip(((point - a) * along).sum(axis=1) / (along * along).sum(axis=1), 0, 1)
+    return float(np.hypot(*(point - a - share[:, None] * along).T).min())
+
+
+def _strain(c: Check) -> None:
+    t, blocks = c.tables, c.drawing.blocks
+    concerned = set(c.drawing.cracks.block.tolist())
+    worst, at = 0.0, 0
+    for k, traction in enumerate(t.loads.tractions):
+        concerned.update(blocks.vertex_block[blocks.edges_named(traction.edge)].tolist())
+        stress = _largest(t, traction)
+        worst, at = (stress, k) if stress > worst else (worst, at)
+    if worst == 0.0:
+        return
+    names = {material_of(t, c.drawing.zones[block]) for block in concerned}
+    softest = min(names, key=lambda name: t.materials[name].youngs_modulus_pa)
+    modulus = t.materials[softest].youngs_modulus_pa
+    if worst > LARGEST_STRAIN * modulus:
+        c.warn(
+            ("loads", "tractions", at),
+            f"its {worst / 1e6:.4g} MPa would strain {softest!r} (E = {modulus / 1e9:.4g} GPa) by "
+            f"{100 * worst / modulus:.3g} %, if the run comes so far",
+            "is the modulus, the load or the end of the run wrong?",
+        )
+
+
+def _largest(t: SceneTables, traction: TractionTable) -> float:
+    """The largest magnitude of a traction in the run, Pa: its history is linear between its times and the end."""
+    history, end = traction_history(traction), t.run.end_time_s
+    return max(float(np.hypot(*history.at(time))) for time in (*history.times[history.times < end], end))

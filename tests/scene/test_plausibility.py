@@ -1,0 +1,125 @@
+"""Slips of units and drawing are told, sound scenes are not; the overview says what a scene holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_texts import GOOD
+
+from geomech.scene import load_scene
+
+PIPELINES = Path(__file__).parents[2] / "pipelines"
+
+
+def warnings_of(scene_file, *changes, overrides=()):
+    text = GOOD
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    return load_scene(scene_file(text), overrides).warnings
+
+
+@pytest.mark.parametrize(
+    ("change", "place", "message", "way_out"),
+    [
+        (("= 20e9", "= 20.0"), "materials.rock.youngs_modulus_pa", "is 20 Pa", "50 GPa is 50e9"),
+        (("= 1e6", "= 1.0"), "materials.rock.k_ic_pa_sqrt_m", "is 1 Pa √m", "1.2e6"),
+        # 10 MPa at the end of the run, on 0.1 GPa: 10 %.
+        (("= 20e9", "= 0.1e9"), "loads.tractions[0]", "10 MPa would strain 'rock' (E = 0.1 GPa) by 10 %", "modulus"),
+        # The flaw's upper end is 0.1 sin 30° above its centre: 1 mm below a top at 1.051 m, half a hundredth of 0.2 m.
+        (("2.0", "1.051"), "geometry.cracks[0]", "0.001 m from the outline of 'rock'", "end it on the outline"),
+    ],
+)
+def test_each_slip_is_told_once(scene_file, change, place, message, way_out):
+    found = [w for w in warnings_of(scene_file, change) if message in w.message]
+    assert len(found) == 1 and found[0].place.endswith(f": {place}") and way_out in found[0].way_out
+
+
+@pytest.mark.parametrize(("factor", "told"), [(2e-4, 1), (1e-3, 0), (10.0, 0), (1000.0, 1)])
+def test_sizes_that_are_hardly_in_metres(scene_file, factor, told):
+    """The plate of 1 × 2 m, scaled: only below 1 mm and above 100 m."""
+    f = factor
+    changes = [
+        (f"geometry.zones.0.rectangle=[0.0, 0.0, {f}, {2 * f}]"),
+        (f"geometry.cracks.0.centre=[{0.5 * f}, {f}]"),
+        (f"geometry.cracks.0.length_m={0.2 * f}"),
+        (f"geometry.edges.0.line=[[0.0, {2 * f}], [{f}, {2 * f}]]"),
+        (f"geometry.edges.1.line=[[0.0, 0.0], [{f}, 0.0]]"),
+    ]
+    found = warnings_of(scene_file, overrides=changes)
+    assert ["in metres?" in w.way_out for w in found] == [True] * told
+
+
+def test_a_crack_that_reaches_the_outline_or_keeps_away_is_not_told(scene_file):
+    end = "points = [[0.5, 1.0], [{x}, 1.0]]"
+    old = "centre = [0.5, 1.0]\nlength_m = 0.2\nangle_deg = 30"
+    assert warnings_of(scene_file, (old, end.format(x=1.0))) == ()
+    assert warnings_of(scene_file, (old, end.format(x=0.99))) == ()
+    assert len(warnings_of(scene_file, (old, end.format(x=0.999)))) == 1
+
+
+def test_the_largest_load_of_a_history_counts(scene_file):
+    """12 % in the middle of the run, none at its end."""
+    course = "times_s = [0, 50, 100]\nvalues_pa = [[0, 0], [0, {p}], [0, 0]]"
+    (warning,) = warnings_of(
+        scene_file,
+        ("rate_pa_per_s = [0.0, -1e5]", course.format(p=-2.4e9)),
+        ("rate_pa_per_s = [0.0, 1e5]", course.format(p=2.4e9)),
+    )
+    assert "by 12 %" in warning.message
+
+
+@pytest.mark.parametrize("name", [p.name for p in sorted(PIPELINES.iterdir()) if (p / "scene.toml").is_file()])
+def test_pipelines_have_nothing_to_be_warned_of(name):
+    first = load_scene(PIPELINES / name)
+    for variant in (None, *first.variants):
+        assert load_scene(PIPELINES / name, variant=variant).warnings == ()
+
+
+def test_overview_says_what_there_is(scene_file):
+    old = "centre = [0.5, 1.0]\nlength_m = 0.2\nangle_deg = 30"
+    text = GOOD.replace(old, "points = [[0.7, 1.0], [1.0, 1.0]]")
+    lines = [" ".join(line.split()) for line in load_scene(scene_file(text)).overview()]
+    assert lines == [
+        "size 1 × 2 m, 1 zone",
+        "zones rock: 1 × 2 m, rock",
+        "materials rock: E 20 GPa, ν 0.25, K_Ic 1 MPa√m",
+        "cracks flaw: 300 mm, 1 tip, one end daylights",
+        "loads load:top: compression, 100 kPa/s to 10 MPa at 100 s",
+        "load:bottom: compression, 100 kPa/s to 10 MPa at 100 s",
+        "run to 100 s or the first of coalescence, split, in steps of at most 1 s",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("top", "bottom", "told"),
+    [
+        ("[0.0, 1e5]", "[0.0, -1e5]", ["tension"] * 2),
+        ("[1e5, -1e5]", "[-1e5, 1e5]", ["along (1e+07, -1e+07)", "along (-1e+07, 1e+07)"]),
+    ],
+)
+def test_overview_says_what_loads_do(scene_file, top, bottom, told):
+    text = GOOD.replace("[0.0, -1e5]", "TOP").replace("[0.0, 1e5]", bottom).replace("TOP", top)
+    text = text.replace("rectangle = [0.0, 0.0, 1.0, 2.0]", "rectangle = [0.0, 0.0, 1.0, 2.0]")
+    scene = load_scene(scene_file(text), ["dda.dynamic_factor=1"])  # a moment is left over by oblique loads
+    lines = [line for line in scene.overview() if "load:" in line]
+    assert [what in line for what, line in zip(told, lines)] == [True, True]
+
+
+def test_long_lists_are_cut(scene_file):
+    cracks = "".join(
+        f'[[geometry.cracks]]\nname = "c{k}"\npoints = [[0.2, {y:.2f}], [0.3, {y:.2f}]]\n'
+        for k, y in enumerate(np.linspace(0.1, 0.6, 20))
+    )
+    text = GOOD.replace("[[geometry.edges]]", cracks + "[[geometry.edges]]", 1)
+    lines = load_scene(scene_file(text)).overview()
+    assert sum("100 mm, 2 tips" in line for line in lines) == 7 and any("… and 13 more" in line for line in lines)
+
+
+def test_titles_name_the_variant(scene_file):
+    text = GOOD + '[variants.slow]\n"dda.time_step_s" = 0.5\n'
+    scene = load_scene(scene_file(text), variant="slow")
+    assert scene.problem().title == scene.resolved()["title"] == "A plate between two loads, slow"
+    assert load_scene(scene_file(text)).problem().title == "A plate between two loads"
