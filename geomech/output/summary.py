@@ -31,7 +31,7 @@ class Summary:
         self._began = time.perf_counter()
         self._last: Cycle | None = None
         self._events: list[Event] = []
-        self._peak, self._load_steps, self._growth_passes, self._grown = 0.0, -1, 0, 0.0
+        self._peak, self._load_steps, self._growth_passes, self._grown = 0.0, 0, 0, 0.0
         self._scale = normalisation(problem)
 
     def on_cycle(self, cycle: Cycle) -> None:
@@ -62,7 +62,7 @@ class Summary:
         summary["events"] = counts
         if last is not None:
             summary["cycles"] = last.number + 1
-            summary["load_steps"] = self._load_steps + 1
+            summary["load_steps"] = self._load_steps  # the initial state, number 0, is none
             summary["growing_cycles"] = int(self._growth_passes)
             summary["time_s"] = float(last.state.time)
             summary["peak_load_pa"] = float(self._peak)

@@ -36,33 +36,31 @@ def _tractions(c: Check) -> None:
                 _edge_hint(c, traction.edge, known, taken),
             )
     leading = c.tables.loads.leading_edge
-    loaded = [traction.edge for traction in c.tables.loads.tractions]
-    if leading is not None and leading not in loaded:
+    # Where a traction's own edge is wrong, it may be the one that leads.
+    if leading is not None and leading not in taken and taken <= set(known):
         c.refuse(
             ("loads", "leading_edge"),
             f"no traction acts on the leading edge {leading!r}",
-            nearest(leading, loaded) + "; it must be the edge of one of [[loads.tractions]]",
+            f"it must be the edge of one of [[loads.tractions]]: {nearest(leading, sorted(taken))}",
         )
 
 
 def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
     """What edge may be meant by ``name``. Never one that another traction acts on: two opposite loads on one edge
     cancel. Nor one of another kind: a traction on "contact:bottom" would act between blocks."""
-    alike = [edge for edge in known if edge not in taken and edge.partition(":")[0] == name.partition(":")[0]]
-    alike = alike if ":" in name else [edge for edge in known if edge not in taken]
-    close = difflib.get_close_matches(name, alike, 1, cutoff=0.6)
-    listed = ", ".join(f"{edge!r}{' (loaded already)' if edge in taken else ''}" for edge in known)
-    parts = [
-        (f"did you mean {close[0]!r}? " if close else "") + (f"edges are {listed}" if known else "no edge has a name")
-    ]
-    if c.drawing.model is None:
-        return "; ".join([*parts, "name edges by [[geometry.edges]]"])
     brought = c.drawing.choices_with_edge(name)
+    kind, colon, _ = name.rpartition(":")
+    alike = [edge for edge in known if edge not in taken and edge.startswith(kind + colon)]
+    close = difflib.get_close_matches(name, alike, 1, cutoff=0.6) if not brought else []
+    listed = ", ".join(f"{edge!r}{' (loaded already)' if edge in taken else ''}" for edge in known)
+    hint = (f"did you mean {close[0]!r}? " if close else "") + (f"edges are {listed}" if known else "no edge has a name")
+    if c.drawing.model is None:
+        return f"{hint}; name edges by [[geometry.edges]]"
     if brought:
-        parts.append(f"the model has it with geometry.parameters.{brought}")
-    elif c.drawing.parameters:
-        parts.append("edge names may depend on the model's parameters")
-    return "; ".join([*parts, "the model names edges by physical curves"])
+        return f"the model has it with geometry.parameters.{brought}; now its {hint}"
+    if c.drawing.parameters:
+        hint += "; edge names may depend on the model's parameters"
+    return f"{hint}; the model names edges by physical curves"
 
 
 def _unused(c: Check) -> None:
