@@ -124,7 +124,7 @@ def test_cracks_on_one_another_are_refused(run):
 def test_a_crack_that_ends_at_the_outline_to_round_off_is_a_mouth(run, gap):
     """An edge crack has one tip, whichever side of the outline its other end was rounded to."""
     code, shown, _ = run(plate([("edge", [[-0.03 + gap, 0.0], [-0.02, 0.002]])]), verb="check")
-    assert code == cli.DONE and "1 cracks with 1 tips" in shown
+    assert code == cli.DONE and "1 crack with 1 tip:" in shown
 
 
 @pytest.mark.parametrize(("size", "nu"), [(1 / 120, 0.21), (1e4 / 0.12, 0.21), (1.0, 0.49)])
