@@ -400,7 +400,7 @@ class Coupling:
 
     def _record(self, state, tips, solutions, events, growth_pass, statistics) -> Cycle:
         motion = self._motion(state)
-        return Cycle(
+        cycle = Cycle(
             number=self.number,
             load_step=self.load_step,
             growth_pass=growth_pass,
@@ -419,6 +419,8 @@ class Coupling:
             statistics=statistics,
             seconds=dict(self.seconds),
         )
+        vars(cycle)["motion"] = motion  # known here: the property need not find it again
+        return cycle
 
     def _motion(self, state: State) -> Motion:
         """The blocks' motion in ``state``; the record of one step and the loads of the next ask for the same one."""

@@ -21,7 +21,6 @@ import numpy as np
 
 from ..conventions import normal_of
 from ..model import Blocks, Motion
-from ..model.polygon import area_moments
 
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = np.radians(10.0)
@@ -301,7 +300,7 @@ def _add_point_load(pieces, blocks, block: int, point: np.ndarray, force: np.nda
 
 
 def _balanced(block, blocks, segments, tractions, density, gravity, acceleration, spin, turn_back) -> BoundaryLoad:
-    area, centroid, second = area_moments(blocks.loops(block))
+    area, centroid, second = blocks.area_moments(block)
     gradient = np.zeros((2, 2))
     if density and acceleration is not None:
         strain_rate = np.array([[acceleration[3], acceleration[5] / 2], [acceleration[5] / 2, acceleration[4]]])

@@ -79,7 +79,8 @@ class Body:
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
         if self.loops:
-            self.area, self.centroid, _ = area_moments(self.loops)
+            self.area, self.centroid, self._second = area_moments(self.loops)
+            self._reach = float(np.ptp(self.loops[0], axis=0).max())
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
         points = np.concatenate([self.mesh.edges.reshape(-1, 2), cracks.nodes])
@@ -316,8 +317,9 @@ class Body:
         particular = self._particular(load)
         if self.loops:
             check_equilibrium(
-                load, self.loops, self.centroid, particular.force, particular.gradient, equilibrium_tolerance
-            )
+                load, self._reach, self.area, self.centroid, self._second, particular.force, particular.gradient,
+                equilibrium_tolerance,
+            )  # fmt: skip
         units = self._unit_segments(load)
         if particular.force.any() or particular.gradient.any():
             if self._forces is None:

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.polygon import polygon_moments
-
 
 class OutOfEquilibrium(ValueError):
     """Loads whose resultants do not vanish: no static solution exists.
@@ -73,16 +71,20 @@ class BodyLoad:
 
 def check_equilibrium(
     load: BodyLoad,
-    loops: list[np.ndarray],
+    reach: float,
+    area: float,
     centroid: np.ndarray,
+    second: np.ndarray,
     force: np.ndarray,
     gradient: np.ndarray,
     tolerance: float,
 ) -> None:
-    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size; ``force`` and
-    ``gradient`` are the body force about the ``centroid``."""
-    total, moment, size, reach = np.zeros(2), 0.0, 0.0, 0.0
-    reach = float(np.ptp(loops[0], axis=0).max())
+    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size.
+
+    ``reach`` is the body's extent; ``area``, ``centroid`` and ``second`` (2, 2) its area moments; ``force`` and
+    ``gradient`` the body force about the centroid.
+    """
+    total, moment, size = np.zeros(2), 0.0, 0.0
     if load.segments is not None and len(load.segments):
         x0, x1 = load.segments[:, 0] - centroid, load.segments[:, 1] - centroid
         t0, t1 = load.tractions[:, 0], load.tractions[:, 1]
@@ -94,10 +96,9 @@ def check_equilibrium(
         )
         size += 0.5 * float(length @ (np.hypot(*t0.T) + np.hypot(*t1.T)))
     if force.any() or gradient.any():
-        area, first, second = polygon_moments(loops, centroid)
-        total = total + area * force + gradient @ first
+        total = total + area * force
         turned = gradient @ second
-        moment += first[0] * force[1] - first[1] * force[0] + turned[1, 0] - turned[0, 1]
+        moment += turned[1, 0] - turned[0, 1]
         size += area * (float(np.hypot(*force)) + float(np.abs(gradient).max()) * reach)
     if size > 0:
         relative = max(float(np.hypot(*total)), abs(moment) / reach) / size

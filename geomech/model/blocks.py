@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from .polygon import area_moments
+
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -124,6 +126,16 @@ class Blocks:
         if name not in self.edge_names:
             return np.empty(0, int)
         return np.flatnonzero(self.edge_name == self.edge_names.index(name))
+
+    @cached_property
+    def _area_moments(self) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
+        return {}
+
+    def area_moments(self, block: int) -> tuple[float, np.ndarray, np.ndarray]:
+        """(area, centroid (2,), second moments about it (2, 2)) of the reference polygon of ``block``."""
+        if block not in self._area_moments:
+            self._area_moments[block] = area_moments(self.loops(block))
+        return self._area_moments[block]
 
     def areas(self, vertices: np.ndarray | None = None) -> np.ndarray:
         """(n_blocks,) areas, m², holes taken out."""

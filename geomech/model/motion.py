@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,5 +49,9 @@ class Motion:
 
     def reference(self, block: int, points: np.ndarray) -> np.ndarray:
         """Which material points, in reference coordinates, are now at ``points`` (..., 2)."""
-        back = np.linalg.inv(self.gradient[block])
+        back = self._inverse[block]
         return self.reference_centre[block] + (np.asarray(points, dtype=float) - self.centre[block]) @ back.T
+
+    @cached_property
+    def _inverse(self) -> np.ndarray:
+        return np.linalg.inv(self.gradient)

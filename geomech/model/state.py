@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from .blocks import Blocks
 from .cracks import Cracks
+from .motion import Motion
 
 #: Contact and crack-face states.
 OPEN, STICK, SLIP = 0, 1, 2
@@ -152,3 +154,8 @@ class Cycle:
     monitors: dict[str, np.ndarray] = field(default_factory=dict)
     statistics: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Of all blocks, from their reference positions to `state`."""
+        return Motion.of(self.blocks, self.state.vertices)

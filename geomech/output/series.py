@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from geomech.model import Cycle, Problem
-from geomech.model.motion import Motion
 
 from . import grids
+from .beside import Beside
 from .fields import SERIES
 from .interior import InteriorMeshes
 from .triangulate import Triangles
@@ -52,6 +52,7 @@ class Series:
         names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * bool(self.interior_every)
         self._collections = {name: Collection(self._folder / f"{name}.pvd") for name in names}
         self._triangles, self._meshes = Triangles(), InteriorMeshes()
+        self._beside = Beside()
         self._time = SeriesTime()
         self._pending: tuple[Cycle, float, bool] | None = None
         self._last_interior, self._segments_then = -1, 0
@@ -78,8 +79,11 @@ class Series:
             if not written:
                 self._write(cycle, at)
             self._write_last_interior()
-        for collection in self._collections.values():
-            collection.close()
+        try:
+            self._beside.close()
+        finally:
+            for collection in self._collections.values():
+                collection.close()
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
 
@@ -93,8 +97,7 @@ class Series:
         return cycle.number - self._last_interior >= self.interior_every * (1 if grew else QUIET)
 
     def _write(self, cycle: Cycle, at: float) -> None:
-        motion = Motion.of(cycle.blocks, cycle.state.vertices)
-        shape = self.configuration
+        motion, shape = cycle.motion, self.configuration
         self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles))
         self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape))
         self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
@@ -108,9 +111,12 @@ class Series:
             self._write_interior(cycle, at)
 
     def _write_interior(self, cycle: Cycle, at: float) -> None:
-        motion = Motion.of(cycle.blocks, cycle.state.vertices)
-        self._save("interior", cycle, at, self._meshes.grid(cycle, self._materials, motion, self.configuration))
+        self._beside.do(self._interior, cycle, at)
         self._last_interior, self._segments_then = cycle.number, cycle.cracks.n_segments
+
+    def _interior(self, cycle: Cycle, at: float) -> None:
+        grid = self._meshes.grid(cycle, self._materials, cycle.motion, self.configuration)
+        self._save("interior", cycle, at, grid)
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
         file = f"vtk/{name}_{cycle.number:06d}.vtu"

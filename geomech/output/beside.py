@@ -1,0 +1,33 @@
+"""Long jobs done beside the run: what waits in Gmsh, in compiled kernels and in compression leaves it the interpreter."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+
+class Beside:
+    """Jobs done one after another in a thread, in the order given; at most ``most`` wait.
+
+    It pays for jobs of many milliseconds outside the interpreter; for short ones the two threads only take turns. A job
+    that failed raises its exception in a later `do`, or in `close`, which waits for all.
+    """
+
+    def __init__(self, most: int = 4) -> None:
+        self.most = most
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="beside")
+        self._jobs: deque[Future] = deque()
+
+    def do(self, job: Callable[..., Any], *arguments: Any) -> None:
+        while self._jobs and (self._jobs[0].done() or len(self._jobs) >= self.most):
+            self._jobs.popleft().result()
+        self._jobs.append(self._thread.submit(job, *arguments))
+
+    def close(self) -> None:
+        try:
+            while self._jobs:
+                self._jobs.popleft().result()
+        finally:
+            self._thread.shutdown(cancel_futures=True)
