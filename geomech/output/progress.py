@@ -40,7 +40,7 @@ class Progress:
                 total=self._end,
                 file=self._out,
                 desc=problem.title[:40],
-                bar_format="{desc}: {percentage:3.0f}%|{bar}| {postfix} [{elapsed}]",
+                bar_format="{desc}: {percentage:3.0f}%|{bar}| [{elapsed}{postfix}]",
                 postfix="starting",
                 mininterval=0.1,
                 dynamic_ncols=True,

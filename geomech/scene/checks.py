@@ -86,7 +86,9 @@ def _zones(c: Check) -> None:
         if name not in known:
             # A zone that has its table already is not the one that is meant.
             free = [zone for zone in known if zone not in given]
-            c.refuse(("zones", name), f"the geometry has no zone {name!r}", nearest(name, free) if free else _are(known))
+            c.refuse(
+                ("zones", name), f"the geometry has no zone {name!r}", nearest(name, free) if free else _are(known)
+            )
     if len(materials) > 1:
         for name in known:
             if name not in given or given[name].material is None:
