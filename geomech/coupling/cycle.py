@@ -15,9 +15,12 @@ from dataclasses import replace
 import numpy as np
 
 from .. import dda
-from ..model import TIP, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
+from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
+from ..model.polygon import winding_number
 from .compliance import crack_response
+from .mean_stress import rotated_mean_stress
 from .path import Chords
+from .record import axial_strain, joined_faces, leading_load
 from .splitting import split_blocks
 from .tractions import BoundaryLoad, boundary_load
 
@@ -404,13 +407,13 @@ class Coupling:
             number=self.number,
             load_step=self.load_step,
             growth_pass=growth_pass,
-            load=self._load(state.time),
-            strain=self._strain(motion),
+            load=leading_load(self.problem, self.blocks, state.time),
+            strain=axial_strain(self.gauge, motion),
             blocks=self.blocks,
             state=state,
             cracks=self.cracks,
             tips=tips,
-            faces=self._faces(solutions),
+            faces=joined_faces(self.cracks, solutions),
             bodies=solutions,
             events=tuple(events),
             monitors={
@@ -428,42 +431,9 @@ class Coupling:
             self.known_motion = state, Motion.of(self.blocks, state.vertices)
         return self.known_motion[1]
 
-    def _load(self, now: float) -> float:
-        """The leading load, Pa, positive in compression."""
-        name = self.problem.load_edge
-        edges = self.blocks.edges_named(name) if name else []
-        if not len(edges):
-            return 0.0
-        along = self.blocks.vertices[self.blocks.next_vertex[edges[0]]] - self.blocks.vertices[edges[0]]
-        outward = np.array([along[1], -along[0]]) / np.hypot(*along)
-        return sum(
-            -float(load.history.at(now) @ outward)
-            for load in self.problem.loads.edge_tractions
-            if load.edge_name == name
-        )
-
-    def _strain(self, motion: Motion) -> float:
-        if self.gauge is None:
-            return float("nan")
-        (a, p), (b, q) = self.gauge
-        before = np.hypot(*(np.asarray(q) - np.asarray(p)))
-        return float(1 - np.hypot(*(motion.current(b, q) - motion.current(a, p))) / before)
-
-    def _faces(self, solutions: dict) -> CrackFaces | None:
-        if not solutions:
-            return None
-        rows = {b: np.flatnonzero(self.cracks.block == b) for b in solutions}
-        faces = [solution.faces for solution in solutions.values()]
-        return CrackFaces(
-            segment=np.concatenate([rows[b][s.faces.segment] for b, s in solutions.items()]),
-            **{
-                name: np.concatenate([getattr(f, name) for f in faces])
-                for name in ("points", "opening", "slip", "traction", "state")
-            },
-        )
-
     def _event(self, kind: str, state: State, point, detail: str) -> Event:
-        return Event(kind, self.number, state.time, self._load(state.time), (float(point[0]), float(point[1])), detail)
+        load = leading_load(self.problem, self.blocks, state.time)
+        return Event(kind, self.number, state.time, load, (float(point[0]), float(point[1])), detail)
 
     def _stops(self, events: tuple[Event, ...]) -> bool:
         return any(event.kind in self.problem.run.stop_at for event in events)
@@ -475,33 +445,3 @@ class Coupling:
             yield
         finally:
             self.seconds[phase] = self.seconds.get(phase, 0.0) + clock.perf_counter() - start
-
-
-def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
-    """How often ``loops`` together wind about ``point``: 1 inside a polygon, 0 outside or in its holes."""
-    total = 0.0
-    for loop in loops:
-        a = loop - point
-        b = np.roll(a, -1, axis=0)
-        total += np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.sum(a * b, axis=1)).sum()
-    return total / (2 * np.pi)
-
-
-def rotated_mean_stress(solution, loops: list[np.ndarray], angle: float) -> np.ndarray:
-    """Mean of ``solution``'s stress over a polygon, by area-weighted sampling of its triangles, turned by ``angle``."""
-    import shapely
-
-    from ..conventions import rotate_stress
-
-    polygon = shapely.Polygon(loops[0], loops[1:])
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    corners = np.array([shapely.get_coordinates(t)[:3] for t in triangles])
-    for _ in range(4):  # quartered four times: the means of the quarters of a triangle are exact for linear stress
-        middle = (corners + np.roll(corners, -1, axis=1)) / 2
-        corners = np.concatenate(
-            [np.stack([corners[:, k], middle[:, k], middle[:, k - 1]], axis=1) for k in range(3)] + [middle]
-        )
-    d, e = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = np.abs(d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0])
-    stress = solution.stress(corners.mean(axis=1))
-    return rotate_stress(area @ stress / area.sum(), angle)

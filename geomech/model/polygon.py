@@ -30,3 +30,13 @@ def area_moments(loops: list[np.ndarray]) -> tuple[float, np.ndarray, np.ndarray
     area, first, second = polygon_moments(loops, origin)
     centroid = first / area
     return float(area), origin + centroid, second - area * np.outer(centroid, centroid)
+
+
+def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
+    """How often ``loops`` together wind about ``point``: 1 inside a polygon, 0 outside or in its holes."""
+    total = 0.0
+    for loop in loops:
+        a = loop - point
+        b = np.roll(a, -1, axis=0)
+        total += np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.sum(a * b, axis=1)).sum()
+    return total / (2 * np.pi)
