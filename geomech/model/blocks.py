@@ -51,7 +51,7 @@ class Blocks:
         held: Sequence[Sequence[bool]] | None = None,
         edge_names: Sequence[Sequence[Sequence[str]]] | None = None,
         names: Sequence[str] | None = None,
-    ) -> "Blocks":
+    ) -> Blocks:
         """Build from ``polygons[block][loop]`` = (n, 2) vertices without the closing repetition; a bare (n, 2) array
         stands for a block without holes. ``edge_names[block][loop][edge]`` names edges. Loops are turned to the
         house's sense. Raises ValueError naming the block for loops of fewer than three vertices, repeated vertices,
@@ -147,7 +147,7 @@ class Blocks:
             self.vertex_block, weights=own[:, 0] * w[:, 1] - own[:, 1] * w[:, 0], minlength=self.n_blocks
         )
 
-    def with_vertices(self, vertices: np.ndarray) -> "Blocks":
+    def with_vertices(self, vertices: np.ndarray) -> Blocks:
         """The same blocks with other reference coordinates."""
         return replace(self, vertices=np.asarray(vertices, dtype=float))
 

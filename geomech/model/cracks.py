@@ -44,7 +44,7 @@ class Cracks:
         aperture: Sequence[float] | float = 0.0,
         names: Sequence[str] | None = None,
         surface: Sequence[tuple[bool, bool]] | None = None,
-    ) -> "Cracks":
+    ) -> Cracks:
         """One crack a polyline (n, 2). Nodes are not shared between cracks: crossing cracks are noded by whoever reads
         the scene. ``surface`` says, crack by crack, which end is a mouth. Raises ValueError naming the crack."""
         n = len(polylines)
@@ -107,11 +107,11 @@ class Cracks:
         flat = self.segments.ravel()
         return flat[(self.valence[flat] == 1) & ~self.surface[flat]]
 
-    def in_block(self, block: int) -> "Cracks":
+    def in_block(self, block: int) -> Cracks:
         """The cracks of one block, with nodes renumbered (crack numbers and names stay those of the whole)."""
         return self.take(np.flatnonzero(self.block == block))
 
-    def take(self, segments: np.ndarray) -> "Cracks":
+    def take(self, segments: np.ndarray) -> Cracks:
         """A network of only these ``segments`` (indices), unused nodes dropped."""
         used, renumbered = np.unique(self.segments[segments].ravel(), return_inverse=True)
         return Cracks(

@@ -19,11 +19,11 @@ class History:
     rate: np.ndarray | None = None
 
     @classmethod
-    def constant(cls, value) -> "History":
+    def constant(cls, value) -> History:
         return cls(np.zeros(1), np.atleast_2d(np.asarray(value, dtype=float)))
 
     @classmethod
-    def ramp(cls, rate, start: float = 0.0) -> "History":
+    def ramp(cls, rate, start: float = 0.0) -> History:
         """Zero until ``start``, then growing at ``rate`` per second for ever."""
         rate = np.atleast_1d(np.asarray(rate, dtype=float))
         return cls(np.array([start]), np.zeros((1, len(rate))), rate)

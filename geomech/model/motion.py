@@ -23,7 +23,7 @@ class Motion:
     gradient: np.ndarray
 
     @classmethod
-    def of(cls, blocks: Blocks, vertices: np.ndarray) -> "Motion":
+    def of(cls, blocks: Blocks, vertices: np.ndarray) -> Motion:
         """The motion that takes ``blocks.vertices`` to ``vertices`` (least squares, exact for an affine motion)."""
         owner, n = blocks.vertex_block, blocks.n_blocks
         count = np.bincount(owner, minlength=n)[:, None]

@@ -76,7 +76,7 @@ class State:
     contacts: np.ndarray
 
     @classmethod
-    def at_rest(cls, blocks: Blocks) -> "State":
+    def at_rest(cls, blocks: Blocks) -> State:
         n = blocks.n_blocks
         return cls(
             time=0.0,

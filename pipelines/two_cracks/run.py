@@ -12,7 +12,7 @@ from geomech.pipeline import run
 from geomech.scene import load_scene
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_two_cracks import Watch, report  # noqa: E402
+from compare_two_cracks import Watch, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
