@@ -78,7 +78,8 @@ def report(runs: Mapping[str, Watch]) -> str:
     parts = [_loads(by_phi), _lines(by_phi), _intensities(by_phi)]
     if 0 in by_phi and np.isfinite(by_phi[0].load("initiation")):
         parts.insert(1, _toughness(by_phi))
-    if set(published.PHI_DEG) <= set(by_phi):
+    started = {phi for phi, run in by_phi.items() if np.isfinite(run.load("initiation"))}
+    if set(published.PHI_DEG) <= started:
         parts.append(_disagreements(by_phi))
     return "\n\n".join(part for part in parts if part)
 

@@ -1,7 +1,7 @@
 """Curved crack paths: the place a tip comes to must not depend on the increment."""
 
 from dataclasses import replace
-from itertools import takewhile
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -58,7 +58,7 @@ def test_a_corrected_path_does_not_depend_on_the_increment():
     orders, moves = {}, {}
     for correct in (True, False):
         places = [tip_after(increment, correct) for increment in (8e-3, 4e-3, 2e-3, 1e-3, 0.5e-3)]
-        moves[correct] = [float(np.hypot(*(a - b))) for a, b in zip(places, places[1:])]
+        moves[correct] = [float(np.hypot(*(a - b))) for a, b in pairwise(places)]
         orders[correct] = np.log2(moves[correct][0] / moves[correct][-1]) / (len(moves[correct]) - 1)
         listed = ", ".join(f"{move:.1e}" for move in moves[correct])
         print(f"corrected {correct}: moves {listed} m, observed order {orders[correct]:.2f}")
