@@ -25,7 +25,7 @@ def draw(
     What is not said here the scene's ``[render]`` table says, and where that is silent too, stress yy, 800 pixels and a
     movie. Raises ValueError for a run without a cycle, KeyError for an unknown stress component, RenderingUnavailable
     where VTK can open no window."""
-    from .look import look
+    from .look import final_cycle, look
     from .movie import movie as draw_movie
     from .picture import picture
     from .plots import plots
@@ -33,7 +33,7 @@ def draw(
     if not len(run.history):
         raise ValueError(f"{run.folder}: the run has no cycle yet")
     asked = run.scene.get("render", {})
-    last = int(run.history["cycle"][-1])
+    last = final_cycle(run)
     fixed = look(
         run,
         last,

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from geomech.output.reading import Run
 
+from .field import COMPONENTS, interior_grid, values
+
 if TYPE_CHECKING:
     import pyvista as pv
     from matplotlib.colors import Colormap
-
-#: Name on the command line → (array, column, how it is written).
-COMPONENTS = {
-    "xx": ("stress", 0, "σxx"),
-    "yy": ("stress", 1, "σyy"),
-    "zz": ("stress", 2, "σzz"),
-    "xy": ("stress", 3, "σxy"),
-    "principal_max": ("principal_stress", 0, "σ₁"),
-    "principal_min": ("principal_stress", 2, "σ₃"),
-    "von_mises": ("", -1, "von Mises"),
-}
 
 #: What the colour of cracks means → the legend's title.
 CRACK_COLOURS = {"birth": "grown in cycle", "opening": "opening, µm"}
@@ -30,20 +22,23 @@ CRACK_COLOURS = {"birth": "grown in cycle", "opening": "opening, µm"}
 #: The largest displacement relative to the block system, drawn as this fraction of its size.
 DEFORMATION = 0.03
 #: Stress at a crack tip is singular: the colours span these percentiles of the rock's area and end there.
-ROBUST = (1.5, 98.5)
+ROBUST = (0.7, 99.3)
 
 
 @dataclass(frozen=True)
 class Look:
-    """What stays the same from frame to frame. ``bounds`` (x0, x1, y0, y1) m as drawn; ``limits`` MPa; ``scale`` of
-    the displacement; ``cracks`` the array that colours them and ``crack_limits`` its span (equal: all the same)."""
+    """What stays the same from frame to frame. ``bounds`` (x0, x1, y0, y1) m as drawn; ``limits`` MPa, ``beyond``
+    whether there is stress below and above them; ``scale`` of the displacement; ``cracks`` the array that colours them
+    and ``crack_limits`` its span (equal: all the same); ``rock`` the materials that are filled with colour."""
 
     component: str
     bounds: tuple[float, float, float, float]
     limits: tuple[float, float]
+    beyond: tuple[bool, bool]
     scale: float
     cracks: str
     crack_limits: tuple[float, float]
+    rock: frozenset[int]
     width: int
 
     @property
@@ -66,6 +61,18 @@ class Look:
             return ListedColormap(matplotlib.colormaps["RdBu_r"](at))
         name = "YlGnBu" if low + high > 0 else "YlGnBu_r"
         return ListedColormap(matplotlib.colormaps[name](np.linspace(0.04, 0.96, 256)))
+
+
+def final_cycle(run: Run) -> int:
+    """The cycle that shows what a run came to: its last one; but where a run ends as its rock is cut, the last one with
+    the cracks that cut it, since the pieces have one stress each and nobody waited for them to move."""
+    last = int(run.history["cycle"][-1])
+    written = list(run.grids("blocks"))
+    cracked = run.history[run.history["crack_length"] > 0]
+    if not len(cracked) or run.history["crack_length"][-1] > 0 or len(written) < 2:
+        return last
+    before = cracked[-1]
+    return int(before["cycle"]) if before["time"] == run.history["time"][-1] else last
 
 
 def look(
@@ -93,19 +100,60 @@ def look(
         scale = _magnification(blocks, max(x1 - x0, y1 - y0))
     # The frame holds what there was at the start as well: rock that runs out leaves its place.
     first = run.grid("blocks", min(run.grids("blocks")))
-    drawn = np.concatenate([grid.points[:, :2] + scale * grid["displacement"][:, :2] for grid in (first, blocks)])
-    (x0, y0), (x1, y1) = drawn.min(axis=0), drawn.max(axis=0)
     interior = interior_grid(run, cycle)
-    source = interior if interior is not None else blocks
+    drawn = np.concatenate(
+        [
+            grid.points[:, :2] + scale * grid["displacement"][:, :2]
+            for grid in (first, blocks, interior)
+            if grid is not None
+        ]
+    )
+    (x0, y0), (x1, y1) = drawn.min(axis=0), drawn.max(axis=0)
+    rock = _rock(blocks, interior)
+    limits, beyond = _limits(interior if interior is not None else _filled(blocks, rock), component)
     return Look(
         component=component,
         bounds=(x0, x1, y0, y1),
-        limits=_limits(source, component),
+        limits=limits,
+        beyond=beyond,
         scale=scale,
         cracks=crack_colour,
         crack_limits=_crack_limits(run, cycle, crack_colour),
+        rock=rock,
         width=width,
     )
+
+
+def spanning(fixed: Look, run: Run, cycles: Iterable[int]) -> Look:
+    """``fixed`` with colours for all of ``cycles``: from rock at rest to the fullest span of any."""
+    low, high = fixed.limits
+    below, above = fixed.beyond
+    for cycle in cycles:
+        interior = interior_grid(run, cycle)
+        grid = interior if interior is not None else _filled(run.grid("blocks", cycle), fixed.rock)
+        (a, b), (under, over) = _limits(grid, fixed.component)
+        low, high, below, above = min(low, a), max(high, b), below or under, above or over
+    return replace(fixed, limits=(min(low, 0.0), max(high, 0.0)), beyond=(below, above))
+
+
+def _rock(blocks: pv.UnstructuredGrid, interior: pv.UnstructuredGrid | None) -> frozenset[int]:
+    """Beside a solved specimen, other materials (platens) only hold it: their stress would take attention off it.
+    Where nothing is solved, blocks that never move are what others rest on."""
+    if interior is not None:
+        shown = np.isin(blocks["block_id"], np.unique(interior["block_id"]))
+    else:
+        shown = np.asarray(blocks["fixed"]) == 0
+    return frozenset(np.unique(blocks["material"][shown if shown.any() else slice(None)]).tolist())
+
+
+def _filled(blocks: pv.UnstructuredGrid, rock: frozenset[int]) -> pv.UnstructuredGrid:
+    return blocks.extract_cells(filled_cells(blocks, rock))
+
+
+def filled_cells(blocks: pv.UnstructuredGrid, rock: frozenset[int]) -> np.ndarray:
+    """(n_cells,) True for what is filled with colour: blocks of ``rock`` that can move; all where there are none."""
+    moving = np.isin(blocks["material"], list(rock)) & (np.asarray(blocks["fixed"]) == 0)
+    return moving if moving.any() else np.ones(blocks.n_cells, bool)
 
 
 def _crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
@@ -127,7 +175,8 @@ def _magnification(blocks: pv.UnstructuredGrid, size: float) -> float:
     return max(1.0, float(f"{scale:.1g}")) if scale > 1 else 1.0
 
 
-def _limits(grid: pv.UnstructuredGrid, component: str) -> tuple[float, float]:
+def _limits(grid: pv.UnstructuredGrid, component: str) -> tuple[tuple[float, float], tuple[bool, bool]]:
+    """MPa between which colours span, and whether there are values below and above."""
     shown = values(grid, component)
     in_cells = len(shown) == grid.n_cells and "stress" in grid.cell_data
     area = grid.compute_cell_sizes(length=False, volume=False)["Area"]
@@ -142,23 +191,7 @@ def _limits(grid: pv.UnstructuredGrid, component: str) -> tuple[float, float]:
     if high - low < 1e-6 * max(abs(low), abs(high), 1e-9):
         # A uniform field: a band about its value, or colours would show round-off.
         middle, half = 0.5 * (low + high), max(0.05 * max(abs(low), abs(high)), 1e-9)
-        return float(middle - half), float(middle + half)
-    return float(low), float(high)
-
-
-def values(grid: pv.UnstructuredGrid, component: str) -> np.ndarray:
-    """MPa, at the points of an interior grid or the cells of a block grid."""
-    array, column, _ = COMPONENTS[component]
-    data = grid.cell_data if "stress" in grid.cell_data else grid.point_data
-    if not array:
-        s1, s2, s3 = np.asarray(data["principal_stress"], dtype=float).T
-        return np.sqrt(0.5 * ((s1 - s2) ** 2 + (s2 - s3) ** 2 + (s3 - s1) ** 2)) / 1e6
-    return np.asarray(data[array], dtype=float)[:, column] / 1e6
-
-
-def interior_grid(run: Run, cycle: int) -> pv.UnstructuredGrid | None:
-    try:
-        grid = run.grid("interior", cycle)
-    except KeyError:
-        return None
-    return grid if grid.n_cells else None
+        low, high = middle - half, middle + half
+    span = high - low
+    beyond = bool(shown.min() < low - 0.02 * span), bool(shown.max() > high + 0.02 * span)
+    return (float(low), float(high)), beyond

@@ -2,65 +2,83 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from geomech.output.reading import Run
 
-from .look import Look
-from .picture import Painter
+from .field import agreeing
+from .legend import INK, SOFT_INK, crack_colours
+from .look import Look, final_cycle, spanning
+from .picture import IDLE, OLD_CRACK, ROCK_OUTLINE, Painter
+
+#: A frame in which cracks grew stays so much longer than one of loading.
+LINGER = 2.0
+#: The last frame stays for this long, ms.
+LAST = 2500
 
 
 def movie(run: Run, path: Path, fixed: Look, *, frames: int = 48, frames_per_second: float = 10.0) -> Path | None:
-    """Draw the run's growth as the GIF ``path``: about ``frames`` cycles, most of them from those in which cracks grew;
-    the last one stands still for a while. None where there are not two cycles to show."""
-    import imageio.v3 as imageio
+    """Draw the run's growth as the GIF ``path``: at most about ``frames`` cycles, those whose stress field is known
+    for their own cracks, up to the one that shows what the run came to. Colours span the stress of all of them. None
+    where there are not two cycles to show."""
+    from PIL import Image
 
     shown = moments(run, frames)
     if len(shown) < 2:
         return None
+    few = [shown[k] for k in np.unique(np.linspace(0, len(shown) - 1, 6).round().astype(int))]
+    fixed = spanning(fixed, run, few)
+    palette = _palette(fixed)
+    images = []
     with Painter(run, fixed) as painter:
-        images = []
         for cycle in shown:
             painter.draw(cycle)
-            images.append(painter.image())
-    times = [1000 / frames_per_second] * len(images)
-    times[-1] = 1800
-    imageio.imwrite(path, _palettes(images), extension=".gif", plugin="pillow", duration=times, loop=0)
+            image = Image.fromarray(painter.image())
+            images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
+    length = run.history["crack_length"]
+    grown = [float(run.at(cycle)["crack_length"]) > length[0] for cycle in shown]
+    times = [round(1000 / frames_per_second * (LINGER if more else 1)) for more in grown]
+    times[-1] = max(LAST, times[-1])
+    images[0].save(path, save_all=True, append_images=images[1:], duration=times, loop=0, optimize=False)
     return path
 
 
 def moments(run: Run, frames: int) -> list[int]:
-    """The cycles a movie shows: a third of ``frames`` spread over the loading, the rest over the growth; first and
-    last always."""
-    written = np.array(list(run.grids("blocks")))
-    grew = set(run.history["cycle"][run.history["growing"] > 0].astype(int))
-    growth = np.array([c for c in written if c in grew], dtype=int)
-    # Before growth, cycles with a stress field of their own tell more than those that borrow an older one.
-    telling = [c for c in run.grids("interior") if c not in grew]
-    loading = np.array(telling if len(telling) > 2 else [c for c in written if c not in grew], dtype=int)
+    """The cycles a movie shows, first and last always: a third of ``frames`` spread over the loading, the rest over the
+    growth."""
+    last = final_cycle(run)
+    written = [c for c in run.grids("blocks") if c <= last]
+    told = agreeing(run, written)
+    history = run.history
+    length = {int(c): float(v) for c, v in zip(history["cycle"], history["crack_length"])}
+    grew = set(history["cycle"][history["growing"] > 0].astype(int))
+    growth = np.array([c for c in told if c in grew or length[c] > length[written[0]]], dtype=int)
+    loading = np.array([c for c in told if c not in set(growth.tolist())], dtype=int)
 
     def spread(cycles: np.ndarray, count: int) -> np.ndarray:
         return cycles[np.unique(np.linspace(0, len(cycles) - 1, min(count, len(cycles))).round().astype(int))]
 
-    few = frames if not len(growth) else max(frames // 3, frames - len(growth))
-    chosen = [*spread(loading, few), *spread(growth, frames - min(few, len(loading))), *written[[0, -1]]]
+    # Loading is the same picture in ever deeper colours: where there is growth to see, a few frames of it do.
+    few = frames if not len(growth) else min(frames // 3, max(6, len(growth) // 2))
+    chosen = [*spread(loading, few), *spread(growth, frames - min(few, len(loading))), written[0], written[-1]]
     return sorted({int(c) for c in chosen})
 
 
-def _palettes(images: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """All frames on one palette of 256 colours, taken from the last: a GIF of frames with palettes of their own
-    flickers and is larger."""
+def _palette(fixed: Look):
+    """256 colours for all frames, those that pictures are made of: a GIF of frames with palettes of their own flickers
+    and is larger, and one that is found by statistics draws bands where colours are rare."""
+    from matplotlib.colors import to_rgb
     from PIL import Image
 
-    palette = Image.fromarray(images[-1]).quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    colours = np.array(palette.getpalette()).reshape(-1, 3)
-    # Cutting by medians mixes the page with what is nearly white; the page stays white.
-    colours[colours.min(axis=1) >= 250] = 255
-    palette.putpalette(colours.ravel().tolist())
-    return [
-        np.asarray(Image.fromarray(image).quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB"))
-        for image in images
-    ]
+    rock, cracks = fixed.colours(np.linspace(0, 1, 150))[:, :3], crack_colours()(np.linspace(0, 1, 30))[:, :3]
+    named = np.array([to_rgb(c) for c in (INK, SOFT_INK, IDLE, OLD_CRACK, ROCK_OUTLINE)])
+    greys = np.repeat(np.linspace(0, 1, 31)[:, None], 3, axis=1)
+    # Where a line's edge is smoothed, what is beside it mixes with white (the halo) or with the line's own dark.
+    pale = 0.5 + 0.5 * rock[::7]
+    dark = 0.5 * rock[::9]
+    colours = np.concatenate([rock, cracks, named, greys, pale, dark])[:256]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette((255 * colours).round().astype(np.uint8).ravel().tolist())
+    return palette

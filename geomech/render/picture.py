@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -12,14 +11,18 @@ import numpy as np
 from geomech.output.reading import Run
 
 from . import offscreen
-from .look import COMPONENTS, CRACK_COLOURS, Look, interior_grid, values
+from .field import COMPONENTS, face_displacements, interior_grid, values
+from .legend import SOFT_INK, Legend, crack_colours, rounded
+from .look import CRACK_COLOURS, Look, filled_cells
 
 if TYPE_CHECKING:
     import pyvista as pv
-    from matplotlib.colors import Colormap
 
-_ROCK_OUTLINE, _INK, _IDLE = "#3b3f46", "#1b1d21", "#e4e4e1"
-_OLD_CRACK = "#15161a"
+ROCK_OUTLINE, IDLE, OLD_CRACK = "#3b3f46", "#e4e4e1", "#15161a"
+# Layers above the page, pixels: rock, its outlines, white about cracks, cracks.
+_FIELD, _OUTLINES, _HALO, _CRACKS = 1.0, 2.0, 20.0, 40.0
+# Drawn so many times larger and then averaged: OpenGL's own multisampling leaves wide lines jagged and takes longer.
+_FINER = 2
 
 
 def picture(run: Run, path: Path, fixed: Look, cycle: int) -> Path:
@@ -41,24 +44,25 @@ class Painter:
         x0, x1, y0, y1 = fixed.bounds
         w, h = x1 - x0, y1 - y0
         # Pixels: margins, the strip of the title, the strip of the legend; the drawing takes the rest.
-        self.unit = fixed.width / 800
+        width = _FINER * fixed.width
+        self.unit = width / 800
         side, top = 24 * self.unit, 74 * self.unit
         legend = (210 if fixed.upright else 96) * self.unit
         if fixed.upright:
-            drawing = (fixed.width - legend - 2 * side, None)
-            height = min(drawing[0] * h / w, 900 * self.unit)
-            self.size = (fixed.width, round(height + top + side))
-            self.centre = (side + 0.5 * drawing[0], side + 0.5 * height)
-            self.metres_per_pixel = max(w / drawing[0], h / height)
+            drawing = width - legend - 2 * side
+            height = min(drawing * h / w, 900 * self.unit)
+            self.size = (width, _FINER * round((height + top + side) / _FINER))
+            self.centre = (side + 0.5 * drawing, side + 0.5 * height)
         else:
-            drawing = (fixed.width - 2 * side, None)
-            height = drawing[0] * h / w
-            self.size = (fixed.width, round(height + top + legend))
-            self.centre = (0.5 * fixed.width, legend + 0.5 * height)
-            self.metres_per_pixel = w / drawing[0]
+            drawing = width - 2 * side
+            height = drawing * h / w
+            self.size = (width, _FINER * round((height + top + legend) / _FINER))
+            self.centre = (0.5 * width, legend + 0.5 * height)
+        self.metres_per_pixel = max(w / drawing, h / height)
         self.plotter = pv.Plotter(off_screen=True, window_size=self.size, border=False)
         self.plotter.set_background("white")
-        self.plotter.enable_anti_aliasing("msaa", multi_samples=8)
+        self.plotter.disable_anti_aliasing()
+        self.legend = Legend(self.plotter, self.unit)
 
     def __enter__(self) -> Self:
         return self
@@ -68,17 +72,23 @@ class Painter:
 
     def image(self) -> np.ndarray:
         """(height, width, 3) of 8 bits."""
-        return np.array(self.plotter.screenshot(return_img=True))
+        fine = np.asarray(self.plotter.screenshot(return_img=True))[..., :3]
+        offsets = product(range(_FINER), repeat=2)
+        total = sum(fine[i::_FINER, j::_FINER].astype(np.uint16) for i, j in offsets)
+        return ((total + _FINER**2 // 2) // _FINER**2).astype(np.uint8)
 
     def save(self, path: Path) -> None:
-        self.plotter.screenshot(str(path))
+        from PIL import Image
+
+        Image.fromarray(self.image()).save(path, optimize=True)
 
     def draw(self, cycle: int) -> None:
         # Every actor that is added would draw the window anew.
         self.plotter.suppress_rendering = True
         self.plotter.clear()
-        self._rock(cycle)
-        self._cracks(cycle)
+        interior = interior_grid(self.run, cycle)
+        self._cracks(cycle, interior)
+        self._rock(cycle, interior)
         self._camera()
         self._words(cycle)
         self.plotter.suppress_rendering = False
@@ -86,23 +96,26 @@ class Painter:
 
     def _warped(self, grid: pv.UnstructuredGrid, lift: float) -> pv.UnstructuredGrid:
         """``grid`` deformed, ``lift`` pixels above the page."""
-        height = lift * self.metres_per_pixel
-        grid.points = grid.points + self.look.scale * grid["displacement"] + (0.0, 0.0, height)
+        grid.points = self._moved(np.asarray(grid.points), np.asarray(grid["displacement"]), lift)
         return grid
 
-    def _rock(self, cycle: int) -> None:
-        blocks, interior = self._warped(self.run.grid("blocks", cycle), 0.0), interior_grid(self.run, cycle)
+    def _moved(self, points: np.ndarray, displacement: np.ndarray, lift: float) -> np.ndarray:
+        return points + self.look.scale * displacement + (0.0, 0.0, lift * self.metres_per_pixel)
+
+    # -- rock ----------------------------------------------------------------------------------------------------
+
+    def _rock(self, cycle: int, interior: pv.UnstructuredGrid | None) -> None:
+        blocks = self._warped(self.run.grid("blocks", cycle), 0.0)
         solved = set() if interior is None else set(np.unique(interior["block_id"]).tolist())
         here = np.isin(blocks["block_id"], list(solved))
-        # Beside a solved specimen, other materials (platens) only hold it: their stress would take attention off it.
-        idle = ~np.isin(blocks["material"], np.unique(blocks["material"][here])) if solved else blocks["fixed"] == 1
+        idle = ~filled_cells(blocks, self.look.rock) & ~here
         if idle.any():
-            self.plotter.add_mesh(blocks.extract_cells(idle), color=_IDLE, lighting=False)
+            self.plotter.add_mesh(blocks.extract_cells(idle), color=IDLE, lighting=False)
         plain = ~here & ~idle
         if plain.any():
             self._filled(blocks.extract_cells(plain))
         if interior is not None:
-            self._filled(self._warped(interior, 1.0))
+            self._filled(self._warped(interior, _FIELD))
         # A solved block is outlined as it deforms, crack faces included; the others by their own straight edges.
         self._outlined(blocks.extract_cells(~here))
         if interior is not None:
@@ -114,8 +127,8 @@ class Painter:
         edges = grid.extract_surface(algorithm="dataset_surface").extract_feature_edges(
             boundary_edges=True, feature_edges=False, non_manifold_edges=False, manifold_edges=False
         )
-        edges.points += (0.0, 0.0, 2.0 * self.metres_per_pixel)
-        self.plotter.add_mesh(edges, color=_ROCK_OUTLINE, line_width=1.4 * self.unit, lighting=False)
+        edges.points += (0.0, 0.0, _OUTLINES * self.metres_per_pixel)
+        self.plotter.add_mesh(edges, color=ROCK_OUTLINE, line_width=1.4 * self.unit, lighting=False)
 
     def _filled(self, grid: pv.UnstructuredGrid) -> None:
         grid["fill"] = values(grid, self.look.component)
@@ -124,14 +137,24 @@ class Painter:
             lighting=False, show_scalar_bar=False, copy_mesh=False,
         )  # fmt: skip
 
-    def _cracks(self, cycle: int) -> None:
+    # -- cracks --------------------------------------------------------------------------------------------------
+
+    def _cracks(self, cycle: int, interior: pv.UnstructuredGrid | None) -> None:
+        """Cracks as wide as they are open, and never thinner than a line, on a white halo."""
         try:
             grid = self.run.grid("cracks", cycle)
         except KeyError:
             return
         if not grid.n_cells:
             return
-        lines = self._warped(grid, 40.0)
+        affine = np.asarray(grid["displacement"])
+        upper = lower = affine
+        if interior is not None and self.look.scale:
+            # The block's own motion where the mesh has no face: a crack that is newer than the field.
+            found = face_displacements(interior, grid)
+            known = np.isfinite(found[0]).all(axis=1) & np.isfinite(found[1]).all(axis=1)
+            upper, lower = (np.where(known[:, None], face, affine) for face in found)
+        lines = grid.copy()
         lines["opening"] = 1e6 * lines["opening"]
         by_birth = self.look.cracks == "birth"
         # What the scene drew has no birth to show: black. Openings are shown on all of a crack.
@@ -139,21 +162,49 @@ class Painter:
         low, high = self.look.crack_limits
         fill = {
             "scalars": "birth_cycle" if by_birth else "opening",
-            "cmap": _crack_colours(),
+            "cmap": crack_colours(),
             "clim": (low, high if high > low else low + 1),
-            "nan_color": _OLD_CRACK,
+            "nan_color": OLD_CRACK,
+            "show_scalar_bar": False,
         }
-        halo = lines.copy()
-        halo.points -= (0.0, 0.0, 20.0 * self.metres_per_pixel)
-        self.plotter.add_mesh(
-            halo, color="white", line_width=7.5 * self.unit, render_lines_as_tubes=True, lighting=False, opacity=0.75
-        )
-        for part, width, shown in ((~old, 4.0, fill), (old, 4.6, {"color": _OLD_CRACK})):
+        at = np.asarray(grid.points)
+        for face in (upper, lower):
+            halo = lines.copy()
+            halo.points = self._moved(at, face, _HALO)
+            self.plotter.add_mesh(
+                halo,
+                color="white",
+                line_width=7.5 * self.unit,
+                render_lines_as_tubes=True,
+                lighting=False,
+                opacity=0.75,
+            )
+        lines.points = self._moved(at, 0.5 * (upper + lower), _CRACKS)
+        gaps = self._gaps(lines, self._moved(at, upper, _CRACKS), self._moved(at, lower, _CRACKS))
+        for part, width, shown in ((~old, 4.0, fill), (old, 4.6, {"color": OLD_CRACK})):
             if part.any():
+                self.plotter.add_mesh(gaps.extract_cells(part), lighting=False, **shown)
                 self.plotter.add_mesh(
                     lines.extract_cells(part), line_width=width * self.unit, render_lines_as_tubes=True,
-                    lighting=False, show_scalar_bar=False, **shown,
+                    lighting=False, **shown,
                 )  # fmt: skip
+
+    @staticmethod
+    def _gaps(lines: pv.UnstructuredGrid, upper: np.ndarray, lower: np.ndarray) -> pv.PolyData:
+        """A quadrilateral a line, between its two faces, with the lines' arrays."""
+        import pyvista as pv
+
+        a, b = lines.cells.reshape(-1, 3)[:, 1:].T
+        n = len(upper)
+        gaps = pv.PolyData(
+            np.concatenate([upper, lower]),
+            np.column_stack([np.full(len(a), 4), a, b, b + n, a + n]).ravel(),
+        )
+        gaps.cell_data["birth_cycle"] = lines.cell_data["birth_cycle"]
+        gaps.point_data["opening"] = np.tile(lines.point_data["opening"], 2)
+        return gaps
+
+    # -- page ----------------------------------------------------------------------------------------------------
 
     def _camera(self) -> None:
         x0, x1, y0, y1 = self.look.bounds
@@ -171,92 +222,34 @@ class Painter:
         camera.clipping_range = (0.5 * far, 2 * far)
 
     def _words(self, cycle: int) -> None:
-        row = self.run.at(cycle)
+        row, text, bar = self.run.at(cycle), self.legend.text, self.legend.bar
         w, h = self.size
         u = self.unit
         said = []
         if np.isfinite(row["load"]):
             said.append(f"load {row['load'] / 1e6:.2f} MPa")
-        said += [f"t = {_round(row['time'])} s", f"cycle {int(row['cycle'])}"]
+        said += [f"t = {rounded(row['time'])} s", f"cycle {int(row['cycle'])}"]
         if self.look.scale not in (0.0, 1.0):
             said.append(f"displacements × {self.look.scale:g}")
-        self._text(self.run.title, (24 * u, h - 38 * u), 15)
-        self._text("     ".join(said), (24 * u, h - 64 * u), 11, "#4a4e55")
-        name = COMPONENTS[self.look.component][2]
-        low, high = self.look.limits
+        text(self.run.title, (24 * u, h - 38 * u), 15, width=w - 48 * u)
+        text("     ".join(said), (24 * u, h - 64 * u), 11, SOFT_INK, width=w - 48 * u)
+        name, limits, beyond = COMPONENTS[self.look.component][2], self.look.limits, self.look.beyond
+        grown = self.look.crack_limits[1] > self.look.crack_limits[0]
         if self.look.upright:
-            left = w - 190 * u
-            self._bar(self.look.colours, low, high, (left, h - 400 * u, 26 * u, 260 * u))
-            self._text(f"{name}, MPa", (left, h - 128 * u), 12)
-            self._text("tension positive", (left, h - 428 * u), 9, "#4a4e55")
-            below = (left, 60 * u, 26 * u, 150 * u)
+            # From the top down: title, bar, note, title, bar; the bars give way where the drawing is not tall.
+            left, top = w - 190 * u, h - 100 * u
+            spare = top - 24 * u - (150 if grown else 80) * u
+            tall = min(260 * u, spare * (0.65 if grown else 1.0))
+            low = top - 62 * u - tall
+            text(f"{name}, MPa", (left, top - 28 * u), 12)
+            bar(self.look.colours, limits, (left, low, 26 * u, tall), beyond)
+            text("tension positive", (left, low - 44 * u), 9, SOFT_INK)
+            short = min(150 * u, spare * 0.35)
+            below = (left, low - 100 * u - short, 26 * u, short)
         else:
-            self._bar(self.look.colours, low, high, (24 * u, 44 * u, 0.45 * w, 18 * u))
-            self._text(f"{name}, MPa (tension positive)", (24 * u, 68 * u), 11)
+            bar(self.look.colours, limits, (44 * u, 44 * u, 0.45 * w, 18 * u), beyond)
+            text(f"{name}, MPa (tension positive)", (44 * u, 68 * u), 11)
             below = (0.62 * w, 44 * u, 0.3 * w, 18 * u)
-        first, last = self.look.crack_limits
-        if last > first:
-            self._bar(_crack_colours(), first, last, below, whole=self.look.cracks == "birth")
-            self._text(CRACK_COLOURS[self.look.cracks], (below[0], below[1] + below[3] + 10 * u), 11)
-
-    def _text(self, text: str, at: tuple[float, float], size: float, colour: str = _INK) -> None:
-        # VTK's own fonts have no Greek.
-        self.plotter.add_text(text, position=at, font_size=size * self.unit, color=colour, font_file=_font())
-
-    def _bar(
-        self, colours: Colormap, low: float, high: float, box: tuple[float, float, float, float], whole: bool = False
-    ) -> None:
-        """A scalar bar drawn as an actor of its own, since several meshes share it and its labels are to be round."""
-        import pyvista as pv
-        from vtkmodules.vtkRenderingCore import vtkActor2D, vtkCoordinate, vtkPolyDataMapper2D
-
-        x, y, w, h = box
-        upright, n = h > w, 256
-        t = np.linspace(0.0, 1.0, n + 1)
-        across = np.array([0.0, 1.0])
-        gx, gy = np.meshgrid(x + w * across, y + h * t) if upright else np.meshgrid(x + w * t, y + h * across)
-        strip = pv.StructuredGrid(gx, gy, np.zeros_like(gx)).extract_surface(algorithm="dataset_surface")
-        strip.cell_data["colour"] = (255 * colours(np.linspace(0, 1, n))[:, :3]).astype(np.uint8)
-        mapper = vtkPolyDataMapper2D()
-        mapper.SetInputData(strip)
-        mapper.SetScalarModeToUseCellData()
-        place = vtkCoordinate()
-        place.SetCoordinateSystemToDisplay()
-        mapper.SetTransformCoordinate(place)
-        actor = vtkActor2D()
-        actor.SetMapper(mapper)
-        self.plotter.add_actor(actor, render=False)
-        for value in _ticks(low, high, max(2, int(max(w, h) / (45 if upright else 80) / self.unit)), whole):
-            f = (value - low) / (high - low)
-            beside = (x + w + 10 * self.unit, y + h * f - 8 * self.unit)
-            at = beside if upright else (x + w * f - 8 * self.unit, y - 26 * self.unit)
-            self._text(_round(value), at, 10)
-
-
-def _ticks(low: float, high: float, most: int, whole: bool = False) -> list[float]:
-    """Round numbers from ``low`` to ``high``, at most about ``most``; ``whole`` ones where asked."""
-    least = (high - low) / most
-    step = 10.0 ** math.floor(math.log10(least))
-    step *= next(m for m in (1, 2, 5, 10) if m * step >= least * (1 - 1e-9))
-    if whole:
-        step = max(1.0, step)
-    return [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
-
-
-@lru_cache(maxsize=1)
-def _crack_colours() -> Colormap:
-    """From crimson to orange: apart from every colour that rock is filled with."""
-    from matplotlib.colors import LinearSegmentedColormap
-
-    return LinearSegmentedColormap.from_list("crack", ["#8f0d33", "#d7263d", "#ff7a1a", "#ffb01f"])
-
-
-@lru_cache(maxsize=1)
-def _font() -> str:
-    import matplotlib
-
-    return str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf")
-
-
-def _round(value: float) -> str:
-    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
+        if grown:
+            bar(crack_colours(), self.look.crack_limits, below, whole=self.look.cracks == "birth")
+            text(CRACK_COLOURS[self.look.cracks], (below[0], below[1] + below[3] + 12 * u), 11)

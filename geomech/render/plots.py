@@ -9,10 +9,14 @@ import numpy as np
 
 from geomech.output.reading import Run
 
+from .look import final_cycle
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#3d405b")
+#: Curves nearer than this part of the largest value are one on paper.
+_SAME = 0.01
 
 
 def plots(run: Run, folder: Path) -> list[Path]:
@@ -31,49 +35,99 @@ def plots(run: Run, folder: Path) -> list[Path]:
 
 def stress_strain(axes: Axes, run: Run) -> None:
     """The leading load against axial strain, both positive in compression, with the run's events."""
-    history = run.history
+    history = _to_the_end(run)
     axes.plot(1e3 * history["strain"], history["load"] / 1e6, color=_COLOURS[0], lw=1.8)
     _first_events(axes, run, 1e3 * history["strain"])
     axes.set(xlabel="axial strain, 10⁻³", ylabel="load, MPa", title=run.title)
 
 
 def stress_intensity(axes: Axes, run: Run) -> None:
-    """K_I (full) and K_II (dashed) against load at every tip: growth relieves a tip, the load drives it up again."""
-    tips = run.tips
-    ends = np.unique(np.stack([tips["crack"], tips["end"]], axis=1), axis=0)
-    for k, (crack, end) in enumerate(ends):
-        mine = tips[(tips["crack"] == crack) & (tips["end"] == end)]
+    """K_I (full) and K_II (dashed) against load at every tip: growth relieves a tip, the load drives it up again. Tips
+    with the same curves share one; the toughness is a line across."""
+    curves = _tip_curves(run)
+    for k, (label, load, k_i, k_ii) in enumerate(curves):
         colour = _COLOURS[k % len(_COLOURS)]
-        load = mine["load"] / 1e6
-        label = f"crack {int(crack) + 1}, {'end' if end else 'start'}"
-        axes.plot(load, mine["K_I"] / 1e6, color=colour, lw=1.4, label=label)
-        axes.plot(load, mine["K_II"] / 1e6, color=colour, lw=1.0, ls="--")
+        axes.plot(load, k_i, color=colour, lw=1.4, label=label)
+        axes.plot(load, k_ii, color=colour, lw=1.0, ls="--")
     axes.plot([], [], color="#555555", lw=1.6, label=r"$K_I$")
     axes.plot([], [], color="#555555", lw=1.3, ls="--", label=r"$K_{II}$")
     axes.axhline(0, color="#999999", lw=0.6)
-    if len(ends) <= 8:
+    toughness = run.summary.get("normalisation", {}).get("k_ic_pa_sqrt_m")
+    if toughness:
+        axes.axhline(toughness / 1e6, color="#222222", lw=0.9, ls=":", label=r"$K_{Ic}$")
+    if len(curves) <= 8:
         axes.legend(frameon=False, fontsize=8)
     axes.set(xlabel="load, MPa", ylabel="stress intensity factor, MPa√m", title=run.title)
 
 
+def _tip_curves(run: Run) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+    """(label, load MPa, K_I, K_II MPa√m) of every tip; one for all tips whose curves lie on one another."""
+    tips = run.tips
+    near = _SAME * float(np.nanmax(np.abs([tips["K_I"], tips["K_II"]]), initial=0.0))
+    groups: list[tuple[list[tuple[int, int]], np.ndarray]] = []
+    for crack, end in np.unique(np.stack([tips["crack"], tips["end"]], axis=1), axis=0).astype(int):
+        mine = tips[(tips["crack"] == crack) & (tips["end"] == end)]
+        for members, known in groups:
+            if np.array_equal(known["cycle"], mine["cycle"]) and all(
+                np.abs(known[name] - mine[name]).max() <= near for name in ("K_I", "K_II")
+            ):
+                members.append((crack, end))
+                break
+        else:
+            groups.append(([(crack, end)], mine))
+    n = sum(len(members) for members, _ in groups)
+    return [
+        (_tip_names(run, members, n), mine["load"] / 1e6, mine["K_I"] / 1e6, mine["K_II"] / 1e6)
+        for members, mine in groups
+    ]
+
+
+def _tip_names(run: Run, members: list[tuple[int, int]], n_tips: int) -> str:
+    if len(members) == n_tips and n_tips > 2:
+        return f"all {n_tips} tips"
+    names = run.summary.get("cracks", [])
+    parts = []
+    for crack in dict.fromkeys(crack for crack, _ in members):
+        ends = [end for other, end in members if other == crack]
+        name = names[crack] if crack < len(names) else f"crack {crack}"
+        parts.append(f"{name}, {'both tips' if len(ends) > 1 else ('start', 'end')[ends[0]]}")
+    return "; ".join(parts)
+
+
 def crack_length(axes: Axes, run: Run) -> None:
     """The length of all cracks against load: what grows at one load is a vertical line."""
-    history = run.history
+    history = _to_the_end(run)
     axes.plot(history["load"] / 1e6, 1e3 * history["crack_length"], color=_COLOURS[0], lw=1.8)
     _first_events(axes, run, None)
     axes.set(xlabel="load, MPa", ylabel="crack length, mm", title=run.title)
 
 
+def _to_the_end(run: Run) -> np.ndarray:
+    """The history up to what the run came to: not past the cut that ends it, where cracks turn into block faces."""
+    return run.history[run.history["cycle"] <= final_cycle(run)]
+
+
 def _first_events(axes: Axes, run: Run, strain: np.ndarray | None) -> None:
-    """Mark the first event of every kind: as a point on the load–strain curve, or as a line at its load."""
-    for k, (kind, cycle, load) in enumerate(_firsts(run)):
-        colour = _COLOURS[1 + k % (len(_COLOURS) - 1)]
+    """Mark the first event of every kind: as a point on the load–strain curve, or as a line at its load. Those that
+    would be drawn over one another share one mark."""
+    history = _to_the_end(run)
+    marks: dict[tuple[float, float], list[str]] = {}
+    for kind, cycle, load in _firsts(run):
+        row = min(np.searchsorted(history["cycle"], cycle), len(history) - 1)
+        at = (0.0 if strain is None else float(strain[row]), float(load) / 1e6)
+        # On paper, a hundredth of the axes is the size of a mark.
+        size = np.array(
+            [1.0 if strain is None else np.nanmax(np.abs(strain)), np.nanmax(np.abs(history["load"])) / 1e6]
+        )
+        near = [other for other in marks if np.all(np.abs(np.subtract(other, at)) <= 0.01 * size)]
+        marks.setdefault(near[0] if near else at, []).append(kind)
+    for k, ((x, load), kinds) in enumerate(marks.items()):
+        colour, label = _COLOURS[1 + k % (len(_COLOURS) - 1)], ", ".join(kinds)
         if strain is None:
-            axes.axvline(load / 1e6, color=colour, lw=1.0, ls=":", label=kind)
+            axes.axvline(load, color=colour, lw=1.0, ls=":", label=label)
         else:
-            row = min(np.searchsorted(run.history["cycle"], cycle), len(strain) - 1)
-            axes.plot(strain[row], load / 1e6, "o", color=colour, ms=5, label=kind)
-    if axes.get_legend_handles_labels()[0]:
+            axes.plot(x, load, "o", color=colour, ms=5, label=label)
+    if marks:
         axes.legend(frameon=False, fontsize=8)
 
 

@@ -136,7 +136,7 @@ def cycle(number: int, load_step: int, growth_pass: int, grown: int, *, turn: fl
         out = (1.0 if k else -1.0) * (np.array([0.0, 1.0]) if grown else np.array([1.0, 1.0]) / math.sqrt(2))
         k_i, k_ii = -0.0626 * load, -0.0586 * load
         row = tips[k]
-        row["node"], row["block"], row["point"], row["direction"] = node, 1, network.nodes[node], out
+        row["node"], row["end"], row["block"], row["point"], row["direction"] = node, k, 1, network.nodes[node], out
         row["k_i"], row["k_ii"], row["k_eq"], row["angle"] = k_i, k_ii, abs(k_ii) * 1.15, 1.0
         row["grown"] = 1e-3 if growth_pass else 0.0
     at = np.linspace(0.0, 1.0, 5)

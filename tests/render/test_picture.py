@@ -11,10 +11,12 @@ import synthetic_run as made
 
 from geomech.output import Histories, Run, Series, Summary
 from geomech.render import draw, offscreen
-from geomech.render.look import COMPONENTS, look, values
+from geomech.render.field import COMPONENTS, agreeing, face_displacements, interior_grid, values
+from geomech.render.legend import ticks
+from geomech.render.look import final_cycle, look
 from geomech.render.movie import moments
-from geomech.render.picture import _ticks, picture
-from geomech.render.plots import plots
+from geomech.render.picture import picture
+from geomech.render.plots import _tip_curves, plots
 
 imageio = pytest.importorskip("imageio.v3")
 pytestmark = pytest.mark.skipif(offscreen.usable_window() is None, reason="no off-screen OpenGL here")
@@ -57,11 +59,92 @@ def test_rock_hole_notch_and_crack_are_where_they_should_be(drawn_run, tmp_path)
 
 
 def test_movie_grows_to_the_last_picture(drawn, drawn_run):
+    """Frames are the cycles whose interior is that of their own cracks: after the first load it comes with growth."""
     frames = imageio.imread(drawn["growth.gif"])
-    assert len(frames) == len(moments(drawn_run, 48)) == 10
+    assert moments(drawn_run, 48) == [0, 1, 6, 8, 9]
+    assert len(frames) == 5
     orange = [((f[..., 0] > 200) & (f[..., 1] > 80) & (f[..., 2] < 90))[:, :330].sum() for f in frames]
     assert orange[0] == 0
     assert orange[-1] > 20  # the younger pieces of crack
+
+
+def test_frames_share_their_colours(drawn):
+    """A platen is the same grey in every frame, and what stands still has the same pixels."""
+    frames = np.array([np.asarray(frame)[..., :3] for frame in imageio.imread(drawn["growth.gif"])], dtype=int)
+    image = imageio.imread(drawn["specimen.png"]).astype(int)
+    grey = (np.abs(image[..., :3] - (0xE4, 0xE4, 0xE1)) <= 1).all(axis=2)
+    assert grey.sum() > 2000
+    assert np.abs(frames[:, grey] - (0xE4, 0xE4, 0xE1)).max() <= 4
+    # 256 colours for everything: a shade is missed by no more than the eye sees.
+    assert np.percentile(np.abs(frames[-1][::3, ::3] - frames[-2][::3, ::3]), 50) == 0
+
+
+def test_between_two_fields_of_the_same_cracks_lies_their_mean(tmp_path):
+    """Loading of one crack is linear in the made-up run, so what is interpolated is what would have been written."""
+    made.write(tmp_path, [Histories(), Series(interior_every=1), Summary()], steps=21, passes=0)
+    run = Run(tmp_path)
+    assert list(run.grids("interior")) == [1, 11, 20]
+    assert agreeing(run, range(21)) == list(range(21))
+    grid = interior_grid(run, 4)
+    assert np.allclose(grid["stress"][:, 1], -4 * made.RATE, rtol=1e-6)
+    made.write(tmp_path, [Histories(), Series(interior_every=1), Summary()], steps=3, passes=0)
+    assert list(Run(tmp_path).grids("interior")) == [1, 2]
+
+
+def test_cracks_lie_between_the_faces_of_the_deformed_rock(drawn_run):
+    """The lines are displaced as the torn mesh is: by the closed form of the made-up motion, not by a block's mean."""
+    cracks, interior = drawn_run.grid("cracks", 9), drawn_run.grid("interior", 9)
+    upper, lower = face_displacements(interior, cracks)
+    expected = made.placement(cracks.points[:, :2], 5 * made.RATE, 0.0) - cracks.points[:, :2]
+    for face in (upper, lower):
+        assert np.allclose(face[:, :2], expected, rtol=0, atol=1e-8)
+
+
+def test_the_faces_of_a_torn_rock_are_told_apart():
+    """A square cut from its left side to its middle, whose upper half stands 1 above the lower."""
+    import pyvista as pv
+
+    points = np.array([[-1, 0], [0, 0], [1, 0], [1, 1], [-1, 1], [-1, -1], [1, -1], [-1, 0]], dtype=float)
+    triangles = np.array([[0, 1, 4], [1, 3, 4], [1, 2, 3], [5, 1, 7], [5, 6, 1], [6, 2, 1]])
+    rock = pv.UnstructuredGrid(
+        np.column_stack([np.full(6, 3), triangles]).ravel(), np.full(6, 5), np.column_stack([points, np.zeros(8)])
+    )
+    rock["displacement"] = np.zeros((8, 3))
+    rock["displacement"][0] = (0, 1, 0)
+    line = pv.UnstructuredGrid([2, 0, 1, 2, 1, 2], [3, 3], np.array([[-0.75, 0, 0], [-0.25, 0, 0], [0.5, 0, 0]]))
+    upper, lower = face_displacements(rock, line)
+    assert np.allclose(upper[:2, 1], [0.75, 0.25])
+    assert np.allclose(lower[:2], 0)
+    assert np.isnan(upper[2]).all()
+    # Against the line's direction the faces change places.
+    turned = pv.UnstructuredGrid([2, 1, 0], [3], line.points[:2])
+    assert np.allclose(face_displacements(rock, turned)[1][:, 1], [0.75, 0.25])
+
+
+def test_a_run_that_ends_with_a_cut_is_shown_before_it(tmp_path):
+    from dataclasses import replace
+
+    from geomech.model import TIP, Cracks
+
+    none = {"cracks": Cracks.from_polylines([]), "tips": np.zeros(0, TIP), "faces": None, "bodies": {}}
+    cut = replace(made.cycle(6, 3, 3, 2), **none)
+    later = replace(made.cycle(7, 4, 0, 2), **none)
+    for name, cycles, shown in (("cut", [cut], 5), ("cut and on", [cut, later], 7)):
+        folder = tmp_path / name
+        for watch in (watchers := [Histories(), Series(), Summary()]):
+            watch.on_start(made.problem(), folder)
+            for cycle in [*made.cycles(4, 2), *cycles]:
+                watch.on_cycle(cycle)
+        for watch in watchers:
+            watch.on_end({})
+        assert final_cycle(Run(folder)) == shown
+
+
+def test_tips_with_the_same_curve_share_one(drawn_run):
+    """The made-up crack has the same factors at both its ends."""
+    ((label, load, k_i, _),) = _tip_curves(drawn_run)
+    assert label == "flaw, both tips"
+    assert np.allclose(k_i, -0.0626 * load, rtol=1e-9)
 
 
 def test_moments_prefer_growth(tmp_path):
@@ -123,9 +206,9 @@ def test_every_component_has_values(drawn_run, component):
 
 
 def test_ticks_are_round_and_inside():
-    assert _ticks(-48.2, 3.1, 6) == [-40.0, -30.0, -20.0, -10.0, 0.0]
-    assert _ticks(0.0, 1.0, 5) == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
-    assert _ticks(3, 6, 20, whole=True) == [3, 4, 5, 6]
+    assert ticks(-48.2, 3.1, 6) == [-40.0, -30.0, -20.0, -10.0, 0.0]
+    assert ticks(0.0, 1.0, 5) == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    assert ticks(3, 6, 20, whole=True) == [3, 4, 5, 6]
 
 
 def test_curves_need_no_opengl(drawn_run, tmp_path):
