@@ -29,7 +29,8 @@ class Series:
     ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
     last are always written. ``interior_every`` counts cycles between interior fields while cracks grow; while none does
     they come `QUIET` times as rarely, since there they mostly scale with the load. They also come with the first load,
-    with every event, before and after blocks are cut and at the end; 0 leaves them out. Raises ValueError for an unknown ``configuration``.
+    with every event, before and after blocks are cut and at the end; 0 leaves them out. Raises ValueError for an
+    unknown ``configuration``.
     """
 
     def __init__(self, *, every: int = 1, interior_every: int = 5, configuration: str = "reference") -> None:

@@ -26,12 +26,13 @@ class Legend:
 
     def text(
         self, text: str, at: tuple[float, float], size: float, colour: str = INK, width: float | None = None
-    ) -> None:
-        """``text`` from ``at`` on, smaller where it would be longer than ``width``."""
+    ) -> float:
+        """``text`` from ``at`` on, smaller where it would be longer than ``width``; the size it got."""
         if width is not None and text:
             size = min(size, width / (_LETTER * len(text) * self.unit))
         # VTK's own fonts have no Greek.
         self.plotter.add_text(text, position=at, font_size=size * self.unit, color=colour, font_file=_font())
+        return size
 
     def bar(
         self,

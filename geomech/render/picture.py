@@ -227,12 +227,13 @@ class Painter:
         u = self.unit
         said = []
         if np.isfinite(row["load"]):
-            said.append(f"load {row['load'] / 1e6:.2f} MPa")
+            pulled = " in tension" if row["load"] < 0 else ""
+            said.append(f"load {abs(row['load']) / 1e6:.2f} MPa{pulled}")
         said += [f"t = {rounded(row['time'])} s", f"cycle {int(row['cycle'])}"]
         if self.look.scale not in (0.0, 1.0):
             said.append(f"displacements × {self.look.scale:g}")
-        text(self.run.title, (24 * u, h - 38 * u), 15, width=w - 48 * u)
-        text("     ".join(said), (24 * u, h - 64 * u), 11, SOFT_INK, width=w - 48 * u)
+        size = text(self.run.title, (24 * u, h - 38 * u), 15, width=w - 48 * u)
+        text("     ".join(said), (24 * u, h - 64 * u), min(11, size), SOFT_INK, width=w - 48 * u)
         name, limits, beyond = COMPONENTS[self.look.component][2], self.look.limits, self.look.beyond
         grown = self.look.crack_limits[1] > self.look.crack_limits[0]
         if self.look.upright:

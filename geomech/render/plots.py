@@ -34,11 +34,13 @@ def plots(run: Run, folder: Path) -> list[Path]:
 
 
 def stress_strain(axes: Axes, run: Run) -> None:
-    """The leading load against axial strain, both positive in compression, with the run's events."""
-    history = _to_the_end(run)
-    axes.plot(1e3 * history["strain"], history["load"] / 1e6, color=_COLOURS[0], lw=1.8)
-    _first_events(axes, run, 1e3 * history["strain"])
-    axes.set(xlabel="axial strain, 10⁻³", ylabel="load, MPa", title=run.title)
+    """The leading load against axial strain, both positive in compression (in tension, where that is what leads), with
+    the run's events."""
+    history, sign = _to_the_end(run), _sense(run)
+    axes.plot(sign * 1e3 * history["strain"], sign * history["load"] / 1e6, color=_COLOURS[0], lw=1.8)
+    _first_events(axes, run, sign * 1e3 * history["strain"])
+    lengthening = ", lengthening positive" if sign < 0 else ""
+    axes.set(xlabel=f"axial strain, 10⁻³{lengthening}", ylabel=_load_label(run), title=run.title)
 
 
 def stress_intensity(axes: Axes, run: Run) -> None:
@@ -57,7 +59,21 @@ def stress_intensity(axes: Axes, run: Run) -> None:
         axes.axhline(toughness / 1e6, color="#222222", lw=0.9, ls=":", label=r"$K_{Ic}$")
     if len(curves) <= 8:
         axes.legend(frameon=False, fontsize=8)
-    axes.set(xlabel="load, MPa", ylabel="stress intensity factor, MPa√m", title=run.title)
+    low, high = _calm_span(run)
+    if toughness and high > low:
+        # A crack that runs away leaves all others flat at the bottom, so it leaves the page instead.
+        room = 2.0 * max(toughness / 1e6, high, -low)
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(max(bottom, low - room), min(top, high + room))
+    axes.set(xlabel=_load_label(run), ylabel="stress intensity factor, MPa√m", title=run.title)
+
+
+def _calm_span(run: Run) -> tuple[float, float]:
+    """The least and the largest K_I or K_II, MPa√m, where the load has just gone up and nothing has grown at it."""
+    calm = run.history["cycle"][run.history["growth_pass"] == 0]
+    tips = run.tips[np.isin(run.tips["cycle"], calm)]
+    every = np.concatenate([[0.0], tips["K_I"], tips["K_II"]]) / 1e6
+    return float(np.nanmin(every)), float(np.nanmax(every))
 
 
 def _tip_curves(run: Run) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
@@ -77,7 +93,7 @@ def _tip_curves(run: Run) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]
             groups.append(([(crack, end)], mine))
     n = sum(len(members) for members, _ in groups)
     return [
-        (_tip_names(run, members, n), mine["load"] / 1e6, mine["K_I"] / 1e6, mine["K_II"] / 1e6)
+        (_tip_names(run, members, n), _sense(run) * mine["load"] / 1e6, mine["K_I"] / 1e6, mine["K_II"] / 1e6)
         for members, mine in groups
     ]
 
@@ -97,9 +113,19 @@ def _tip_names(run: Run, members: list[tuple[int, int]], n_tips: int) -> str:
 def crack_length(axes: Axes, run: Run) -> None:
     """The length of all cracks against load: what grows at one load is a vertical line."""
     history = _to_the_end(run)
-    axes.plot(history["load"] / 1e6, 1e3 * history["crack_length"], color=_COLOURS[0], lw=1.8)
+    axes.plot(_sense(run) * history["load"] / 1e6, 1e3 * history["crack_length"], color=_COLOURS[0], lw=1.8)
     _first_events(axes, run, None)
-    axes.set(xlabel="load, MPa", ylabel="crack length, mm", title=run.title)
+    axes.set(xlabel=_load_label(run), ylabel="crack length, mm", title=run.title)
+
+
+def _sense(run: Run) -> float:
+    """1 where the leading load presses, −1 where it pulls: its largest value is drawn to the right."""
+    load = run.history["load"]
+    return -1.0 if np.nanmax(np.abs(load)) > np.nanmax(load) else 1.0
+
+
+def _load_label(run: Run) -> str:
+    return "load in tension, MPa" if _sense(run) < 0 else "load, MPa"
 
 
 def _to_the_end(run: Run) -> np.ndarray:
@@ -114,7 +140,7 @@ def _first_events(axes: Axes, run: Run, strain: np.ndarray | None) -> None:
     marks: dict[tuple[float, float], list[str]] = {}
     for kind, cycle, load in _firsts(run):
         row = min(np.searchsorted(history["cycle"], cycle), len(history) - 1)
-        at = (0.0 if strain is None else float(strain[row]), float(load) / 1e6)
+        at = (0.0 if strain is None else float(strain[row]), _sense(run) * float(load) / 1e6)
         # On paper, a hundredth of the axes is the size of a mark.
         size = np.array(
             [1.0 if strain is None else np.nanmax(np.abs(strain)), np.nanmax(np.abs(history["load"])) / 1e6]
@@ -148,6 +174,6 @@ def _save(curve, run: Run, path: Path) -> Path:
     axes = figure.add_subplot()
     curve(axes, run)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.title.set_fontsize(10)
+    axes.title.set_fontsize(min(10.0, 10.0 * 72 / max(1, len(run.title))))
     figure.savefig(path)
     return path
