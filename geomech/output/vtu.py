@@ -29,7 +29,7 @@ VERTEX, LINE, POLY_LINE, TRIANGLE = 1, 3, 4, 5
 _TYPE = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 _TAIL = b"\n</AppendedData>\n</VTKFile>\n"
 #: Grids of up to this many bytes are left as they are: packing them takes longer than all the rest of their writing.
-SMALL = 1 << 14
+SMALL = 1 << 16
 # Arrays are compressed in pieces of this many bytes, so that a reader never needs more than that at a time.
 _BLOCK = 1 << 20
 _size = struct.Struct("=Q").pack
