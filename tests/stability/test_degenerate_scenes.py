@@ -207,9 +207,9 @@ def test_a_run_does_not_write_over_its_scene(tmp_path, capfd):
     assert "write over the scene" in capfd.readouterr().err and scene.read_text() == plate()
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_broken_off_run_can_be_read(tmp_path, how):
-    """Ctrl-C ends with exit code 1 and a summary; a kill leaves all but the last cycle's files in good order."""
+    """Ctrl-C and SIGTERM end with exit code 1 and a summary; a kill leaves all but the last cycle's files in good order."""
     scene, out = tmp_path / "plate.toml", tmp_path / "out"
     scene.write_text(plate(increment=2e-5))
     process = subprocess.Popen(
@@ -222,7 +222,7 @@ def test_a_broken_off_run_can_be_read(tmp_path, how):
     os.kill(process.pid, how)
     _, shown = process.communicate(timeout=20)
     assert "Traceback" not in shown
-    if how == signal.SIGINT:
+    if how != signal.SIGKILL:
         assert process.returncode == cli.FAILED and "interrupted" in shown
         assert json.loads((out / "summary.json").read_text())["end"] == "interrupted"
     run = Run(out)
