@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..conventions import outward_normal_of
 from ..model import Blocks, CrackFaces, Cracks, Motion, Problem
 
 
@@ -14,7 +15,7 @@ def leading_load(problem: Problem, blocks: Blocks, now: float) -> float:
     if not len(edges):
         return 0.0
     along = blocks.vertices[blocks.next_vertex[edges[0]]] - blocks.vertices[edges[0]]
-    outward = np.array([along[1], -along[0]]) / np.hypot(*along)
+    outward = outward_normal_of(along / np.hypot(*along))
     return sum(
         -float(load.history.at(now) @ outward) for load in problem.loads.edge_tractions if load.edge_name == name
     )

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..model import CONTACT, Blocks, Cracks, Motion, State
+from ..model.polygon import signed_area
 
 _log = logging.getLogger(__name__)
 
@@ -265,12 +266,7 @@ def _steps(ring: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _area(graph: _Graph, rings: list[np.ndarray]) -> float:
-    total = 0.0
-    for ring in rings:
-        p = graph.points[ring] - graph.points[ring[0]]
-        q = np.roll(p, -1, axis=0)
-        total += 0.5 * float(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]))
-    return total
+    return sum(signed_area(graph.points[ring]) for ring in rings)
 
 
 def _faces_without_slivers(graph: _Graph, names: str) -> tuple[list[list[np.ndarray]], np.ndarray]:

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..conventions import normal_of
+from ..ddm.loads import resultants
 from ..model import Blocks, Motion
 
 #: Two edges belong to one joint face when their directions differ by less than this.
@@ -324,22 +325,3 @@ def _balanced(block, blocks, segments, tractions, density, gravity, acceleration
         missed = np.hypot(*(body_force - carried)) * area + abs(torque - angular) * polar / np.sqrt(area)
         imbalance = float(missed / size)
     return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance)
-
-
-def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """(force (2,), moment about ``about``, sum of the sizes of all forces) of linear tractions on ``segments``."""
-    if not len(segments):
-        return np.zeros(2), 0.0, 0.0
-    a, b = segments[:, 0] - about, segments[:, 1] - about
-    t_a, t_b = tractions[:, 0], tractions[:, 1]
-    length = np.hypot(*(b - a).T)
-    forces = length[:, None] * (t_a + t_b) / 2
-    # ∫ x × t of two linear functions: Simpson's rule is exact.
-    middle, t_middle = (a + b) / 2, (t_a + t_b) / 2
-
-    def cross(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-        return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-
-    moments = length / 6 * (cross(a, t_a) + 4 * cross(middle, t_middle) + cross(b, t_b))
-    size = float(np.sum(length * (np.hypot(*t_a.T) + np.hypot(*t_b.T)) / 2))
-    return forces.sum(axis=0), float(moments.sum()), size

@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-#: Columns of the array that `block_moments` returns.
-AREA, CENTROID_X, CENTROID_Y, MOMENT_XX, MOMENT_YY, MOMENT_XY = range(6)
-
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def block_moments(vertices, next_vertex, vertex_start):

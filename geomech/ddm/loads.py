@@ -86,15 +86,7 @@ def check_equilibrium(
     """
     total, moment, size = np.zeros(2), 0.0, 0.0
     if load.segments is not None and len(load.segments):
-        x0, x1 = load.segments[:, 0] - centroid, load.segments[:, 1] - centroid
-        t0, t1 = load.tractions[:, 0], load.tractions[:, 1]
-        length = np.hypot(*(x1 - x0).T)
-        total = total + 0.5 * length @ (t0 + t1)
-        a, b = 2 * t0 + t1, t0 + 2 * t1
-        moment += (
-            float(length @ (x0[:, 0] * a[:, 1] - x0[:, 1] * a[:, 0] + x1[:, 0] * b[:, 1] - x1[:, 1] * b[:, 0])) / 6
-        )
-        size += 0.5 * float(length @ (np.hypot(*t0.T) + np.hypot(*t1.T)))
+        total, moment, size = resultants(load.segments, load.tractions, centroid)
     if force.any() or gradient.any():
         total = total + area * force
         turned = gradient @ second
@@ -104,3 +96,22 @@ def check_equilibrium(
         relative = max(float(np.hypot(*total)), abs(moment) / reach) / size
         if relative > tolerance:
             raise OutOfEquilibrium(total, moment, relative)
+
+
+def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """(force (2,), moment about ``about``, sum of the sizes of all forces) of linear tractions on ``segments``."""
+    if not len(segments):
+        return np.zeros(2), 0.0, 0.0
+    a, b = segments[:, 0] - about, segments[:, 1] - about
+    t_a, t_b = tractions[:, 0], tractions[:, 1]
+    length = np.hypot(*(b - a).T)
+    forces = length[:, None] * (t_a + t_b) / 2
+    # ∫ x × t of two linear functions: Simpson's rule is exact.
+    middle, t_middle = (a + b) / 2, (t_a + t_b) / 2
+
+    def cross(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+        return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+
+    moments = length / 6 * (cross(a, t_a) + 4 * cross(middle, t_middle) + cross(b, t_b))
+    size = float(np.sum(length * (np.hypot(*t_a.T) + np.hypot(*t_b.T)) / 2))
+    return forces.sum(axis=0), float(moments.sum()), size

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Cracks, DdmSettings
+from ..model.polygon import signed_area
 from . import proximity, shapes
 from .influence import ElementSet
 
@@ -93,7 +94,7 @@ def _boundary(loops, edges, cracks, settings):
     if not len(edges):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
-    span = math.sqrt(abs(_area(loops[0])))
+    span = math.sqrt(abs(signed_area(loops[0])))
     size = span / settings.elements_per_side
     layers, ratio = settings.grading_layers, settings.grading_ratio
     mouths = [cracks.nodes[k] for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))]
@@ -116,12 +117,6 @@ def _boundary(loops, edges, cracks, settings):
             source.append(np.full(len(line) - 1, edge))
     pairs = np.concatenate(nodes)
     return pairs[:, 0], pairs[:, 1], np.zeros(len(pairs), np.int64), np.concatenate(source)
-
-
-def _area(loop: np.ndarray) -> float:
-    own = loop - loop[0]
-    after = np.roll(own, -1, axis=0)
-    return 0.5 * float(np.sum(own[:, 0] * after[:, 1] - own[:, 1] * after[:, 0]))
 
 
 def _interior_angles(loop: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import Cracks
+from ..model.polygon import signed_area
 
 #: Lengths below this part of the extent are zero.
 _SMALL = 1e-9
@@ -27,9 +28,7 @@ def check_outline(loops: list[np.ndarray]) -> list[np.ndarray]:
         if short.any():
             at = int(np.flatnonzero(short)[0])
             raise ValueError(f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide")
-        own = loop - loop[0]
-        after = np.roll(own, -1, axis=0)
-        area = 0.5 * np.sum(own[:, 0] * after[:, 1] - own[:, 1] * after[:, 0])
+        area = signed_area(loop)
         if k == 0 and area <= 0:
             raise ValueError(f"{name}: vertices must run counter-clockwise and enclose an area")
         if k and area >= 0:

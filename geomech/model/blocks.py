@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .polygon import area_moments
+from .polygon import area_moments, signed_area
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,8 +165,7 @@ def _oriented(loop: np.ndarray, label: list[str], counter_clockwise: bool, name:
     if short.any():
         at = int(np.flatnonzero(short)[0])
         raise ValueError(f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide at ({loop[at, 0]:g}, {loop[at, 1]:g})")
-    own = loop - loop[0]
-    area = 0.5 * np.sum(own[:, 0] * np.roll(own[:, 1], -1) - own[:, 1] * np.roll(own[:, 0], -1))
+    area = signed_area(loop)
     if abs(area) <= 1e-14 * span**2:
         raise ValueError(f"{name}: the outline encloses no area")
     if (area > 0) != counter_clockwise:

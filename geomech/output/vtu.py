@@ -24,7 +24,7 @@ import numpy as np
 from .fields import conform
 
 #: Cell types of the VTK file format.
-VERTEX, LINE, POLY_LINE, TRIANGLE = 1, 3, 4, 5
+VERTEX, LINE, TRIANGLE = 1, 3, 5
 
 _TYPE = {"f8": "Float64", "f4": "Float32", "i8": "Int64", "i4": "Int32", "u1": "UInt8"}
 _TAIL = b"\n</AppendedData>\n</VTKFile>\n"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model import Blocks, Cracks
+from ..model.polygon import signed_area
 from .network import crack_network
 from .parts import EdgeLine, Flaw, ShapeError, Trace, Zone, extent_of, grid_decimals
 
@@ -77,13 +78,6 @@ def block_names(zone_names: Sequence[str]) -> list[str]:
         seen[name] += 1
         names.append(name if count[name] == 1 else f"{name} {seen[name]}")
     return names
-
-
-def signed_area(loop: np.ndarray) -> float:
-    """Area of ``loop`` (n, 2), m², positive counter-clockwise."""
-    own = loop - loop[0]
-    following = np.roll(own, -1, axis=0)
-    return 0.5 * float(np.sum(own[:, 0] * following[:, 1] - own[:, 1] * following[:, 0]))
 
 
 def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[Flaw]):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Cracks
+from ..model.polygon import signed_area
 from .gmsh_session import gmsh_session
 
 
@@ -38,7 +39,7 @@ def mesh_interior(
     positive, RuntimeError where Gmsh cannot mesh the block.
     """
     loops = [np.asarray(loop, dtype=float) for loop in loops]
-    area = abs(sum(_area(loop) * (1 if k == 0 else -1) for k, loop in enumerate(loops)))
+    area = abs(sum(abs(signed_area(loop)) * (1 if k == 0 else -1) for k, loop in enumerate(loops)))
     # An equilateral triangle of side h covers 0.43 h².
     size = float(np.sqrt(area / 0.43 / 2000)) if size is None else size
     tip_size = 0.1 * size if tip_size is None else tip_size
@@ -46,11 +47,6 @@ def mesh_interior(
         raise ValueError(f"mesh sizes must be positive, got size {size!r} and tip_size {tip_size!r} m")
     points, triangles, crack_edges = _mesh(loops, cracks, size, min(tip_size, size))
     return _torn(points, triangles, crack_edges)
-
-
-def _area(loop: np.ndarray) -> float:
-    own, following = loop - loop[0], np.roll(loop, -1, axis=0) - loop[0]
-    return 0.5 * abs(float(np.sum(own[:, 0] * following[:, 1] - own[:, 1] * following[:, 0])))
 
 
 def _with_mouths(loop: np.ndarray, mouths: list[tuple[int, np.ndarray]], tolerance: float):

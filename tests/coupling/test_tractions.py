@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from geomech.coupling.tractions import boundary_load, linear_pressure, resultants
+from geomech.coupling.tractions import boundary_load, linear_pressure
+from geomech.ddm.loads import resultants
 from geomech.model import CONTACT, SLIP, Blocks, Motion
 from geomech.model.polygon import area_moments
 
