@@ -50,3 +50,18 @@ class Particular:
         ux = -(b[0] * x**2 / 2 + g[0, 0] * x**3 / 6) / m - g[0, 1] * y**3 / (6 * mu)
         uy = -(b[1] * y**2 / 2 + g[1, 1] * y**3 / 6) / m - g[1, 0] * x**3 / (6 * mu)
         return np.column_stack([ux + strain[0] * x + 0.5 * strain[2] * y, uy + strain[1] * y + 0.5 * strain[2] * x])
+
+
+def edge_densities(edges: np.ndarray, particular: Particular) -> np.ndarray:
+    """(m, 2, 3) monomials of −σ_p n (n outward) along every edge (m, 2, 2), local components."""
+    a, b = edges[:, 0], edges[:, 1]
+    d = b - a
+    t = d / np.hypot(*d.T)[:, None]
+    out = np.column_stack([t[:, 1], -t[:, 0]])
+    values = []
+    for x in (a, 0.5 * (a + b), b):
+        s = particular.stress_of_force(x)
+        f = -np.column_stack([s[:, 0] * out[:, 0] + s[:, 2] * out[:, 1], s[:, 2] * out[:, 0] + s[:, 1] * out[:, 1]])
+        values.append(np.stack([np.sum(f * t, axis=1), -np.sum(f * out, axis=1)], axis=1))
+    lo, mid, hi = values
+    return np.stack([mid, 0.5 * (hi - lo), 0.5 * (hi + lo) - mid], axis=2)

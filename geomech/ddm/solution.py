@@ -13,7 +13,8 @@ from . import shapes
 from .faces import settle
 from .influence import add_fields
 from .loads import BodyLoad
-from .particular import Particular
+from .particular import Particular, edge_densities
+from .unit_loads import OFF, onto_boundary
 
 if TYPE_CHECKING:
     from .body import Body
@@ -149,8 +150,7 @@ class Solution:
         body = self.body
         # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
         follows = body._w @ self._w if self._w.size else np.zeros_like(self._u)
-        lifted = body._rigid @ (body._rigid_weights @ follows) / body._extent
-        on_boundary = body._gg @ (self._u + follows) + lifted + self._boundary_load
+        on_boundary = body._outside.times(self._u + follows, lifted=follows) + self._boundary_load
         on_faces = body._schur @ self._w + body._cg @ (self._u + follows) + self._face_load - self._traction
         scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
@@ -161,7 +161,7 @@ class Solution:
         """Estimated condition number of the matrices solved with, the worse one."""
         body = self.body
         factor = body._open_factor or body._free_factor(self.closed)[1]
-        return 1.0 / min(factor.rcond, body._gg_factor.rcond)
+        return 1.0 / min(factor.rcond, body._outside.factor.rcond)
 
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
@@ -197,9 +197,9 @@ class Solution:
                 add(elements.start, elements.end, elements.kind, elements.densities(values), body._tol, False)
         if self.load.segments is not None and len(self.load.segments):
             start, end, density = self._line_forces
-            add(start, end, np.zeros(len(start), np.int64), density, 2e-6 * body._extent, True)
+            add(start, end, np.zeros(len(start), np.int64), density, 2 * OFF * body._extent, True)
         if self._particular.force.any() or self._particular.gradient.any():
-            edges, density = body.mesh.edges, body.edge_densities(self._particular)
+            edges, density = body.mesh.edges, edge_densities(body.mesh.edges, self._particular)
             add(edges[:, 0], edges[:, 1], np.zeros(len(edges), np.int64), density, body._tol, True)
         shift /= 2 * body.material.shear_modulus
         return stress + self._particular.stress(where), shift + self._particular.displacement(where)
@@ -209,7 +209,7 @@ class Solution:
         body = self.body
         start, end, density = [], [], []
         for k, (segment, ends) in enumerate(zip(self.load.segments, self.load.tractions)):
-            (a, b), against = body._on_boundary(segment, k)
+            (a, b), against = onto_boundary(body.mesh.edges, segment, k, body._extent)
             ends = ends[::-1] if against else ends
             t = (b - a) / np.hypot(*(b - a))
             local = ends @ np.column_stack([t, normal_of(t)])

@@ -1,0 +1,202 @@
+"""What unit loads do on a body's boundary and cracks, remembered: loads mostly come again and only change in size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..model import Material
+from .boundary import BoundarySystem
+from .influence import ElementSet, line_forces, project_jumps
+from .loads import BodyLoad
+from .mesh import Mesh
+from .particular import Particular, edge_densities
+
+#: A load segment may stand this far off the boundary, in units of the extent; it is put onto it.
+OFF = 1e-6
+#: Loads on so many different segments are remembered.
+_REMEMBERED = 400
+
+
+class UnitLoad:
+    """What unit loads do, one a column of ``applied``: tractions g on the boundary above r on the cracks.
+
+    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹ g, of
+    which ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against`` whether they were
+    given against the boundary's direction.
+    """
+
+    def __init__(self, applied: np.ndarray, segment: np.ndarray | None = None, against: bool = False):
+        self.applied, self.segment, self.against = applied, segment, against
+        self.eliminated: np.ndarray | None = None
+        self.answered: np.ndarray | None = None
+        self.used = False
+
+
+class UnitLoads:
+    """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `kernels` for ``tol``."""
+
+    def __init__(self, mesh: Mesh, centroid: np.ndarray, material: Material, tol: float, extent: float):
+        self.mesh, self.boundary, self.faces = mesh, mesh.boundary, mesh.cracks
+        self.centroid, self.material, self.nu = centroid, material, material.effective_poissons_ratio
+        self.tol, self.extent = tol, extent
+        self._segments: dict[bytes, UnitLoad] = {}
+        self._forces: UnitLoad | None = None
+        self._recent: list[bytes] = []
+
+    def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
+        """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old numbers."""
+        n_g = self.boundary.n_unknowns
+        if old._forces is not None:
+            self._forces = self._unit_forces(old._forces.applied[:n_g])
+            self._forces.eliminated = old._forces.eliminated
+        keys = [key for key in old._recent if key in old._segments]
+        if not keys:
+            return
+        new, kept = np.flatnonzero(c_old < 0), np.flatnonzero(c_old >= 0)
+        straight = np.array([old._segments[key].segment for key in keys])
+        fresh = self._linear_forces(self.faces.take(new), straight)
+        to, fro, at = (
+            n_g + x for x in (self.faces.unknowns(kept), old.faces.unknowns(c_old[kept]), self.faces.unknowns(new))
+        )
+        for key, rows in zip(keys, fresh):
+            before = old._segments[key]
+            applied = np.empty((n_g + self.faces.n_unknowns, 4))
+            applied[:n_g], applied[to], applied[at] = before.applied[:n_g], before.applied[fro], rows
+            self._segments[key] = unit = UnitLoad(applied, before.segment, before.against)
+            unit.eliminated = before.eliminated
+        self._recent = keys
+
+    def of(self, load: BodyLoad, particular: Particular) -> list[tuple[UnitLoad, np.ndarray]]:
+        """The unit loads of which ``load`` is made and their sizes."""
+        units = self._unit_segments(load)
+        if particular.force.any() or particular.gradient.any():
+            if self._forces is None:
+                self._forces = self._unit_forces()
+            units.append((self._forces, np.concatenate([particular.force, particular.gradient.ravel()])))
+        return units
+
+    def add(
+        self,
+        units: list[tuple[UnitLoad, np.ndarray]],
+        rest: np.ndarray,
+        boundary: BoundarySystem,
+        cg: np.ndarray,
+        opened: Callable[[np.ndarray], np.ndarray],
+    ) -> tuple[np.ndarray, ...]:
+        """g, r, y, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and cracks.
+
+        ``cg`` is A_CΓ, ``opened`` applies S⁻¹.
+        """
+        n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
+        n = n_g + n_c
+        again = [unit for unit, _ in units if unit.used and unit.answered is None]
+        if again:
+            self._answer(again, boundary, cg, opened)
+        total = np.zeros(2 * n + n_c)
+        for unit, size in units:
+            unit.used = True
+            if unit.answered is None:
+                rest = rest + unit.applied @ size
+            else:
+                total += unit.answered @ size
+        if rest.any():
+            y = boundary.solve(rest[:n_g])
+            reduced = rest[n_g:] - cg @ y
+            total += np.concatenate([rest, y, reduced, opened(reduced)])
+        return tuple(np.split(total, [n_g, n, n + n_g, 2 * n]))
+
+    def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray, opened) -> None:
+        """Work out what the ``units`` come to."""
+        n_g = self.boundary.n_unknowns
+        fresh = [unit for unit in units if unit.eliminated is None]
+        if fresh:
+            y = boundary.solve(np.hstack([unit.applied[:n_g] for unit in fresh]))
+            for unit, part in zip(fresh, np.split(y, np.cumsum([u.applied.shape[1] for u in fresh])[:-1], axis=1)):
+                unit.eliminated = part
+        for unit in units:
+            reduced = unit.applied[n_g:] - cg @ unit.eliminated
+            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
+
+    def _unit_segments(self, load: BodyLoad) -> list[tuple[UnitLoad, np.ndarray]]:
+        """The load's segments and their (4,) tractions."""
+        if load.segments is None or not len(load.segments):
+            return []
+        if not len(self.mesh.edges):
+            raise ValueError("load segments need a body with an outline")
+        keys = [segment.tobytes() for segment in load.segments]
+        missing = [k for k, key in enumerate(keys) if key not in self._segments]
+        if missing:
+            if len(self._segments) > _REMEMBERED:
+                self._segments.clear()
+                return self._unit_segments(load)
+            placed = [onto_boundary(self.mesh.edges, load.segments[k], k, self.extent) for k in missing]
+            straight = np.array([segment for segment, _ in placed])
+            parts = (self._linear_forces(targets, straight) for targets in (self.boundary, self.faces))
+            for k, (segment, against), *rows in zip(missing, placed, *parts):
+                self._segments[keys[k]] = UnitLoad(np.concatenate(rows), segment, against)
+        self._recent = keys
+        units = [self._segments[key] for key in keys]
+        return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, load.tractions)]
+
+    def _linear_forces(self, targets: ElementSet, segments: np.ndarray) -> np.ndarray:
+        """(m, n_unknowns, 4) traction from unit (x, y) forces at the start, then at the end of straight segments,
+        linear along them; seen from outside the boundary."""
+        tol = 2 * OFF * self.extent
+        unit = line_forces(targets, segments[:, 0], segments[:, 1], 1, self.nu, tol, -1.0)
+        if targets is self.boundary:
+            project_jumps(unit, targets, segments[:, 0], segments[:, 1], self.nu, tol, -1.0)
+        d = segments[:, 1] - segments[:, 0]
+        t = d / np.hypot(*d.T)[:, None]
+        turn = np.stack([t, np.column_stack([-t[:, 1], t[:, 0]])], axis=1)
+        by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
+        out = np.einsum("nmce,mcx->mnex", by_end, turn)
+        return np.ascontiguousarray(out.reshape(len(segments), targets.n_unknowns, 4))
+
+    def _unit_forces(self, on_boundary: np.ndarray | None = None) -> UnitLoad:
+        """The six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy of size one; ``on_boundary`` if it is known already."""
+        one = np.eye(6)
+        units = [Particular(self.centroid, e[:2], e[2:].reshape(2, 2), np.zeros(3), self.material) for e in one]
+        densities = np.column_stack([edge_densities(self.mesh.edges, unit).ravel() for unit in units])
+        a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
+
+        def from_edges(targets: ElementSet) -> np.ndarray:
+            forces = line_forces(targets, a, b, 2, self.nu, self.tol, -1.0)
+            return forces.reshape(targets.n_unknowns, 6 * len(a)) @ densities
+
+        points = self.faces.nodes.reshape(-1, 2)
+        inside = np.column_stack([on_elements(self.faces, unit.stress_of_force(points)) for unit in units])
+        first = from_edges(self.boundary) if on_boundary is None else on_boundary
+        return UnitLoad(np.concatenate([first, from_edges(self.faces) + inside]))
+
+
+def onto_boundary(edges: np.ndarray, segment: np.ndarray, number: int, extent: float) -> tuple[np.ndarray, bool]:
+    """``segment`` (2, 2) put onto the one of ``edges`` (m, 2, 2) it lies on, and whether it runs against that edge.
+
+    Raises ValueError naming the segment by its ``number`` when it is off by more than a millionth of ``extent``, or has no
+    length.
+    """
+    a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
+    length = np.hypot(*d.T)
+    rel = segment[None] - a[:, None]
+    s = np.einsum("ijc,ic->ij", rel, d) / length[:, None] ** 2
+    clipped = np.clip(s, 0.0, 1.0)
+    foot = a[:, None] + clipped[..., None] * d[:, None]
+    off = np.hypot(*np.moveaxis(foot - segment, 2, 0)).max(axis=1)
+    at = int(np.argmin(off))
+    if off[at] > OFF * extent:
+        raise ValueError(f"load segment {number} lies {off[at]:.3g} m off the boundary of the body")
+    if abs(s[at, 1] - s[at, 0]) * length[at] <= 1e-14 * extent:
+        raise ValueError(f"load segment {number} has no length")
+    against = bool(s[at, 1] < s[at, 0])
+    return (foot[at][::-1] if against else foot[at]), against
+
+
+def on_elements(c: ElementSet, stress: np.ndarray) -> np.ndarray:
+    """(n_unknowns,) traction (along, normal) at the collocation nodes of ``stress`` (3,) or (n_nodes, 3)."""
+    s = np.broadcast_to(stress, (c.n, c.per, 3)) if np.ndim(stress) == 1 else stress.reshape(c.n, c.per, 3)
+    t, n = c.tangent[:, None], c.normal[:, None]
+    tx = s[..., 0] * n[..., 0] + s[..., 2] * n[..., 1]
+    ty = s[..., 2] * n[..., 0] + s[..., 1] * n[..., 1]
+    return np.stack([tx * t[..., 0] + ty * t[..., 1], tx * n[..., 0] + ty * n[..., 1]], axis=1).ravel()
