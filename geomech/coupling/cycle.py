@@ -19,7 +19,6 @@ from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
 from ..model.polygon import winding_number
 from .compliance import crack_response
 from .mean_stress import rotated_mean_stress
-from .path import Chords
 from .record import axial_strain, joined_faces, leading_load
 from .splitting import split_blocks
 from .tractions import BoundaryLoad, boundary_load
@@ -266,28 +265,22 @@ class Coupling:
         if not np.any(tips["k_eq"] >= k_ic):
             return None
         from ..ddm.growth import advance
+        from ..ddm.path import corrected
+
+        trial = self.bodies
 
         def grow():
             with self._timed("growth"):
                 return advance(self.cracks, self.blocks.loops, tips, self.problem.growth, k_ic, self.number)
 
-        growth, trial = grow(), self.bodies
-        chords = Chords(tips)
-        settled = not self.problem.growth.correct
-        # A step that joins something may cut a piece off, on which there is nothing to solve.
-        while not settled and not growth.joins and np.any(growth.grown > 0):
-            trial, nodes_of = self._bodies_of(growth.cracks, trial)
-            ahead = self._tips(self._solve(trial, self.loads, self.solutions), nodes_of)
-            settled = chords.bend(tips, growth.grown, ahead, growth.cracks, self.number)
-            tried, growth = growth, grow()
-            stuck = (tried.grown > 0) & (growth.grown == 0)
-            if stuck.any():
-                # Bent, a step would not leave its tip; the criterion's own direction does.
-                tips["angle"][stuck] = chords.start[stuck]
-                growth = grow()
-        if not (np.any(growth.grown > 0) or growth.joins):
-            return None
-        self.bodies = trial  # most of it is what the corrected step needs
+        def look_ahead(cracks):
+            nonlocal trial
+            trial, nodes_of = self._bodies_of(cracks, trial)
+            return self._tips(self._solve(trial, self.loads, self.solutions), nodes_of)
+
+        growth = corrected(tips, grow, look_ahead, self.number, self.problem.growth.correct)
+        if growth is not None:
+            self.bodies = trial  # most of it is what the corrected step needs
         return growth
 
     def _initiations(self, tips: np.ndarray, state: State) -> tuple[Event, ...]:

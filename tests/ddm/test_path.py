@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geomech.coupling.path import LOOKS, TOLERANCE, Chords
+from geomech.ddm.path import LOOKS, TOLERANCE, Chords
 from geomech.model import TIP, Cracks
 
 

@@ -14,9 +14,12 @@ back against the trial, the condition on the chord is solved, not corrected once
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..model import Cracks
+from .growth import Growth
 
 #: A step that turns by more than this starts at a kink.
 KINK = np.radians(20.0)
@@ -74,6 +77,34 @@ class Chords:
         unsettled = off & (rest * self.start < 0) if first else off
         self.last_angle, self.last_rest = angle, rest
         return self.looks == LOOKS or not unsettled.any()
+
+
+def corrected(
+    tips: np.ndarray,
+    grow: Callable[[], Growth],
+    look_ahead: Callable[[Cracks], np.ndarray],
+    cycle: int,
+    correct: bool = True,
+) -> Growth | None:
+    """One growth step of all driven tips along chords; None when no tip moves. Sets the angles that were followed.
+
+    ``tips``: TIP rows with the criterion's ``angle`` and ``k_eq``; ``grow()`` advances them as they then stand, in segments
+    of birth ``cycle``; ``look_ahead(cracks)`` solves the tried network and returns its TIP rows with their angles. Without
+    ``correct`` the criterion's angles are followed as they are.
+    """
+    growth = grow()
+    chords = Chords(tips)
+    settled = not correct
+    # A step that joins something may cut a piece off, on which there is nothing to solve.
+    while not settled and not growth.joins and np.any(growth.grown > 0):
+        settled = chords.bend(tips, growth.grown, look_ahead(growth.cracks), growth.cracks, cycle)
+        tried, growth = growth, grow()
+        stuck = (tried.grown > 0) & (growth.grown == 0)
+        if stuck.any():
+            # Bent, a step would not leave its tip; the criterion's own direction does.
+            tips["angle"][stuck] = chords.start[stuck]
+            growth = grow()
+    return growth if np.any(growth.grown > 0) or growth.joins else None
 
 
 def _turns_ahead(tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> np.ndarray:
