@@ -1,6 +1,6 @@
 """Displacement discontinuity method: cracks in an elastic body.
 
-    body = ddm.Body(loops, cracks, material)        # loops [] for the infinite plane
+    body = ddm.Body(loops, cracks, material)        # loops [] for the infinite plane; holes=, supports=
     sol = body.solve(ddm.BodyLoad(remote_stress=[0, 1e6, 0]))
     sol.tips["k_i"], sol.faces.opening, sol.stress(points), sol.displacement(points)
 
@@ -14,12 +14,25 @@ _PUBLIC = {
     "Body": ".body",
     "BodyLoad": ".loads",
     "OutOfEquilibrium": ".loads",
+    "Pressure": ".loads",
+    "Support": ".supports",
     "NotConverged": ".faces",
     "Solution": ".solution",
 }
 _MODULES = ("criteria", "growth", "shapes")
 
-__all__ = ["Body", "BodyLoad", "NotConverged", "OutOfEquilibrium", "Solution", "criteria", "growth", "shapes"]
+__all__ = [
+    "Body",
+    "BodyLoad",
+    "NotConverged",
+    "OutOfEquilibrium",
+    "Pressure",
+    "Solution",
+    "Support",
+    "criteria",
+    "growth",
+    "shapes",
+]
 
 
 def __getattr__(name: str):

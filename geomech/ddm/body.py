@@ -12,6 +12,7 @@ complement S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC of the crack unknowns. The matri
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -26,8 +27,9 @@ from .loads import BodyLoad, check_equilibrium
 from .mesh import Mesh, mesh, outline_edges
 from .particular import Particular
 from .solution import Solution, settle_faces
+from .supports import Holds, Support, called, marks, place, values_at
 from .unit_loads import UnitLoads, on_elements
-from .validity import check_cracks, check_outline
+from .validity import check_cracks, check_outline, outlined
 
 #: Reciprocal condition of S below which contact is not built on its inverse.
 _SAFE = 1e-11
@@ -36,8 +38,8 @@ _SAFE = 1e-11
 class Body:
     """An elastic body with cracks.
 
-    ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``cracks``:
-    those of this body. ``previous``: an earlier body of which whatever is unchanged, element by element, is reused:
+    ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``holes``:
+    more of them, which may run either way, in the infinite plane too. ``cracks``: those of this body. ``previous``: an earlier body of which whatever is unchanged, element by element, is reused:
     growth costs the rows and columns of the new elements. ``counts`` tells what was done. Raises ValueError naming the
     item on geometry that is no body, numpy.linalg.LinAlgError when cracks cut a part off.
     """
@@ -49,26 +51,44 @@ class Body:
         material: Material,
         settings: DdmSettings | None = None,
         previous: Body | None = None,
+        holes: Sequence[np.ndarray] = (),
+        supports: Sequence[Support] = (),
     ):
         self.material, self.cracks = material, cracks
         self.settings = settings = DdmSettings() if settings is None else settings
-        if previous is not None and (previous.settings != settings or previous.nu != material.effective_poissons_ratio):
+        self.supports = tuple(supports)
+        if previous is not None and (
+            previous.settings != settings
+            or previous.nu != material.effective_poissons_ratio
+            or previous.supports != self.supports
+        ):
             previous = None
         self.counts = {"elements": 0, "elements_new": 0, "boundary_assemblies": 0, "boundary_factorisations": 0}
-        same = previous is not None and _same_loops(previous.loops, loops)
-        self.loops = previous.loops if same else check_outline(loops)
-        check_cracks(cracks, outline_edges(self.loops)[0], self.loops, _fresh(cracks, previous if same else None))
-        self.mesh: Mesh = mesh(self.loops, cracks, settings)
+        given = [*loops, *holes]
+        same = previous is not None and _same_loops(previous._given_loops, given)
+        if not same and self.supports:
+            previous = None
+        self._given_loops = [np.array(loop, dtype=float) for loop in given]
+        self.loops = previous.loops if same else check_outline(loops, holes)
+        self.outlined = outlined(self.loops)
+        edges, _ = outline_edges(self.loops)
+        check_cracks(cracks, edges, self.loops, _fresh(cracks, previous if same else None))
+        points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
+        self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
+        self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
+        marked: list[tuple[np.ndarray, int]] = []
+        if self.supports:
+            n_outline = len(self.loops[0]) if self.outlined else 0
+            self.support_segments = place(self.supports, edges, n_outline, self._extent)
+            marked = marks(self.supports, self.support_segments, self.loops[0], settings.grading_layers)
+        self.mesh: Mesh = mesh(self.loops, cracks, settings, marked)
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
-        if self.loops:
+        if self.outlined:
             self.area, self.centroid, self._second = area_moments(self.loops)
             self._reach = float(np.ptp(self.loops[0], axis=0).max())
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
-        points = np.concatenate([self.mesh.edges.reshape(-1, 2), cracks.nodes])
-        self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
-        self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
         self._assemble(previous)
 
     @property
@@ -78,7 +98,8 @@ class Body:
     def _assemble(self, previous: Body | None) -> None:
         nu, tol = self.nu, self._tol
         c, old = self.faces, previous
-        system = BoundarySystem(self.mesh, nu, tol, self._extent, old._outside if old else None)
+        holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
+        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, old._outside if old else None)
         self._outside = system
         self.boundary = g = system.elements
         g_old, same_boundary = system.at_old, system.unchanged
@@ -91,7 +112,9 @@ class Body:
         def block(rows, columns):
             return lambda r, k: influence(rows.take(r), columns.take(k), nu, tol)
 
-        self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, block(c, g))
+        self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k))
+        if system.holds is not None:
+            self._c_known = system.holds.known(c, nu, tol)
         # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
         # make again, should the boundary change, than to carry along.
         everything = np.arange(g.n)
@@ -114,19 +137,38 @@ class Body:
         self._column_at = np.full(c.n_unknowns, -1)
         self._columns = np.empty((c.n_unknowns, 0))
         self._closed_now: tuple[bytes, np.ndarray, Factor] | None = None
-        self._loads = UnitLoads(self.mesh, self.centroid, self.material, tol, self._extent)
+        self._loads = UnitLoads(self.mesh, self.centroid, self.material, tol, self._extent, self.outlined)
         if same_boundary:
             self._loads.inherit(old._loads, c_old)
 
     def _particular(self, load: BodyLoad) -> Particular:
         force = np.zeros(2) if load.body_force is None else load.body_force
         gradient = np.zeros((2, 2)) if load.body_force_gradient is None else load.body_force_gradient
-        if not self.loops and (force.any() or gradient.any()):
+        if not self.outlined and (force.any() or gradient.any()):
             raise ValueError("a body force needs a body with an outline")
         if load.about is not None:
             force = force + gradient @ (self.centroid - load.about)
         uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
         return Particular(self.centroid, force, gradient, uniform, self.material)
+
+    def _imposed(self, load: BodyLoad, particular: Particular) -> np.ndarray:
+        """(h_unknowns,) 2μ times what the supports hold of displacement, less that of the ``particular`` field."""
+        holds = self._outside.holds
+        values = () if load.displacements is None else load.displacements
+        if load.displacements is not None and len(values) != len(self.supports):
+            raise ValueError(f"{len(self.supports)} supports but {len(values)} imposed displacements")
+        points = holds.sources.nodes
+        shift = -particular.displacement(points.reshape(-1, 2)).reshape(points.shape)
+        for k, value in enumerate(values):
+            here, segment = holds.support == k, np.array(self._straight(k))
+            at = points[here].reshape(-1, 2)
+            shift[here] += values_at(value, segment, at, called(self.supports, k)).reshape(-1, *points.shape[1:])
+        return 2 * self.material.shear_modulus * holds.imposed(shift)
+
+    def _straight(self, k: int) -> np.ndarray:
+        """(2, 2) support ``k`` in the direction it was given in."""
+        on = self.supports[k].on
+        return self.support_segments[k] if isinstance(on, int) else np.array(on)
 
     # Solution --------------------------------------------------------------------------------------------------------
 
@@ -137,18 +179,24 @@ class Body:
         `faces.NotConverged` when the contact of crack faces does not settle.
         """
         particular = self._particular(load)
-        if self.loops:
+        if self.outlined:
             check_equilibrium(
                 load, self._reach, self.area, self.centroid, self._second, particular.force, particular.gradient,
-                equilibrium_tolerance,
+                equilibrium_tolerance, self._outside.free_motions,
             )  # fmt: skip
         rest = np.zeros(self.boundary.n_unknowns + self.faces.n_unknowns)
-        if particular.uniform.any():
+        if particular.uniform.any() and (self.outlined or not self.loops):
             rest[self.boundary.n_unknowns :] = on_elements(self.faces, particular.uniform)
+        imposed = np.zeros(0)
+        if self.supports:
+            imposed = self._imposed(load, particular)
+            rest += np.concatenate([self._outside.known @ imposed, self._c_known @ imposed])
         units = self._loads.of(load, particular)
         g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self._opened)
         w, closed, traction, solves = settle_faces(self, reduced, opened, load.crack_pressure, warm)
-        return Solution(self, load, particular, y, w, closed, traction, g, r, solves)
+        on_edges = [np.tensordot(unit.densities, size, 1) for unit, size in units if unit.densities is not None]
+        edge_density = sum(on_edges) if on_edges else None
+        return Solution(self, load, particular, y, w, closed, traction, g, r, solves, imposed, edge_density)
 
     def _free_factor(self, closed: np.ndarray) -> tuple[np.ndarray, Factor]:
         """Free unknowns (indices) and factors of S restricted to them, ``closed`` (n_unknowns,) bool fixed."""
@@ -270,7 +318,7 @@ class Body:
     def compliance(self, sol: Solution | None = None) -> np.ndarray:
         """(3, 3) added compliance, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform boundary stress,
         with the face states of ``sol`` (all open if None); symmetrised. Raises ValueError in the infinite plane."""
-        if not self.loops:
+        if not self.outlined:
             raise ValueError("the mean strain of cracks needs a body with an outline")
         if not self.faces.n:
             return np.zeros((3, 3))

@@ -1,52 +1,82 @@
 """The boundary's side of a body's equations: A_ΓΓ with its rigid motions lifted, and its factors.
 
-Where tractions are given the boundary's displacement is free up to a rigid motion of every loop: these are without stress
-and span the null space of A_ΓΓ. With R the motions and Q their mean over the loop, A_ΓΓ + R Qᵀ/extent is regular and
-Qᵀu = 0 follows for loads in equilibrium.
+Unknown is the boundary's displacement, or, where a support holds it, the reaction (see `supports`). What the supports of
+a loop leave free of its rigid motions is without stress and spans the null space of A_ΓΓ. With R these motions and Q
+their mean over the loop, A_ΓΓ + R Qᵀ/extent is regular and Qᵀu = 0 follows for loads in equilibrium.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from .factor import Factor
 from .influence import ElementSet, influence, reuse
 from .mesh import Mesh
+from .supports import Holds
 
 
 class BoundarySystem:
-    """A_ΓΓ of ``mesh.boundary``, what is unchanged since ``previous`` taken over from it.
+    """A_ΓΓ of ``mesh.boundary``, what is unchanged since ``previous`` (with the same supports) taken over from it.
 
     elements      the boundary's elements
-    matrix        (n, n) traction seen from outside from the displacement (times 2μ) of the boundary
-    rigid         (n, 3L) rigid motions of every loop, nodal values
-    weights       (3L, n) their mean over the loop
+    holds         which of them supports hold, or None
+    matrix        (n, n) traction seen from outside from the displacement (times 2μ) or reaction of the boundary
+    known         (n, h) the same from the displacement of held elements
+    rigid         (n, k) rigid motions of every loop that no support resists, nodal values
+    weights       (k, n) their mean over the loop
+    free_motions  those of the whole body, None when nothing is held
     factor        of ``matrix`` with the rigid motions lifted
-    new           (n_elements,) bool: not in ``previous``
+    unchanged     whether all is ``previous``'s; ``at_old`` (n_elements,) the elements' numbers there, −1 where new
 
     Raises numpy.linalg.LinAlgError when the equations are singular.
     """
 
-    def __init__(self, mesh: Mesh, nu: float, tol: float, extent: float, previous: BoundarySystem | None = None):
+    def __init__(
+        self,
+        mesh: Mesh,
+        nu: float,
+        tol: float,
+        extent: float,
+        holds: Holds | None = None,
+        previous: BoundarySystem | None = None,
+    ):
         g = mesh.boundary
+        self._nu, self._tol = nu, tol
         self.at_old = at_old = g.found_in(previous.elements if previous else None)
-        self.extent = extent
-        self.elements = g
         self.unchanged = previous is not None and g.n == previous.elements.n and np.array_equal(at_old, np.arange(g.n))
         if self.unchanged:
-            self.elements, self.matrix, self.factor = previous.elements, previous.matrix, previous.factor
-            self.rigid, self.weights, self.extent = previous.rigid, previous.weights, previous.extent
+            self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
+            self.matrix, self.known, self.factor = previous.matrix, previous.known, previous.factor
+            self.rigid, self.weights, self.free_motions = previous.rigid, previous.weights, previous.free_motions
             return
-
-        def block(r: np.ndarray, k: np.ndarray) -> np.ndarray:
-            return influence(g.take(r), g.take(k), nu, tol)
-
-        self.matrix = reuse(previous.matrix if previous else None, at_old, at_old, g, g, block)
+        self.elements, self.holds, self.extent = g, holds, extent
+        self.matrix = reuse(
+            previous.matrix if previous else None, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k)
+        )
+        self.known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
         self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
-        self.factor = Factor(self.matrix + self._lift(), "the boundary equations are singular")
+        self.free_motions: FreeMotions | None = None
+        if holds is not None:
+            self._hold_motions(mesh.edge_loop)
+        self.factor = Factor(self.matrix + self.rigid @ self.weights / extent, "the boundary equations are singular")
 
-    def _lift(self) -> np.ndarray:
-        return self.rigid @ self.weights / self.extent
+    def _hold_motions(self, edge_loop: np.ndarray) -> None:
+        """Keep of the outline's rigid motions those that are free."""
+        holds, g = self.holds, self.elements
+        free = holds.free_motions(self.rigid[:, :3])
+        self.free_motions = FreeMotions(*middle_of(g.take(np.flatnonzero(edge_loop[g.source] == 0)))[1:], free)
+        keep = ~holds.unknowns
+        modes = holds.turned(self.rigid[:, :3] @ free) * keep[:, None]
+        means = holds.turned((free.T @ self.weights[:3]).T).T * keep
+        self.rigid = np.hstack([modes, self.rigid[:, 3:]])
+        self.weights = np.concatenate([means, self.weights[3:]])
+
+    def influence_on(self, targets: ElementSet, elements: np.ndarray) -> np.ndarray:
+        """(targets.n_unknowns, …) traction on ``targets`` from the unknowns of the boundary's ``elements``."""
+        matrix = influence(targets, self.elements.take(elements), self._nu, self._tol)
+        return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self._nu, self._tol)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions."""
@@ -55,6 +85,25 @@ class BoundarySystem:
     def times(self, u: np.ndarray, lifted: np.ndarray) -> np.ndarray:
         """A_ΓΓ ``u``, and what the lifted rigid motions of ``lifted`` add."""
         return self.matrix @ u + self.rigid @ (self.weights @ lifted) / self.extent
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotions:
+    """Rigid motions that no support resists: columns of ``combinations`` (3, k), x, y and the turn that moves points at
+    ``radius`` from ``centre`` (2,) by one."""
+
+    centre: np.ndarray
+    radius: float
+    combinations: np.ndarray
+
+
+def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
+    """Length of ``g``, mean (2,) of its points and their root mean square distance from it."""
+    x, ds = g.nodes, g.quadrature
+    perimeter = ds.sum()
+    middle = np.einsum("ej,ejc->c", ds, x) / perimeter
+    rel = x - middle
+    return perimeter, middle, float(np.sqrt(np.einsum("ej,ejc,ejc->", ds, rel, rel) / perimeter))
 
 
 def rigid_motions(g: ElementSet, edge_loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -66,10 +115,8 @@ def rigid_motions(g: ElementSet, edge_loop: np.ndarray) -> tuple[np.ndarray, np.
     loop_of = edge_loop[g.source] if g.n else np.empty(0, int)
     for k in range(n_loops):
         here = np.flatnonzero(loop_of == k)
-        x, ds = g.nodes[here], g.quadrature[here]
-        perimeter = ds.sum()
-        rel = x - np.einsum("ej,ejc->c", ds, x) / perimeter
-        radius = np.sqrt(np.einsum("ej,ejc,ejc->", ds, rel, rel) / perimeter)
+        perimeter, middle, radius = middle_of(g.take(here))
+        rel, ds = g.nodes[here] - middle, g.quadrature[here]
         one, zero = np.ones(ds.shape), np.zeros(ds.shape)
         for m, motion in enumerate(((one, zero), (zero, one), (-rel[..., 1] / radius, rel[..., 0] / radius))):
             vector = np.stack(motion, axis=-1)

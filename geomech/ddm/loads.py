@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .boundary import FreeMotions
 
 
 class OutOfEquilibrium(ValueError):
@@ -21,6 +26,24 @@ class OutOfEquilibrium(ValueError):
         )
 
 
+@dataclass(frozen=True)
+class Pressure:
+    """Of a fluid: ``value`` Pa at ``about`` (x, y), growing by ``gradient`` Pa/m. Water with its level at y0 is
+    ``Pressure(0, (0, -9.81e3), (0, y0))``. Raises ValueError when something is not finite."""
+
+    value: float = 0.0
+    gradient: tuple[float, float] = (0.0, 0.0)
+    about: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([self.value, *self.gradient, *self.about]).all():
+            raise ValueError(f"a pressure is not finite: {self}")
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """(...,) Pa at ``points`` (..., 2)."""
+        return self.value + (points - np.asarray(self.about)) @ np.asarray(self.gradient, dtype=float)
+
+
 @dataclass(frozen=True, eq=False)
 class BodyLoad:
     """All parts are optional and add up.
@@ -33,6 +56,10 @@ class BodyLoad:
     remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
                                     that carry it act on the boundary in addition to ``tractions``
     crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses
+    hole_pressure        the same in all holes, or of each: a number, Pa, or a `Pressure`
+    displacements        for every support of the body what it imposes, m: None (zero), constant (2,), linear (2, 2) from
+                         its values at the support's ends, or a function of points (n, 2); components that the
+                         support does not hold are ignored
     """
 
     segments: np.ndarray | None = None
@@ -42,6 +69,21 @@ class BodyLoad:
     about: np.ndarray | None = None
     remote_stress: np.ndarray | None = None
     crack_pressure: np.ndarray | float = 0.0
+    hole_pressure: Pressure | Sequence[Pressure | float] | float = 0.0
+    displacements: Sequence | None = None
+
+    def hole_pressures(self, n_holes: int) -> list[Pressure]:
+        """That of every hole, [] when there is none. Raises ValueError when there are not as many."""
+        given = self.hole_pressure
+        if np.ndim(given) == 0 and not isinstance(given, Pressure) and given == 0:
+            return []
+        if isinstance(given, Pressure) or np.ndim(given) == 0:
+            given = [given] * n_holes
+            if not n_holes:
+                raise ValueError("a pressure in holes, but the body has none")
+        if len(given) != n_holes:
+            raise ValueError(f"{n_holes} holes but {len(given)} pressures")
+        return [p if isinstance(p, Pressure) else Pressure(float(p)) for p in given]
 
     def __post_init__(self) -> None:
         shapes = {
@@ -62,6 +104,9 @@ class BodyLoad:
             if not np.isfinite(value).all():
                 raise ValueError(f"{name}: not finite")
             object.__setattr__(self, name, value)
+        for p in self.hole_pressure if isinstance(self.hole_pressure, Sequence) else [self.hole_pressure]:
+            if not isinstance(p, Pressure) and not np.isfinite(p).all():
+                raise ValueError("hole_pressure: not finite")
         if not np.isfinite(self.crack_pressure).all():
             raise ValueError("crack_pressure: not finite")
         n = [0 if x is None else len(x) for x in (self.segments, self.tractions)]
@@ -78,11 +123,12 @@ def check_equilibrium(
     force: np.ndarray,
     gradient: np.ndarray,
     tolerance: float,
+    free: FreeMotions | None = None,
 ) -> None:
     """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size.
 
     ``reach`` is the body's extent; ``area``, ``centroid`` and ``second`` (2, 2) its area moments; ``force`` and
-    ``gradient`` the body force about the centroid.
+    ``gradient`` the body force about the centroid. With supports only the ``free`` rigid motions count.
     """
     total, moment, size = np.zeros(2), 0.0, 0.0
     if load.segments is not None and len(load.segments):
@@ -93,9 +139,20 @@ def check_equilibrium(
         moment += turned[1, 0] - turned[0, 1]
         size += area * (float(np.hypot(*force)) + float(np.abs(gradient).max()) * reach)
     if size > 0:
+        if free is not None:
+            total, moment = _unheld(total, moment, centroid, free)
         relative = max(float(np.hypot(*total)), abs(moment) / reach) / size
         if relative > tolerance:
             raise OutOfEquilibrium(total, moment, relative)
+
+
+def _unheld(total: np.ndarray, moment: float, centroid: np.ndarray, free: FreeMotions) -> tuple[np.ndarray, float]:
+    """The part of a force (2,) and a moment about ``centroid`` that does work on the ``free`` rigid motions."""
+    arm = free.centre - centroid
+    about = moment - (arm[0] * total[1] - arm[1] * total[0])
+    work = free.combinations @ (free.combinations.T @ np.array([total[0], total[1], about / free.radius]))
+    force, about = work[:2], work[2] * free.radius
+    return force, about + arm[0] * force[1] - arm[1] * force[0]
 
 
 def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, float, float]:

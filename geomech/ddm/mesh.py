@@ -11,6 +11,7 @@ wing's tip however far away (without grading its K_I was 13 % low at 1.2 flaw le
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,10 +60,13 @@ def outline_edges(loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return edges, np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])
 
 
-def mesh(loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings) -> Mesh:
-    """Elements of a body with outline ``loops`` (counter-clockwise, holes clockwise, [] for the infinite plane)."""
+def mesh(
+    loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings, marks: Sequence[tuple[np.ndarray, int]] = ()
+) -> Mesh:
+    """Elements of a body with outline ``loops`` (counter-clockwise, holes clockwise; holes alone or [] for the
+    infinite plane). ``marks``: further points (2,) of the boundary that are to be nodes, with graded layers at each."""
     edges, edge_loop = outline_edges(loops)
-    boundary = _boundary(loops, edges, cracks, settings)
+    boundary = _boundary(loops, edges, cracks, settings, marks)
     crack = _cracks(cracks, settings)
     points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
     extent = np.ptp(points, axis=0).max() if len(points) else 0.0
@@ -90,29 +94,35 @@ def _graded(ratio: float, layers: int) -> list[float]:
     return [ratio**k for k in range(layers, 0, -1)]
 
 
-def _boundary(loops, edges, cracks, settings):
+def _boundary(loops, edges, cracks, settings, marks):
     if not len(edges):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
-    span = math.sqrt(abs(signed_area(loops[0])))
-    size = span / settings.elements_per_side
+    spans = [math.sqrt(abs(signed_area(loop))) for loop in loops]
+    if signed_area(loops[0]) > 0:
+        spans = spans[:1] * len(loops)
     layers, ratio = settings.grading_layers, settings.grading_ratio
-    mouths = [cracks.nodes[k] for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))]
-    corner = np.concatenate([_interior_angles(loop) for loop in loops])
+    mouths = [(cracks.nodes[k], layers) for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))]
+    mouths += marks
+    angles = np.concatenate([_interior_angles(loop) for loop in loops])
+    corner = [_corner_layers(angle, layers) for angle in angles]
+    for point, deep in marks:
+        for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
+            corner[k] = max(corner[k], deep)
     first = np.cumsum([0] + [len(loop) for loop in loops])
     nodes, source = [], []
     for k in range(len(loops)):
-        n_edges = len(loops[k])
+        n_edges, span = len(loops[k]), spans[k]
         for i in range(n_edges):
             edge = first[k] + i
             fractions = _side(
                 length[edge],
-                size,
-                _corner_layers(corner[edge], layers),
-                _corner_layers(corner[first[k] + (i + 1) % n_edges], layers),
+                span / settings.elements_per_side,
+                corner[edge],
+                corner[first[k] + (i + 1) % n_edges],
                 ratio,
             )
-            line = _with_mouths(edges[edge], fractions, mouths, ratio, layers, span)
+            line = _with_mouths(edges[edge], fractions, mouths, ratio, span)
             nodes.append(np.stack([line[:-1], line[1:]], axis=1))
             source.append(np.full(len(line) - 1, edge))
     pairs = np.concatenate(nodes)
@@ -144,8 +154,8 @@ def _side(length: float, size: float, layers_start: int, layers_end: int, ratio:
     return np.array([0.0, *(f / n for f in fine), 1.0])
 
 
-def _with_mouths(edge, fractions, mouths, ratio, layers, span) -> np.ndarray:
-    """(n, 2) points along an ``edge`` with mouths as nodes, graded; elsewhere as without them."""
+def _with_mouths(edge, fractions, mouths, ratio, span) -> np.ndarray:
+    """(n, 2) points along an ``edge`` with ``mouths`` (point, layers) as nodes, graded; elsewhere as without them."""
     a, b = edge
     along = b - a
     length = math.hypot(*along)
@@ -153,14 +163,14 @@ def _with_mouths(edge, fractions, mouths, ratio, layers, span) -> np.ndarray:
     points[0], points[-1] = a, b
     fractions = list(fractions)
     here = []
-    for mouth in mouths:
+    for mouth, layers in mouths:
         rel = mouth - a
         f = float(rel @ along) / length**2
         off = abs(rel[0] * along[1] - rel[1] * along[0]) / length
         # At a corner there is nothing to split.
         if off <= 1e-7 * span and 1e-7 * span < f * length < length - 1e-7 * span:
-            here.append((f, mouth))
-    for f, mouth in sorted(here, key=lambda pair: pair[0]):
+            here.append((f, mouth, layers))
+    for f, mouth, layers in sorted(here, key=lambda mark: mark[0]):
         k = int(np.searchsorted(fractions, f))
         cell = fractions[k] - fractions[k - 1]
         for end in (k, k - 1):

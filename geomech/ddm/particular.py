@@ -53,14 +53,15 @@ class Particular:
 
 
 def edge_densities(edges: np.ndarray, particular: Particular) -> np.ndarray:
-    """(m, 2, 3) monomials of −σ_p n (n outward) along every edge (m, 2, 2), local components."""
+    """(m, 2, 3) monomials of −σ_p n (n outward, the uniform part included) along every edge (m, 2, 2), local
+    components."""
     a, b = edges[:, 0], edges[:, 1]
     d = b - a
     t = d / np.hypot(*d.T)[:, None]
     out = np.column_stack([t[:, 1], -t[:, 0]])
     values = []
     for x in (a, 0.5 * (a + b), b):
-        s = particular.stress_of_force(x)
+        s = particular.stress(x)
         f = -np.column_stack([s[:, 0] * out[:, 0] + s[:, 2] * out[:, 1], s[:, 2] * out[:, 0] + s[:, 1] * out[:, 1]])
         values.append(np.stack([np.sum(f * t, axis=1), -np.sum(f * out, axis=1)], axis=1))
     lo, mid, hi = values

@@ -10,11 +10,13 @@ import numpy as np
 from ..conventions import normal_of
 from ..model import OPEN, SLIP, CrackFaces
 from . import shapes
+from .boundary import middle_of
 from .faces import settle
 from .influence import add_fields
 from .loads import BodyLoad
-from .particular import Particular, edge_densities
-from .unit_loads import OFF, onto_boundary
+from .particular import Particular
+from .placing import OFF, onto_boundary
+from .reactions import Reactions, reactions
 
 if TYPE_CHECKING:
     from .body import Body
@@ -84,17 +86,35 @@ class Solution:
         boundary_load: np.ndarray,
         face_load: np.ndarray,
         solves: int,
+        imposed: np.ndarray,
+        edge_density: np.ndarray | None,
     ):
         self.body, self.load, self.solves = body, load, solves
         self.closed = closed
         self._particular, self._eliminated = particular, eliminated
         self._w, self._traction = jumps, traction
-        self._boundary_load, self._face_load = boundary_load, face_load
+        self._boundary_load, self._face_load, self._imposed = boundary_load, face_load, imposed
+        self._edge_density = edge_density
+
+    @cached_property
+    def _x(self) -> np.ndarray:
+        """(n_unknowns,) the boundary's unknowns: 2μ times its displacement, reactions where it is held."""
+        return -self._eliminated - self.body._w @ self._w
 
     @cached_property
     def _u(self) -> np.ndarray:
-        """(n_unknowns,) 2μ times the displacement of the boundary."""
-        return -self._eliminated - self.body._w @ self._w
+        """(n_unknowns,) 2μ times the displacement of the boundary, without the particular field's."""
+        return self._on_supports[0]
+
+    @cached_property
+    def _on_supports(self) -> tuple[np.ndarray, np.ndarray]:
+        holds = self.body._outside.holds
+        return (self._x, np.zeros(0)) if holds is None else holds.split(self._x, self._imposed)
+
+    @cached_property
+    def reactions(self) -> Reactions:
+        """What the supports do to the body: tractions along them and their resultants."""
+        return reactions(self.body, self._on_supports[1], self._particular)
 
     @cached_property
     def states(self) -> np.ndarray:
@@ -140,7 +160,7 @@ class Solution:
     @cached_property
     def crack_strain(self) -> np.ndarray:
         """(3,) mean strain of the cracks, (1/A) Σ ∫ sym(n ⊗ [u]) ds, engineering shear. ValueError without outline."""
-        if not self.body.loops:
+        if not self.body.outlined:
             raise ValueError("the mean strain of cracks needs a body with an outline")
         return self.body.strain_weights @ self._w
 
@@ -150,8 +170,8 @@ class Solution:
         body = self.body
         # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
         follows = body._w @ self._w if self._w.size else np.zeros_like(self._u)
-        on_boundary = body._outside.times(self._u + follows, lifted=follows) + self._boundary_load
-        on_faces = body._schur @ self._w + body._cg @ (self._u + follows) + self._face_load - self._traction
+        on_boundary = body._outside.times(self._x + follows, lifted=follows) + self._boundary_load
+        on_faces = body._schur @ self._w + body._cg @ (self._x + follows) + self._face_load - self._traction
         scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
         return left / scale if scale else left
@@ -172,8 +192,8 @@ class Solution:
         return self._total(points)[0]
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) displacement at ``points`` (n, 2), m. The mean displacement and mean rotation of the outline are zero; in
-        the infinite plane cracks add to the uniform strain about the origin."""
+        """(n, 2) displacement at ``points`` (n, 2), m. What no support holds of the mean displacement and mean
+        rotation of the outline is zero; in the infinite plane cracks add to the uniform strain about the origin."""
         return self.fields(points)[1]
 
     def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -191,16 +211,22 @@ class Solution:
 
         def add(start, end, kind, density, tol, force):
             add_fields(where, start, end, kind, density, nu, tol, 1.0, force, stress, shift)
+            if force:
+                shift[:] += _kelvin_constant(start, end, density, nu)
 
         for elements, values in ((body.boundary, self._u), (body.faces, self._w)):
             if elements.n:
                 add(elements.start, elements.end, elements.kind, elements.densities(values), body._tol, False)
+        if body.supports:
+            held = body._outside.holds.sources
+            add(held.start, held.end, held.kind, held.densities(self._on_supports[1]), body._tol, True)
         if self.load.segments is not None and len(self.load.segments):
             start, end, density = self._line_forces
             add(start, end, np.zeros(len(start), np.int64), density, 2 * OFF * body._extent, True)
-        if self._particular.force.any() or self._particular.gradient.any():
-            edges, density = body.mesh.edges, edge_densities(body.mesh.edges, self._particular)
-            add(edges[:, 0], edges[:, 1], np.zeros(len(edges), np.int64), density, body._tol, True)
+        if self._edge_density is not None:
+            edges = body.mesh.edges
+            kind = np.zeros(len(edges), np.int64)
+            add(edges[:, 0], edges[:, 1], kind, self._edge_density, body._tol, True)
         shift /= 2 * body.material.shear_modulus
         return stress + self._particular.stress(where), shift + self._particular.displacement(where)
 
@@ -209,7 +235,7 @@ class Solution:
         body = self.body
         start, end, density = [], [], []
         for k, (segment, ends) in enumerate(zip(self.load.segments, self.load.tractions)):
-            (a, b), against = onto_boundary(body.mesh.edges, segment, k, body._extent)
+            (a, b), against, _ = onto_boundary(body.mesh.edges, segment, f"load segment {k}", body._extent)
             ends = ends[::-1] if against else ends
             t = (b - a) / np.hypot(*(b - a))
             local = ends @ np.column_stack([t, normal_of(t)])
@@ -251,24 +277,38 @@ class Solution:
 
     @cached_property
     def _motion(self) -> np.ndarray:
-        """(3,) mean displacement (2) and rotation of the outline before it is taken out."""
+        """(3,) mean displacement (2) and rotation of the outline, as far as no support resists them, before they are
+        taken out; about the body's centroid."""
         body, g = self.body, self.body.boundary
-        if not g.n:
+        if not body.outlined:
             return np.zeros(3)
         here = np.flatnonzero(body.mesh.edge_loop[g.source] == 0)
         u = self._u.reshape(g.n, 2, g.per)[here] / (2 * body.material.shear_modulus)
         x, ds = g.nodes[here], g.quadrature[here]
         total = u[:, 0, :, None] * g.tangent[here, None] + u[:, 1, :, None] * g.normal[here, None]
         total = total + self._particular.displacement(x.reshape(-1, 2)).reshape(x.shape)
-        perimeter = ds.sum()
+        perimeter, middle, radius = middle_of(g.take(here))
         mean = np.einsum("ej,ejc->c", ds, total) / perimeter
-        middle = np.einsum("ej,ejc->c", ds, x) / perimeter
         rel = x - middle
         turn = np.einsum("ej,ej->", ds, rel[..., 0] * total[..., 1] - rel[..., 1] * total[..., 0])
-        turn /= np.einsum("ej,ejc,ejc->", ds, rel, rel)
-        # Given about the body's centroid, as the field is.
+        turn /= perimeter * radius**2
+        free = body._outside.free_motions
+        if free is not None:
+            ways = free.combinations
+            *mean, turn = ways @ (ways.T @ np.array([*mean, turn * radius]))
+            turn /= radius
         arm = body.centroid - middle
         return np.array([mean[0] - turn * arm[1], mean[1] + turn * arm[0], turn])
+
+
+def _kelvin_constant(start: np.ndarray, end: np.ndarray, density: np.ndarray, nu: float) -> np.ndarray:
+    """(2,) 2μ times the translation by which line forces in their own frames differ from Kelvin's solution.
+
+    The kernels have −y²/r² for his x²/r² = 1 − y²/r², which moves every element by a constant along itself; without it the
+    plane would not be at rest far away.
+    """
+    along = (end - start) * (density[:, 0] @ (shapes.moments()[shapes.ORDINARY, : density.shape[2]]))[:, None]
+    return along.sum(axis=0) / (8 * np.pi * (1 - nu))
 
 
 def _rigid(motion: np.ndarray, centre: np.ndarray, points: np.ndarray) -> np.ndarray:

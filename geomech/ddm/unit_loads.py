@@ -12,9 +12,8 @@ from .influence import ElementSet, line_forces, project_jumps
 from .loads import BodyLoad
 from .mesh import Mesh
 from .particular import Particular, edge_densities
+from .placing import OFF, onto_boundary
 
-#: A load segment may stand this far off the boundary, in units of the extent; it is put onto it.
-OFF = 1e-6
 #: Loads on so many different segments are remembered.
 _REMEMBERED = 400
 
@@ -24,33 +23,44 @@ class UnitLoad:
 
     Loads that come again are ``answered`` once and then only scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹ g, of
     which ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against`` whether they were
-    given against the boundary's direction.
+    given against the boundary's direction; or ``densities`` (m, 2, 3, columns) are what acts on the m edges of the body.
     """
 
-    def __init__(self, applied: np.ndarray, segment: np.ndarray | None = None, against: bool = False):
-        self.applied, self.segment, self.against = applied, segment, against
+    def __init__(
+        self,
+        applied: np.ndarray,
+        segment: np.ndarray | None = None,
+        against: bool = False,
+        densities: np.ndarray | None = None,
+    ):
+        self.applied, self.segment, self.against, self.densities = applied, segment, against, densities
         self.eliminated: np.ndarray | None = None
         self.answered: np.ndarray | None = None
         self.used = False
 
 
 class UnitLoads:
-    """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `kernels` for ``tol``."""
+    """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `kernels` for ``tol``.
 
-    def __init__(self, mesh: Mesh, centroid: np.ndarray, material: Material, tol: float, extent: float):
+    ``outlined``: whether the first loop is an outline; if not, all are holes in the infinite plane.
+    """
+
+    def __init__(self, mesh: Mesh, centroid: np.ndarray, material: Material, tol: float, extent: float, outlined: bool):
         self.mesh, self.boundary, self.faces = mesh, mesh.boundary, mesh.cracks
         self.centroid, self.material, self.nu = centroid, material, material.effective_poissons_ratio
         self.tol, self.extent = tol, extent
+        n_loops = int(mesh.edge_loop.max()) + 1 if len(mesh.edges) else 0
+        self.in_plane, self.n_holes = not outlined, n_loops - outlined
         self._segments: dict[bytes, UnitLoad] = {}
-        self._forces: UnitLoad | None = None
+        self._on_edges: dict[str | int, UnitLoad] = {}
         self._recent: list[bytes] = []
 
     def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
         """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old numbers."""
         n_g = self.boundary.n_unknowns
-        if old._forces is not None:
-            self._forces = self._unit_forces(old._forces.applied[:n_g])
-            self._forces.eliminated = old._forces.eliminated
+        for name, before in old._on_edges.items():
+            self._on_edges[name] = self._edge_load(name, before.applied[:n_g])
+            self._on_edges[name].eliminated = before.eliminated
         keys = [key for key in old._recent if key in old._segments]
         if not keys:
             return
@@ -71,10 +81,19 @@ class UnitLoads:
     def of(self, load: BodyLoad, particular: Particular) -> list[tuple[UnitLoad, np.ndarray]]:
         """The unit loads of which ``load`` is made and their sizes."""
         units = self._unit_segments(load)
+        sizes: dict[str | int, np.ndarray] = {}
         if particular.force.any() or particular.gradient.any():
-            if self._forces is None:
-                self._forces = self._unit_forces()
-            units.append((self._forces, np.concatenate([particular.force, particular.gradient.ravel()])))
+            sizes["force"] = np.concatenate([particular.force, particular.gradient.ravel()])
+        if len(self.mesh.edges) and self.in_plane and particular.uniform.any():
+            sizes["remote"] = particular.uniform
+        for hole, pressure in enumerate(load.hole_pressures(self.n_holes)):
+            size = np.array([pressure.at(self._centre(hole)), *pressure.gradient])
+            if size.any():
+                sizes[hole] = size
+        for name, size in sizes.items():
+            if name not in self._on_edges:
+                self._on_edges[name] = self._edge_load(name)
+            units.append((self._on_edges[name], size))
         return units
 
     def add(
@@ -131,7 +150,9 @@ class UnitLoads:
             if len(self._segments) > _REMEMBERED:
                 self._segments.clear()
                 return self._unit_segments(load)
-            placed = [onto_boundary(self.mesh.edges, load.segments[k], k, self.extent) for k in missing]
+            placed = [
+                onto_boundary(self.mesh.edges, load.segments[k], f"load segment {k}", self.extent)[:2] for k in missing
+            ]
             straight = np.array([segment for segment, _ in placed])
             parts = (self._linear_forces(targets, straight) for targets in (self.boundary, self.faces))
             for k, (segment, against), *rows in zip(missing, placed, *parts):
@@ -154,43 +175,48 @@ class UnitLoads:
         out = np.einsum("nmce,mcx->mnex", by_end, turn)
         return np.ascontiguousarray(out.reshape(len(segments), targets.n_unknowns, 4))
 
-    def _unit_forces(self, on_boundary: np.ndarray | None = None) -> UnitLoad:
-        """The six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy of size one; ``on_boundary`` if it is known already."""
-        one = np.eye(6)
-        units = [Particular(self.centroid, e[:2], e[2:].reshape(2, 2), np.zeros(3), self.material) for e in one]
-        densities = np.column_stack([edge_densities(self.mesh.edges, unit).ravel() for unit in units])
+    def _hole(self, number: int) -> np.ndarray:
+        """Edges of a hole."""
+        return np.flatnonzero(self.mesh.edge_loop == number + (0 if self.in_plane else 1))
+
+    def _centre(self, number: int) -> np.ndarray:
+        return self.mesh.edges[self._hole(number), 0].mean(axis=0)
+
+    def _edge_load(self, name: str | int, on_boundary: np.ndarray | None = None) -> UnitLoad:
+        """What acts on whole edges; ``on_boundary`` if it is known already.
+
+        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy; "remote": the three stresses of the infinite plane,
+        which its holes leave without traction; a number: pressure in that hole, constant and growing with x and with y
+        from its centre.
+        """
         a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
+        points = self.faces.nodes.reshape(-1, 2)
+        if isinstance(name, int):
+            densities = np.zeros((len(a), 2, 3, 3))
+            here, centre = self._hole(name), self._centre(name)
+            # The normal of an edge points into the rock, as pressure does.
+            densities[here, 1, 0, 0] = 1.0
+            for k in (0, 1):
+                densities[here, 1, 0, k + 1] = 0.5 * (a + b)[here, k] - centre[k]
+                densities[here, 1, 1, k + 1] = 0.5 * (b - a)[here, k]
+            inside = np.zeros((self.faces.n_unknowns, 3))
+        else:
+            none, size = np.zeros(2), 6 if name == "force" else 3
+            units = [
+                Particular(self.centroid, e[:2], e[2:].reshape(2, 2), np.zeros(3), self.material)
+                if name == "force"
+                else Particular(self.centroid, none, np.zeros((2, 2)), e, self.material)
+                for e in np.eye(size)
+            ]
+            densities = np.stack([edge_densities(self.mesh.edges, unit) for unit in units], axis=-1)
+            inside = np.column_stack([on_elements(self.faces, unit.stress(points)) for unit in units])
 
         def from_edges(targets: ElementSet) -> np.ndarray:
             forces = line_forces(targets, a, b, 2, self.nu, self.tol, -1.0)
-            return forces.reshape(targets.n_unknowns, 6 * len(a)) @ densities
+            return forces.reshape(targets.n_unknowns, 6 * len(a)) @ densities.reshape(6 * len(a), -1)
 
-        points = self.faces.nodes.reshape(-1, 2)
-        inside = np.column_stack([on_elements(self.faces, unit.stress_of_force(points)) for unit in units])
         first = from_edges(self.boundary) if on_boundary is None else on_boundary
-        return UnitLoad(np.concatenate([first, from_edges(self.faces) + inside]))
-
-
-def onto_boundary(edges: np.ndarray, segment: np.ndarray, number: int, extent: float) -> tuple[np.ndarray, bool]:
-    """``segment`` (2, 2) put onto the one of ``edges`` (m, 2, 2) it lies on, and whether it runs against that edge.
-
-    Raises ValueError naming the segment by its ``number`` when it is off by more than a millionth of ``extent``, or has no
-    length.
-    """
-    a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
-    length = np.hypot(*d.T)
-    rel = segment[None] - a[:, None]
-    s = np.einsum("ijc,ic->ij", rel, d) / length[:, None] ** 2
-    clipped = np.clip(s, 0.0, 1.0)
-    foot = a[:, None] + clipped[..., None] * d[:, None]
-    off = np.hypot(*np.moveaxis(foot - segment, 2, 0)).max(axis=1)
-    at = int(np.argmin(off))
-    if off[at] > OFF * extent:
-        raise ValueError(f"load segment {number} lies {off[at]:.3g} m off the boundary of the body")
-    if abs(s[at, 1] - s[at, 0]) * length[at] <= 1e-14 * extent:
-        raise ValueError(f"load segment {number} has no length")
-    against = bool(s[at, 1] < s[at, 0])
-    return (foot[at][::-1] if against else foot[at]), against
+        return UnitLoad(np.concatenate([first, from_edges(self.faces) + inside]), densities=densities)
 
 
 def on_elements(c: ElementSet, stress: np.ndarray) -> np.ndarray:

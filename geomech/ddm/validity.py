@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..model import Cracks
@@ -11,39 +13,58 @@ from ..model.polygon import signed_area
 _SMALL = 1e-9
 
 
-def check_outline(loops: list[np.ndarray]) -> list[np.ndarray]:
-    """The loops as float arrays. Raises ValueError naming the loop: shape, finiteness, repeated vertices, sense of
-    rotation (outline counter-clockwise, holes clockwise), crossing edges."""
-    out = []
-    for k, loop in enumerate(loops):
-        name = "the outline" if k == 0 else f"hole {k}"
-        loop = np.array(loop, dtype=float)
-        if loop.ndim != 2 or loop.shape[1] != 2 or len(loop) < 3:
-            raise ValueError(f"{name}: expected at least three vertices (n, 2), got shape {loop.shape}")
-        if not np.isfinite(loop).all():
-            raise ValueError(f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not finite")
-        step = np.roll(loop, -1, axis=0) - loop
-        span = np.ptp(loop, axis=0).max()
-        short = np.hypot(*step.T) <= _SMALL * span
-        if short.any():
-            at = int(np.flatnonzero(short)[0])
-            raise ValueError(f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide")
+def outlined(loops: list[np.ndarray]) -> bool:
+    """Whether the first loop is an outline; if not, all are holes in the infinite plane."""
+    return bool(loops) and signed_area(loops[0]) > 0
+
+
+def check_outline(loops: list[np.ndarray], holes: Sequence[np.ndarray] = ()) -> list[np.ndarray]:
+    """``loops`` (an outline and its holes, or none) and further ``holes``, which may run either way, as float arrays.
+
+    Raises ValueError naming the loop: shape, finiteness, repeated vertices, sense of rotation (outline counter-clockwise,
+    holes clockwise), crossing edges, holes outside the outline or in each other.
+    """
+    out = [_checked(loop, "the outline" if k == 0 else f"hole {k}") for k, loop in enumerate(loops)]
+    for k, loop in enumerate(out):
+        if k == 0 and signed_area(loop) <= 0:
+            raise ValueError("the outline: vertices must run counter-clockwise and enclose an area")
+        if k and signed_area(loop) >= 0:
+            raise ValueError(f"hole {k}: the vertices of a hole must run clockwise")
+    bounded = len(out) > 0
+    for k, hole in enumerate(holes, max(len(out), 1)):
+        loop = _checked(hole, f"hole {k}")
         area = signed_area(loop)
-        if k == 0 and area <= 0:
-            raise ValueError(f"{name}: vertices must run counter-clockwise and enclose an area")
-        if k and area >= 0:
-            raise ValueError(f"{name}: the vertices of a hole must run clockwise")
-        out.append(loop)
+        if area == 0:
+            raise ValueError(f"hole {k}: encloses no area")
+        out.append(loop[::-1].copy() if area > 0 else loop)
     if out:
         edges = np.concatenate([np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in out])
         where = _crossings(edges, edges, upper=True)
         if len(where):
             i, j = where[0]
             raise ValueError(f"the outline crosses itself: edges {i} and {j} near {_near(edges[i])}")
-        for k, hole in enumerate(out[1:], 1):
-            if not inside(out[:1], hole).all():
-                raise ValueError(f"hole {k}: not inside the outline")
+    first_hole = 1 if bounded else 0
+    for k, hole in enumerate(out[first_hole:], 1):
+        if bounded and not inside(out[:1], hole).all():
+            raise ValueError(f"hole {k}: not inside the outline")
+        for m, other in enumerate(out[first_hole:], 1):
+            if m != k and not inside([other], hole[:1]).all():
+                raise ValueError(f"hole {k}: inside hole {m}")
     return out
+
+
+def _checked(loop: np.ndarray, name: str) -> np.ndarray:
+    loop = np.array(loop, dtype=float)
+    if loop.ndim != 2 or loop.shape[1] != 2 or len(loop) < 3:
+        raise ValueError(f"{name}: expected at least three vertices (n, 2), got shape {loop.shape}")
+    if not np.isfinite(loop).all():
+        raise ValueError(f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not finite")
+    step = np.roll(loop, -1, axis=0) - loop
+    short = np.hypot(*step.T) <= _SMALL * np.ptp(loop, axis=0).max()
+    if short.any():
+        at = int(np.flatnonzero(short)[0])
+        raise ValueError(f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide")
+    return loop
 
 
 def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fresh: np.ndarray | None = None) -> None:
@@ -104,7 +125,7 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
 
 
 def inside(loops: list[np.ndarray], points: np.ndarray) -> np.ndarray:
-    """(n,) whether points lie inside the outline and outside the holes (even–odd rule)."""
+    """(n,) whether points lie inside the outline, if there is one, and outside the holes (even–odd rule)."""
     points = np.asarray(points, dtype=float)
     count = np.zeros(len(points), int)
     for loop in loops:
@@ -113,7 +134,7 @@ def inside(loops: list[np.ndarray], points: np.ndarray) -> np.ndarray:
         spans = (a[..., 1] > y) != (b[..., 1] > y)
         rise = np.where(spans, b[..., 1] - a[..., 1], 1.0)
         count += (spans & (x < a[..., 0] + (y - a[..., 1]) * (b[..., 0] - a[..., 0]) / rise)).sum(axis=0)
-    return count % 2 == 1
+    return count % 2 == (1 if outlined(loops) else 0)
 
 
 def _near(segment) -> str:
