@@ -6,7 +6,12 @@ import numpy as np
 
 
 class Factor:
-    """LU of a square row-major ``matrix`` (left as it is). Raises LinAlgError, with ``what``, when it is singular."""
+    """LU of a square row-major ``matrix`` (left as it is), its rows brought to one size. Raises LinAlgError, with
+    ``what``, when it is singular.
+
+    Tractions on an element go with one over its length: unscaled, elements of very different lengths would look singular.
+    Scales are powers of two, so that no bit of the solution depends on them.
+    """
 
     def __init__(self, matrix: np.ndarray, what: str):
         from scipy.linalg import lapack
@@ -16,10 +21,14 @@ class Factor:
         if self.n == 0:
             self.rcond = 1.0
             return
+        size = np.abs(matrix).sum(axis=1)
+        if not np.isfinite(size).all():
+            raise np.linalg.LinAlgError(f"{what} (not finite)")
+        self._scale = np.ldexp(1.0, -np.frexp(size)[1])
         # LAPACK is column-major: factor the transpose, which is the same memory, and solve the transposed system.
-        transposed = np.ascontiguousarray(matrix).T
-        self._lu, self._pivots, info = lapack.dgetrf(transposed)
-        norm = np.abs(matrix).sum(axis=1).max()
+        transposed = (matrix * self._scale[:, None]).T
+        self._lu, self._pivots, info = lapack.dgetrf(transposed, overwrite_a=True)
+        norm = (size * self._scale).max()
         self.rcond = lapack.dgecon(self._lu, norm, norm="1")[0] if info == 0 else 0.0
         if not self.rcond > 1e-15:
             raise np.linalg.LinAlgError(f"{what} (reciprocal condition {self.rcond:.1e})")
@@ -28,4 +37,5 @@ class Factor:
         """Solution for ``right`` (n,) or (n, k)."""
         if self.n == 0 or right.size == 0:
             return np.zeros_like(right)
-        return self._solve(self._lu, self._pivots, right, trans=1)[0]
+        scaled = right * (self._scale if right.ndim == 1 else self._scale[:, None])
+        return self._solve(self._lu, self._pivots, scaled, trans=1, overwrite_b=True)[0]
