@@ -3,7 +3,7 @@
 Each criterion takes K_I and K_II of many tips, (n,) Pa √m, and the material, and returns ``(angle, k_eq)``: the growth
 angle from the crack's own direction (rad, counter-clockwise, so that a positive K_II gives a negative angle) and the
 equivalent stress intensity factor that is held against K_Ic. A tip that no tensile kink can leave has k_eq = 0 and
-angle 0. K_I may be negative: a slot that cannot close carries a compressive K_I and still kinks in tension to the side.
+angle 0 (the F-criterion knows kinks that shear besides). K_I may be negative: a slot that cannot close carries a compressive K_I and still kinks in tension to the side.
 """
 
 from __future__ import annotations
@@ -83,6 +83,38 @@ def maximum_energy_release_rate(
     return angle, k_eq
 
 
+def largest_relative_release_rate(k_i: np.ndarray, k_ii: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """F-criterion (Shen & Stephansson 1993): the kink with the largest F = G_I/G_Ic + G_II/G_IIc, with K_eq = √F K_Ic.
+
+    So F = (k_1/K_Ic)² + (k_2/K_IIc)² with the factors k_1, k_2 of an infinitesimal kink (`kink_factors`); a kink that
+    closes (k_1 < 0) has only its second part. K_IIc = K_Ic makes it the energy criterion, an infinite K_IIc that of
+    the largest k_1. What presses on the faces of a closed kink (friction, stress along the crack) does not come in: for a
+    kink of no length it vanishes beside k_1 and k_2. Kinks beyond 126° are not considered.
+    """
+    k_i, k_ii = _tips(k_i, k_ii)
+    share = material.k_ic / material.k_iic if np.isfinite(material.k_iic) else 0.0
+
+    def factors(tip: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, ...]:
+        f, slope = _series(theta, _KINK), _series(theta, _KINK_SLOPE)
+        a, b = k_i[tip], k_ii[tip]
+        return (
+            np.maximum(f[..., 0] * a + f[..., 1] * b, 0.0),
+            share * (f[..., 2] * a + f[..., 3] * b),
+            slope[..., 0] * a + slope[..., 1] * b,
+            share * (slope[..., 2] * a + slope[..., 3] * b),
+        )
+
+    def rising(tip: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        k_1, k_2, dk_1, dk_2 = factors(tip, theta)
+        return k_1 * dk_1 + k_2 * dk_2
+
+    angle, k_eq = np.zeros(len(k_i)), np.zeros(len(k_i))
+    tip, theta = _turning_points(rising, len(k_i), _KINK_GRID)
+    k_1, k_2, _, _ = factors(tip, theta)
+    _keep_best(angle, k_eq, tip, theta, np.hypot(k_1, k_2))
+    return angle, k_eq
+
+
 def minimum_strain_energy_density(k_i: np.ndarray, k_ii: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
     """Sih (1974): the tip turns to a local minimum of S = a11 K_I² + 2 a12 K_I K_II + a22 K_II².
 
@@ -124,6 +156,7 @@ CRITERIA: dict[str, Criterion] = {
     "mts": maximum_tangential_stress,
     "g": maximum_energy_release_rate,
     "s": minimum_strain_energy_density,
+    "f": largest_relative_release_rate,
 }
 
 

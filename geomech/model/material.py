@@ -10,10 +10,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Material:
-    """An isotropic linear elastic material with a fracture toughness.
+    """An isotropic linear elastic material with fracture toughnesses, and a strength where it is still whole.
 
     ``density`` kg/m³, ``youngs_modulus`` Pa, ``k_ic`` Pa √m (infinite: cracks in it do not grow), ``plane`` either
-    "strain" or "stress". Raises ValueError, naming the material, on constants that no elastic solid has.
+    "strain" or "stress". ``k_iic`` Pa √m is the toughness against growth in shear, asked for by the F-criterion alone;
+    ``tensile_strength`` Pa, ``cohesion`` Pa and ``friction_angle`` rad (Mohr–Coulomb) are those of intact rock, asked for
+    where cracks may be born. What is infinite does not fail. Raises ValueError, naming the material, on constants
+    that no elastic solid has.
     """
 
     name: str
@@ -22,6 +25,10 @@ class Material:
     density: float = 0.0
     k_ic: float = math.inf
     plane: str = "strain"
+    k_iic: float = math.inf
+    tensile_strength: float = math.inf
+    cohesion: float = math.inf
+    friction_angle: float = 0.0
 
     def __post_init__(self) -> None:
         def refuse(what: str) -> None:
@@ -35,6 +42,16 @@ class Material:
             refuse(f"density must not be negative, got {self.density!r} kg/m³")
         if not self.k_ic > 0:
             refuse(f"fracture toughness must be positive, got {self.k_ic!r} Pa √m")
+        if not self.k_iic > 0:
+            refuse(f"fracture toughness in mode II must be positive, got {self.k_iic!r} Pa √m")
+        if math.isinf(self.k_ic) and math.isfinite(self.k_iic):
+            refuse("a toughness in mode II needs one in mode I beside it")
+        if not self.tensile_strength > 0:
+            refuse(f"tensile strength must be positive, got {self.tensile_strength!r} Pa")
+        if not self.cohesion > 0:
+            refuse(f"cohesion of intact rock must be positive, got {self.cohesion!r} Pa")
+        if not 0 <= self.friction_angle < math.pi / 2:
+            refuse(f"friction angle must be from 0 to below π/2, got {self.friction_angle!r} rad")
         if self.plane not in ("strain", "stress"):
             refuse(f'plane must be "strain" or "stress", got {self.plane!r}')
 

@@ -52,6 +52,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
                 density=m.density_kg_m3,
                 k_ic=m.k_ic_pa_sqrt_m if m.k_ic_pa_sqrt_m is not None and tables.growth.enabled else math.inf,
                 plane=m.plane,
+                k_iic=m.k_iic_pa_sqrt_m if m.k_iic_pa_sqrt_m is not None and tables.growth.enabled else math.inf,
             )
             for name, m in tables.materials.items()
         ),

@@ -95,6 +95,9 @@ class MaterialTable(Table):
     k_ic_pa_sqrt_m: Positive | None = Field(
         None, description="fracture toughness in mode I, Pa √m; needed where cracks may grow"
     )
+    k_iic_pa_sqrt_m: Positive | None = Field(
+        None, description='toughness against growth in shear, Pa √m, for growth.criterion = "f" (unset: no such growth)'
+    )
     plane: Literal["strain", "stress"] = Field("strain", description='"strain" or "stress" in the plane')
 
 
@@ -236,10 +239,10 @@ class DdmTable(Table):
 
 class GrowthTable(Table):
     enabled: bool = Field(True, description="false: cracks open and slide, none grows")
-    criterion: Literal["mts", "g", "s"] = Field(
+    criterion: Literal["mts", "g", "s", "f"] = Field(
         "mts",
         description='growth criterion: "mts" maximum tangential stress, "g" maximum energy release rate, "s" minimum '
-        "strain-energy density",
+        'strain-energy density, "f" tension and shear, each against its own toughness',
     )
     increment_m: Positive | None = Field(
         None, description="longest advance of a tip in a cycle, m (unset: a tenth of the shortest crack)"

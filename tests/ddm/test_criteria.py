@@ -171,3 +171,45 @@ def test_bad_input_is_refused():
             criterion([1.0], [math.nan], ROCK)
         with pytest.raises(ValueError, match="one length"):
             criterion([1.0, 2.0], [1.0], ROCK)
+
+
+def rock_with(shear_toughness):
+    return Material("rock", 17e9, 0.21, k_ic=2e6, k_iic=shear_toughness)
+
+
+def test_f_criterion_with_equal_toughnesses_is_the_energy_criterion():
+    """G_I/G_c + G_II/G_c = G/G_c, wherever the energy criterion finds an opening kink."""
+    k_i, k_ii = mixed_loads(200, opening=True)
+    angle, k_eq = CRITERIA["f"](k_i, k_ii, rock_with(2e6))
+    same, k_same = CRITERIA["g"](k_i, k_ii, ROCK)
+    np.testing.assert_allclose(k_eq, k_same, rtol=1e-13)
+    np.testing.assert_allclose(angle, same, atol=1e-12)
+
+
+def test_f_criterion_tells_shear_from_tension_by_the_toughnesses():
+    """Pure mode II. Straight on, F = (K_II/K_IIc)²; to the side, where k_2 vanishes, F = (1.23 K_II/K_Ic)²: at 77° by the
+    expansion (75.6° where G is largest, 1.51 K_II²/E'). So a tip shears straight on below K_IIc = K_Ic/1.23."""
+    tough, weak = rock_with(6e6), rock_with(1e6)
+    angle, k_eq = CRITERIA["f"]([0.0], [1e6], tough)
+    assert math.degrees(angle[0]) == pytest.approx(-76.5, abs=1.0) and k_eq[0] == pytest.approx(1.23e6, rel=5e-3)
+    angle, k_eq = CRITERIA["f"]([0.0], [1e6], weak)
+    assert angle[0] == pytest.approx(0.0, abs=1e-12) and k_eq[0] == pytest.approx(2e6, rel=1e-13)
+    # Just at the toughness, whatever the criterion's name for it: F = 1.
+    _, k_eq = CRITERIA["f"]([0.0, -3e6], [1e6, 1e6], weak)
+    assert k_eq[1] >= k_eq[0] * (1 - 1e-12)  # a slot pressed together still shears
+    turns = [float(CRITERIA["f"]([0.0], [1.0], rock_with(k))[1][0]) for k in (1e6, 1.5e6, 2e6, 4e6)]
+    assert turns == sorted(turns, reverse=True)
+
+
+def test_f_criterion_is_the_largest_f_of_all_kinks():
+    """Against brute force over the expansion on a fine grid."""
+    k_i, k_ii = mixed_loads(100)
+    rock = rock_with(3e6)
+    _, k_eq = CRITERIA["f"](k_i, k_ii, rock)
+    theta = np.radians(np.linspace(-126, 126, 5041))
+    k = np.einsum("tij,jn->itn", kink_factors(theta), np.stack([k_i, k_ii]))
+    brute = np.hypot(np.maximum(k[0], 0.0), k[1] * 2 / 3)
+    inside = (brute.argmax(axis=0) > 0) & (brute.argmax(axis=0) < len(theta) - 1)
+    # The grid misses a maximum by less than 0.025°, of which the square counts.
+    np.testing.assert_allclose(k_eq[inside], brute.max(axis=0)[inside], rtol=1e-6)
+    assert inside.mean() > 0.9

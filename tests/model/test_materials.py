@@ -47,6 +47,11 @@ def test_out_of_plane_stress_keeps_the_plane_plane():
         {"k_ic": 0.0},
         {"k_ic": math.nan},
         {"plane": "axial"},
+        {"k_ic": 1e6, "k_iic": 0.0},
+        {"k_iic": 1e6},
+        {"tensile_strength": -1.0},
+        {"cohesion": math.nan},
+        {"friction_angle": 1.6},
     ],
 )
 def test_impossible_materials_are_refused(wrong):
