@@ -4,7 +4,10 @@
     sol = body.solve(ddm.BodyLoad(remote_stress=[0, 1e6, 0]))
     sol.tips["k_i"], sol.faces.opening, sol.stress(points), sol.displacement(points)
 
-`criteria` say where a tip goes, `growth` takes it there.
+`criteria` say where a tip goes, `growth` takes it there, and `propagate` does both again and again:
+
+    for step in ddm.propagate(loops, cracks, material, load, control="toughness"):
+        step.load_factor, step.cracks, step.tips, step.solution
 """
 
 from importlib import import_module
@@ -18,6 +21,7 @@ _PUBLIC = {
     "Support": ".supports",
     "NotConverged": ".faces",
     "Solution": ".solution",
+    "propagate": ".propagation",
 }
 _MODULES = ("criteria", "growth", "shapes")
 
@@ -31,6 +35,7 @@ __all__ = [
     "Support",
     "criteria",
     "growth",
+    "propagate",
     "shapes",
 ]
 

@@ -71,7 +71,10 @@ class Chords:
         if first:
             # Faces that close make the condition jump; secants must not run away across the jump.
             ends = np.stack([angle - OUTSIDE * rest, angle + (1 + OUTSIDE) * rest])
-            self.lowest, self.highest = np.nanmin(ends, axis=0, initial=np.inf), np.nanmax(ends, axis=0, initial=-np.inf)
+            self.lowest, self.highest = (
+                np.nanmin(ends, axis=0, initial=np.inf),
+                np.nanmax(ends, axis=0, initial=-np.inf),
+            )
         tips["angle"][known] = np.clip(angle - rest / slope, self.lowest, self.highest)[known]
         # A first look that turns on the way the trial did needs no second one: the path is smooth.
         unsettled = off & (rest * self.start < 0) if first else off

@@ -1,0 +1,242 @@
+"""Cracks that grow in one elastic body, without blocks: solve, ask the criterion, advance, again.
+
+    for step in ddm.propagate([], cracks, rock, ddm.BodyLoad(remote_stress=[0, 1e6, 0]), control="toughness"):
+        print(step.load_factor, step.cracks.lengths.sum(), step.tips["k_i"])
+
+Under a fixed load tips advance while their K_eq is at least K_Ic. Under a controlled one the load follows the cracks:
+every step stands at the load factor at which the most driven tip has just K_eq = K_Ic, so that growth is quasi-static
+whether the factor rises (stable) or falls (it would run away under a dead load).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import TIP, Cracks, DdmSettings, Event, GrowthSettings, Material
+from .body import Body
+from .criteria import CRITERIA
+from .growth import Growth, advance
+from .loads import BodyLoad
+from .path import corrected
+from .solution import Solution
+
+#: Under a controlled load, tips driven within this part of the most driven one grow with it: K at a graded kink is
+#: right to some 1e-3, and of two tips that are images of one another both should go.
+TOGETHER = 0.01
+#: The controlled load is good when the drive is off one by less than this.
+PRECISION = 1e-9
+#: And this is as near to one as a search that ends beside a jump of the drive (faces that close) must come to grow.
+SETTLED = 1e-6
+#: How much the factor is raised while nothing is driven enough, and how often.
+WIDER, RAISES = 4.0, 12
+
+#: The load at a factor, of the cracks as they then are: per-segment pressures need them.
+Loading = Callable[[float, Cracks], BodyLoad]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One network under one load, and how it went on.
+
+    number       0, 1, 2 …
+    load_factor  1 under a fixed load
+    cracks       the network that was solved
+    solution     its solution; None where cracks cut a part off and nothing holds it (the last step then)
+    tips         TIP rows with the criterion's ``k_eq`` and the ``angle`` that was followed; ``grown`` m
+    growth       the network after this step and what tips met on the way; None when none grew (the last step)
+    events       initiation, coalescence, self, daylighting; arrest or split in the last step
+    """
+
+    number: int
+    load_factor: float
+    cracks: Cracks
+    solution: Solution | None
+    tips: np.ndarray
+    growth: Growth | None
+    events: tuple[Event, ...]
+
+
+def propagate(
+    loops: Sequence[np.ndarray],
+    cracks: Cracks,
+    material: Material,
+    load: BodyLoad | Loading,
+    growth: GrowthSettings | None = None,
+    settings: DdmSettings | None = None,
+    *,
+    control: str = "load",
+    max_steps: int = 200,
+    max_factor: float = math.inf,
+    **body,
+) -> Iterator[Step]:
+    """Grow ``cracks`` in the body with outline ``loops`` ([] the infinite plane), one `Step` an increment.
+
+    ``load``: a `BodyLoad`, or ``load(factor, cracks)`` that gives one. ``control``: "load" holds the factor at 1 until no tip
+    is driven; "toughness" finds in every step the factor, starting from the last one, at which the largest K_eq/K_Ic is
+    one. A `BodyLoad` is then multiplied as a whole; with a function, part of the load can stand (in-situ stress) while
+    another rises, and where K does not rise steadily with the factor, some crossing of one is found, not always the
+    first. The run ends with the event "arrest" when nothing grows (or the factor would pass ``max_factor``), "split" when
+    cracks have cut off a part that nothing holds, or after ``max_steps``. ``body``: further arguments of `Body`. Raises
+    ValueError on an unknown control or criterion, and what `Body` and its ``solve`` raise.
+    """
+    if control not in ("load", "toughness"):
+        raise ValueError(f'control must be "load" or "toughness", got {control!r}')
+    growth = GrowthSettings() if growth is None else growth
+    if growth.criterion not in CRITERIA:
+        raise ValueError(f"no growth criterion {growth.criterion!r}; there are {', '.join(CRITERIA)}")
+    run = _Run(list(loops), material, load, growth, settings, body, control == "toughness", max_factor)
+    return run.steps(cracks, max_steps)
+
+
+class _Run:
+    """What stays the same from step to step, and the body, load factor and solution that the last one left."""
+
+    def __init__(self, loops, material, load, growth, settings, options, controlled, max_factor):
+        self.loops, self.material, self.load, self.growth = loops, material, load, growth
+        self.settings, self.options = settings, options
+        self.controlled, self.max_factor = controlled, max_factor
+        self.factor = 1.0
+        self.body: Body | None = None
+        self.solution: Solution | None = None
+        self.number = 0
+
+    def steps(self, cracks: Cracks, max_steps: int) -> Iterator[Step]:
+        for self.number in range(max_steps):
+            try:
+                self.body = self._body(cracks, self.body)
+                self.solution, tips, drive = self._settled()
+            except np.linalg.LinAlgError as failure:
+                if not self.number:
+                    raise
+                at = cracks.nodes.mean(axis=0)
+                lost = self._event("split", at, str(failure))
+                yield Step(self.number, self.factor, cracks, None, np.empty(0, TIP), None, (lost,))
+                return
+            growth = self._grow(tips, drive)
+            events = self._events(cracks, tips, growth)
+            yield Step(self.number, self.factor, cracks, self.solution, tips, growth, events)
+            if growth is None:
+                return
+            cracks = growth.cracks
+
+    def _body(self, cracks: Cracks, previous: Body | None) -> Body:
+        return Body(self.loops, cracks, self.material, self.settings, previous=previous, **self.options)
+
+    # -- load ----------------------------------------------------------------------------------------------------
+
+    def _load_at(self, factor: float, cracks: Cracks) -> BodyLoad:
+        if callable(self.load):
+            return self.load(factor, cracks)
+        return self.load if factor == 1.0 else times(self.load, factor)
+
+    def _solve(self, body: Body, factor: float) -> tuple[Solution, np.ndarray]:
+        solution = body.solve(self._load_at(factor, body.cracks), warm=self.solution)
+        tips = solution.tips.copy()
+        tips["angle"], tips["k_eq"] = CRITERIA[self.growth.criterion](tips["k_i"], tips["k_ii"], self.material)
+        return solution, tips
+
+    def _drive(self, factor: float) -> tuple[Solution, np.ndarray, float]:
+        """Solution, tips and the largest K_eq/K_Ic at a load factor."""
+        solution, tips = self._solve(self.body, factor)
+        return solution, tips, float(np.max(tips["k_eq"], initial=0.0)) / self.material.k_ic
+
+    def _settled(self) -> tuple[Solution, np.ndarray, float]:
+        """Solution, tips and drive at the load of this step, which sets the factor."""
+        if not self.controlled:
+            return self._drive(1.0)
+        found = None
+
+        def excess(factor: float) -> float:
+            nonlocal found
+            found, self.factor = self._drive(factor), factor
+            return found[2] - 1
+
+        def settled() -> bool:
+            return abs(found[2] - 1) <= PRECISION
+
+        low = high = None
+        factor = min(self.factor or 1.0, self.max_factor)
+        for _ in range(2):
+            rest = excess(factor)
+            low, high = (factor, high) if rest < 0 else (low, factor)
+            if settled():
+                return found
+            # Exact where everything scales with the factor.
+            factor = min(factor / found[2] if found[2] > 0 else WIDER * factor, self.max_factor)
+        if low is None:
+            if excess(0.0) >= 0:
+                return found  # what stands without the factor drives them already
+            low = 0.0
+        for _ in range(RAISES):
+            if high is not None or low >= self.max_factor:
+                break
+            factor = min(WIDER * low, self.max_factor)
+            low, high = (factor, None) if excess(factor) < 0 else (low, factor)
+        if high is None:
+            return found
+        from scipy.optimize import brentq
+
+        factor = brentq(excess, low, high, xtol=1e-15 * high, rtol=1e-13)
+        excess(factor)
+        return found
+
+    # -- growth --------------------------------------------------------------------------------------------------
+
+    def _grow(self, tips: np.ndarray, drive: float) -> Growth | None:
+        if drive < (1 - SETTLED if self.controlled else 1):
+            return None
+        cracks, body, cycle = self.body.cracks, self.body, self.number + 1
+        threshold = self.material.k_ic * ((1 - TOGETHER) * drive if self.controlled else 1.0)
+
+        def grow() -> Growth:
+            return advance(cracks, lambda block: self.loops, tips, self.growth, np.full(len(tips), threshold), cycle)
+
+        def look_ahead(tried: Cracks) -> np.ndarray:
+            self.body = self._body(tried, self.body)
+            return self._solve(self.body, self.factor)[1]
+
+        growth = corrected(tips, grow, look_ahead, cycle, self.growth.correct)
+        if growth is None:
+            self.body = body
+        else:
+            tips["grown"] = growth.grown
+        return growth
+
+    # -- events --------------------------------------------------------------------------------------------------
+
+    def _events(self, cracks: Cracks, tips: np.ndarray, growth: Growth | None) -> tuple[Event, ...]:
+        if growth is None:
+            at = tips["point"][np.argmax(tips["k_eq"])] if len(tips) else np.zeros(2)
+            return (self._event("arrest", at, "no tip is driven any more"),)
+        events = []
+        born = dict(zip(cracks.segments.ravel().tolist(), np.repeat(cracks.birth_cycle, 2).tolist()))
+        for tip in tips[growth.grown > 0]:
+            if born[int(tip["node"])] == 0:
+                events.append(self._event("initiation", tip["point"], f"{cracks.names[tip['crack']]} starts to grow"))
+        for join in growth.joins:
+            other = cracks.names[join.other_crack] if join.other_crack >= 0 else "the surface"
+            events.append(self._event(join.kind, join.point, f"{cracks.names[join.crack]} meets {other}"))
+        return tuple(events)
+
+    def _event(self, kind: str, point, detail: str) -> Event:
+        return Event(kind, self.number, 0.0, self.factor, (float(point[0]), float(point[1])), detail)
+
+
+def times(load: BodyLoad, factor: float) -> BodyLoad:
+    """``load``, every part of it multiplied. Raises ValueError when a part is no number or array of numbers: such a load is
+    given as a function of the factor."""
+    where = {"segments", "about"}
+    scaled = {}
+    for field in dataclasses.fields(load):
+        value = getattr(load, field.name)
+        if value is None or field.name in where:
+            continue
+        if not np.issubdtype(np.asarray(value).dtype, np.number):
+            raise ValueError(f"{field.name} cannot be multiplied: give the load as a function of the load factor")
+        scaled[field.name] = factor * np.asarray(value, dtype=float)
+    return dataclasses.replace(load, **scaled)

@@ -1,0 +1,129 @@
+"""Growth in one body without blocks, against closed forms of a straight crack that lengthens."""
+
+import math
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from geomech import ddm
+from geomech.ddm.propagation import times
+from geomech.model import Cracks, GrowthSettings, Material
+
+ROCK = Material("rock", 17e9, 0.21, k_ic=1e6)
+HALF = 10e-3
+#: A straight crack of ordinary elements between two tip elements of one increment: K to 2e-4 (three increments on).
+STRAIGHT = 3e-4
+
+
+def straight(aperture=math.inf):
+    return Cracks.from_polylines([[[-HALF, 0.0], [HALF, 0.0]]], aperture=aperture)
+
+
+def half_length(step):
+    return float(step.cracks.lengths.sum()) / 2
+
+
+def test_controlled_load_follows_griffith():
+    """σ√(πa) = K_Ic at every length; the load that is found drives the tips to 1e-9 of K_Ic."""
+    load = ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0])
+    growth = GrowthSettings(increment=2e-3)
+    steps = list(ddm.propagate([], straight(), ROCK, load, growth, control="toughness", max_steps=8))
+    assert [s.number for s in steps] == list(range(8))
+    for k, step in enumerate(steps):
+        assert half_length(step) == pytest.approx(HALF + k * 2e-3, rel=1e-12)
+        assert step.tips["k_eq"] == pytest.approx(ROCK.k_ic, rel=1e-7)
+        assert step.load_factor == pytest.approx(1.0 / math.sqrt(math.pi * half_length(step)), rel=STRAIGHT)
+    assert [e.kind for e in steps[0].events] == ["initiation", "initiation"]
+    assert not any(s.events for s in steps[1:])
+
+
+def test_a_load_that_wedges_the_crack_open_arrests_it():
+    """Pressure on the first length only: K = 2p √(a/π) arcsin(a₀/a) falls with a (Tada, Paris & Irwin 1973, 5.11), so that
+    under a dead load the crack runs to where that is K_Ic, and stops there within an increment."""
+    pressure = 12e6
+
+    def wedged(factor, cracks):
+        return ddm.BodyLoad(crack_pressure=factor * pressure * (cracks.birth_cycle == 0))
+
+    increment = 1e-3
+    steps = list(ddm.propagate([], straight(), ROCK, wedged, GrowthSettings(increment=increment), max_steps=150))
+    assert [e.kind for e in steps[-1].events] == ["arrest"] and steps[-1].growth is None
+
+    def toughness(a):
+        return 2 * pressure * math.sqrt(a / math.pi) * math.asin(HALF / a)
+
+    a = half_length(steps[-1])
+    assert len(steps) > 5
+    assert toughness(a) < ROCK.k_ic < toughness(a - increment)
+    for step in steps[3::5]:
+        assert step.tips["k_i"] == pytest.approx(toughness(half_length(step)), rel=5e-4)
+    # Driven on, it needs more and more.
+    driven = list(ddm.propagate([], straight(), ROCK, wedged, GrowthSettings(), control="toughness", max_steps=6))
+    factors = [s.load_factor for s in driven]
+    assert factors[1:] == sorted(factors[1:])
+
+
+def test_part_of_the_load_can_stand():
+    """A closed crack under compression that fluid opens: p = σ + K_Ic/√(πa)."""
+
+    def pumped(factor, cracks):
+        return ddm.BodyLoad(remote_stress=[-20e6, -10e6, 0.0], crack_pressure=factor * 1e6)
+
+    for step in ddm.propagate([], straight(0.0), ROCK, pumped, GrowthSettings(), control="toughness", max_steps=5):
+        excess = ROCK.k_ic / math.sqrt(math.pi * half_length(step))
+        assert step.load_factor * 1e6 - 10e6 == pytest.approx(excess, rel=STRAIGHT)
+
+
+def test_what_stands_may_be_enough():
+    def pulled(factor, cracks):
+        return ddm.BodyLoad(remote_stress=[0.0, (10 + factor) * 1e6, 0.0])
+
+    step = next(ddm.propagate([], straight(), ROCK, pulled, control="toughness"))
+    assert step.load_factor == 0.0 and step.tips["k_eq"][0] > ROCK.k_ic and step.growth is not None
+
+
+def test_a_load_that_drives_nothing_ends_the_run():
+    press = ddm.BodyLoad(remote_stress=[0.0, -1e6, 0.0])
+    (only,) = ddm.propagate([], straight(0.0), ROCK, press, control="toughness")
+    assert only.growth is None and [e.kind for e in only.events] == ["arrest"]
+    pull = ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0])
+    (only,) = ddm.propagate([], straight(), ROCK, pull, control="toughness", max_factor=2.0)
+    assert only.load_factor == 2.0 and only.growth is None
+
+
+def test_a_strip_is_torn_in_two():
+    strip = np.array([[-0.03, -0.06], [0.03, -0.06], [0.03, 0.06], [-0.03, 0.06]])
+    load = ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0])
+    *_, before, last = ddm.propagate(
+        [strip], straight(), ROCK, load, GrowthSettings(increment=4e-3), control="toughness"
+    )
+    assert [e.kind for e in before.events] == ["daylighting", "daylighting"]
+    assert last.solution is None and [e.kind for e in last.events] == ["split"]
+    assert last.cracks.surface.sum() == 2 and last.cracks.lengths.sum() == pytest.approx(0.06, rel=1e-12)
+
+
+def test_bad_wishes_are_refused():
+    load = ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0])
+    with pytest.raises(ValueError, match="control"):
+        next(ddm.propagate([], straight(), ROCK, load, control="displacement"))
+    with pytest.raises(ValueError, match="no growth criterion 'x'; there are mts"):
+        next(ddm.propagate([], straight(), ROCK, load, GrowthSettings(criterion="x")))
+
+
+def test_a_load_is_multiplied_but_not_where_it_acts():
+    edge = np.array([[[0.0, 0.0], [1.0, 0.0]]])
+    load = ddm.BodyLoad(segments=edge, tractions=edge + 1, body_force=[0, 2.0], about=[3.0, 4.0], crack_pressure=5.0)
+    twice = times(load, 2.0)
+    np.testing.assert_array_equal(twice.segments, edge)
+    np.testing.assert_array_equal(twice.about, [3, 4])
+    np.testing.assert_array_equal(twice.tractions, 2 * (edge + 1))
+    np.testing.assert_array_equal(twice.body_force, [0, 4])
+    assert twice.crack_pressure == 10.0 and twice.remote_stress is None
+
+
+def test_steps_can_be_taken_one_at_a_time():
+    load = ddm.BodyLoad(remote_stress=[0.0, 8e6, 0.0])
+    first, second = islice(ddm.propagate([], straight(), ROCK, load, GrowthSettings(), settings=None), 2)
+    assert second.cracks is first.growth.cracks
+    assert second.solution.body.counts["elements_new"] < second.solution.body.counts["elements"]
