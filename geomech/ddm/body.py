@@ -21,18 +21,16 @@ from ..model import TIP, Cracks, DdmSettings, Material
 from ..model.polygon import area_moments
 from . import shapes
 from .boundary import BoundarySystem
-from .factor import Factor
+from .crack_system import CrackSystem
+from .faces import settle_faces
 from .influence import ElementSet, influence, reuse
 from .loads import BodyLoad, check_equilibrium
 from .mesh import Mesh, mesh, outline_edges
 from .particular import Particular
-from .solution import Solution, settle_faces
+from .solution import Solution
 from .supports import Holds, Support, called, marks, place, values_at
 from .unit_loads import UnitLoads, on_elements
 from .validity import check_cracks, check_outline, outlined
-
-#: Reciprocal condition of S below which contact is not built on its inverse.
-_SAFE = 1e-11
 
 
 class Body:
@@ -132,11 +130,9 @@ class Body:
         def schur(r, k):
             return cc(r, k) - self._cg[c.unknowns(r)] @ self._w[:, c.unknowns(k)]
 
-        self._schur = reuse(old._schur if same_boundary else None, c_old, c_old, c, c, schur)
-        self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
-        self._column_at = np.full(c.n_unknowns, -1)
-        self._columns = np.empty((c.n_unknowns, 0))
-        self._closed_now: tuple[bytes, np.ndarray, Factor] | None = None
+        self.crack_system = CrackSystem(
+            reuse(old.crack_system.matrix if same_boundary else None, c_old, c_old, c, c, schur)
+        )
         self._loads = UnitLoads(self.mesh, self.centroid, self.material, tol, self._extent, self.outlined)
         if same_boundary:
             self._loads.inherit(old._loads, c_old)
@@ -192,80 +188,11 @@ class Body:
             imposed = self._imposed(load, particular)
             rest += np.concatenate([self._outside.known @ imposed, self._c_known @ imposed])
         units = self._loads.of(load, particular)
-        g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self._opened)
+        g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
         w, closed, traction, solves = settle_faces(self, reduced, opened, load.crack_pressure, warm)
         on_edges = [np.tensordot(unit.densities, size, 1) for unit, size in units if unit.densities is not None]
         edge_density = sum(on_edges) if on_edges else None
         return Solution(self, load, particular, y, w, closed, traction, g, r, solves, imposed, edge_density)
-
-    def _free_factor(self, closed: np.ndarray) -> tuple[np.ndarray, Factor]:
-        """Free unknowns (indices) and factors of S restricted to them, ``closed`` (n_unknowns,) bool fixed."""
-        key = np.packbits(closed).tobytes()
-        if key not in self._factors:
-            if len(self._factors) >= 8:
-                self._factors.pop(next(iter(self._factors)))
-            free = np.flatnonzero(~closed)
-            matrix = self._schur if len(free) == len(closed) else self._schur[np.ix_(free, free)]
-            self._factors[key] = free, Factor(matrix, "cracks cut a part of the body off")
-        return self._factors[key]
-
-    @cached_property
-    def _open_factor(self) -> Factor | None:
-        """Factors of S with all faces open; None when only closed faces hold a part of the body."""
-        try:
-            factor = Factor(self._schur, "cracks cut a part of the body off")
-        except np.linalg.LinAlgError:
-            return None
-        return factor if factor.rcond > _SAFE else None
-
-    def _opened(self, right: np.ndarray) -> np.ndarray:
-        """S⁻¹ ``right``; zeros where it is not to be used (no `_open_factor`)."""
-        return np.zeros_like(right) if self._open_factor is None else self._open_factor.solve(np.asfortranarray(right))
-
-    def _inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
-        """(n_unknowns, len(unknowns)) columns of S⁻¹; they outlast the load."""
-        missing = unknowns[self._column_at[unknowns] < 0]
-        if len(missing):
-            right = np.zeros((self.faces.n_unknowns, len(missing)), order="F")
-            right[missing, np.arange(len(missing))] = 1.0
-            self._column_at[missing] = self._columns.shape[1] + np.arange(len(missing))
-            self._columns = np.hstack([self._columns, self._open_factor.solve(right)])
-        return self._columns[:, self._column_at[unknowns]]
-
-    def _closed_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
-        """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; mostly the same faces stay closed for long."""
-        key = at.tobytes()
-        if self._closed_now is None or self._closed_now[0] != key:
-            columns = self._inverse_columns(at)
-            factor = Factor(columns[at], "closed faces leave a part of the body without hold")
-            self._closed_now = key, columns, factor
-        return self._closed_now[1:]
-
-    def constrained(
-        self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray, opened: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Jumps w (n,) or (n, k) with w = ``fixed`` where ``closed``, S w = ``right`` elsewhere, and what is missing in
-        the closed rows, right − S w. ``opened``: S⁻¹ right, if it is known.
-
-        One factorisation serves all contact states: closing k nodes is a k × k system in columns of S⁻¹. Raises
-        LinAlgError when cracks cut a part off and closed faces do not hold it.
-        """
-        at = np.flatnonzero(closed)
-        reaction = np.zeros_like(right)
-        if self._open_factor is not None:
-            w = self._open_factor.solve(right) if opened is None else opened.copy()
-            if len(at):
-                columns, factor = self._closed_columns(at)
-                reaction[at] = factor.solve(w[at] - fixed[at])
-                w -= columns @ reaction[at]
-                w[at] = fixed[at]
-            return w, reaction
-        free, factor = self._free_factor(closed)
-        w = np.zeros_like(right)
-        w[at] = fixed[at]
-        w[free] = factor.solve((right - self._schur @ w)[free])
-        reaction[at] = (right - self._schur @ w)[at]
-        return w, reaction
 
     @cached_property
     def tip_elements(self) -> tuple[np.ndarray, ...]:
@@ -324,7 +251,7 @@ class Body:
             return np.zeros((3, 3))
         closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
         right = np.column_stack([-on_elements(self.faces, unit) for unit in np.eye(3)])
-        response = self.strain_weights @ self.constrained(right, closed, np.zeros_like(right))[0]
+        response = self.strain_weights @ self.crack_system.constrained(right, closed, np.zeros_like(right))[0]
         return 0.5 * (response + response.T)
 
 

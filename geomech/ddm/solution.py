@@ -11,7 +11,6 @@ from ..conventions import normal_of
 from ..model import OPEN, SLIP, CrackFaces
 from . import shapes
 from .boundary import middle_of
-from .faces import settle
 from .influence import add_fields
 from .loads import BodyLoad
 from .particular import Particular
@@ -27,44 +26,6 @@ _NUDGE = 0.02
 #: Nearer to an end than this part of that distance a point is the end itself; from farther off it is moved on the way it
 #: stands, so that of two faces that meet at a kink each is looked at from its own side.
 _AT_END = 1e-6
-
-
-def settle_faces(
-    body: Body, load_traction: np.ndarray, opened: np.ndarray, pressure: np.ndarray | float, warm: Solution | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Slip and opening (times 2μ), closed unknowns (bool), traction on the faces and the number of solves; ``opened`` is
-    S⁻¹ ``load_traction``."""
-    c = body.faces
-    n = c.n_unknowns
-    if n == 0:
-        return np.zeros(0), np.zeros(0, bool), np.zeros(0), 0
-    pressure = np.broadcast_to(np.asarray(pressure, dtype=float), (body.cracks.n_segments,))
-    applied = np.zeros((c.n, 2, c.per))
-    applied[:, 1] = -pressure[c.source, None]
-    applied = applied.ravel()
-    right = applied - load_traction
-    opened = body._opened(applied) - opened if applied.any() else -opened
-    aperture, can_close, fixed = body.closing
-    stress_scale = max(float(np.abs(right).max()), np.finfo(float).tiny)
-    gap_scale = stress_scale * float(c.length.max())
-    state: dict[str, np.ndarray] = {}
-
-    def respond(closed):
-        w, reaction = body.constrained(right, closed, fixed, opened)
-        state["w"], state["traction"] = w, applied - reaction
-        return (w + aperture) / gap_scale, reaction / stress_scale
-
-    closed = np.zeros(n, bool)
-    if not can_close.any():
-        respond(closed)
-        return state["w"], closed, state["traction"], 1
-    if warm is not None:
-        at = c.found_in(warm.body.faces)
-        rows = np.zeros((c.n, 2 * c.per), bool)
-        rows[at >= 0] = warm.closed.reshape(-1, 2 * c.per)[at[at >= 0]]
-        closed = rows.ravel()
-    closed, solves = settle(respond, can_close, closed)
-    return state["w"], closed, state["traction"], solves
 
 
 class Solution:
@@ -171,7 +132,9 @@ class Solution:
         # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
         follows = body._w @ self._w if self._w.size else np.zeros_like(self._u)
         on_boundary = body._outside.times(self._x + follows, lifted=follows) + self._boundary_load
-        on_faces = body._schur @ self._w + body._cg @ (self._x + follows) + self._face_load - self._traction
+        on_faces = (
+            body.crack_system.matrix @ self._w + body._cg @ (self._x + follows) + self._face_load - self._traction
+        )
         scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
         return left / scale if scale else left
@@ -180,8 +143,7 @@ class Solution:
     def condition(self) -> float:
         """Estimated condition number of the matrices solved with, the worse one."""
         body = self.body
-        factor = body._open_factor or body._free_factor(self.closed)[1]
-        return 1.0 / min(factor.rcond, body._outside.factor.rcond)
+        return 1.0 / min(body.crack_system.rcond(self.closed), body._outside.factor.rcond)
 
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
