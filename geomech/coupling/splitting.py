@@ -441,6 +441,7 @@ def _remaining(cracks: Cracks, fate: np.ndarray, holder: np.ndarray) -> Cracks:
         aperture=cracks.aperture[rows],
         surface=(cracks.surface | on_wall)[unique[:, 0]],
         names=cracks.names,
+        law=cracks.law[rows],
     )
 
 

@@ -23,6 +23,7 @@ class Row:
     block: int
     birth_cycle: int
     aperture: float
+    law: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +58,14 @@ class Network:
         self.nodes: list[Point] = [tuple(p) for p in cracks.nodes.tolist()]
         self.surface: list[bool] = cracks.surface.tolist()
         self.rows = [
-            Row(*ends, crack, block, birth, aperture)
-            for ends, crack, block, birth, aperture in zip(
+            Row(*ends, crack, block, birth, aperture, law)
+            for ends, crack, block, birth, aperture, law in zip(
                 cracks.segments.tolist(),
                 cracks.crack.tolist(),
                 cracks.block.tolist(),
                 cracks.birth_cycle.tolist(),
                 cracks.aperture.tolist(),
+                cracks.law.tolist(),
             )
         ]
         self._at: list[list[Row]] = [[] for _ in self.nodes]
@@ -196,14 +198,14 @@ class Network:
         last = self._at[tip][0]
         onward = last.end == tip
         ends = (tip, node) if onward else (node, tip)
-        row = Row(*ends, last.crack, last.block, self.cycle, 0.0)
+        row = Row(*ends, last.crack, last.block, self.cycle, 0.0, last.law)
         self._insert(self.rows.index(last) + onward, row)
 
     def split(self, row: Row, node: int) -> None:
         """Divide ``row`` at ``node``; both halves keep what it was."""
         at = self.rows.index(row)
         self._remove(row)
-        kept = (row.crack, row.block, row.birth_cycle, row.aperture)
+        kept = (row.crack, row.block, row.birth_cycle, row.aperture, row.law)
         self._insert(at, Row(row.start, node, *kept))
         self._insert(at + 1, Row(node, row.end, *kept))
 
@@ -245,6 +247,7 @@ class Network:
             aperture=np.array([row.aperture for row in self.rows], dtype=float),
             surface=np.array(self.surface, dtype=bool)[used],
             names=self.names,
+            law=np.array([row.law for row in self.rows], dtype=int),
         )
 
 

@@ -21,6 +21,7 @@ class Cracks:
         aperture      (n_segments,)     initial aperture, m: 0 is a closed crack, inf a slot that never closes
         surface       (n_nodes,)        True where a node lies on its block's boundary (a crack mouth)
         names         tuple of str      one name a crack
+        law           (n_segments,)     the law of its faces, an index among those given to who solves; zeros if left out
 
     A node that ends one segment only and is not on the surface is a *tip*. A node shared by three or more segments,
     or by two cracks, is a junction.
@@ -34,6 +35,11 @@ class Cracks:
     aperture: np.ndarray
     surface: np.ndarray
     names: tuple[str, ...] = ()
+    law: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if self.law is None:
+            object.__setattr__(self, "law", np.zeros(len(self.segments), int))
 
     @classmethod
     def from_polylines(
@@ -44,6 +50,7 @@ class Cracks:
         aperture: Sequence[float] | float = 0.0,
         names: Sequence[str] | None = None,
         surface: Sequence[tuple[bool, bool]] | None = None,
+        law: Sequence[int] | int = 0,
     ) -> Cracks:
         """One crack a polyline (n, 2). Nodes are not shared between cracks: crossing cracks are noded by whoever reads
         the scene. ``surface`` says, crack by crack, which end is a mouth. Raises ValueError naming the crack."""
@@ -51,6 +58,7 @@ class Cracks:
         names = tuple(names) if names is not None else tuple(f"crack {k}" for k in range(n))
         blocks = np.broadcast_to(np.asarray(block, dtype=int), (n,))
         apertures = np.broadcast_to(np.asarray(aperture, dtype=float), (n,))
+        laws = np.broadcast_to(np.asarray(law, dtype=int), (n,))
         nodes, segments, crack, mouth = [], [], [], []
         first = 0
         for k, line in enumerate(polylines):
@@ -81,6 +89,7 @@ class Cracks:
             aperture=apertures[crack] if n else np.empty(0),
             surface=np.concatenate(mouth) if n else np.empty(0, bool),
             names=names,
+            law=laws[crack] if n else np.empty(0, int),
         )
 
     @property
@@ -123,4 +132,5 @@ class Cracks:
             aperture=self.aperture[segments],
             surface=self.surface[used],
             names=self.names,
+            law=self.law[segments],
         )

@@ -33,6 +33,7 @@ def network(nodes, segments, *, crack=None, block=0, surface=(), names=None):
         aperture=np.linspace(0, 1e-3, n),
         surface=mouths,
         names=names or tuple(f"flaw{k}" for k in range(crack.max() + 1)),
+        law=np.arange(n) % 3,
     )
 
 
@@ -237,6 +238,7 @@ def test_dangling_cracks_go_to_their_child():
     assert after.block.tolist() == [0, 1, 0, 1] and after.crack.tolist() == [1, 2, 3, 4]
     assert after.birth_cycle.tolist() == [2, 3, 4, 5]
     np.testing.assert_array_equal(after.aperture, cracks.aperture[2:])
+    np.testing.assert_array_equal(after.law, cracks.law[2:])
     assert len(after.nodes) == 8  # the node of the two branches is one for each child now
     assert after.surface.sum() == 3 and len(after.tips) == 5
     np.testing.assert_array_equal(split.state.crack_strain, state.crack_strain[[0, 0]])

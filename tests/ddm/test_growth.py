@@ -107,14 +107,16 @@ def test_tips_below_toughness_stand_and_increments_have_a_floor():
     assert nothing.cracks is cracks and not nothing.grown.any()
 
 
-def test_aperture_is_kept_by_the_slot_and_its_halves():
-    cracks = Cracks.from_polylines([[[-2, 0], [2, 0]], [[0, 3], [0, 0.7]]], aperture=[math.inf, 1e-3])
+def test_aperture_and_law_are_kept_by_the_slot_and_its_halves():
+    lines = [[[-2, 0], [2, 0]], [[0, 3], [0, 0.7]]]
+    cracks = Cracks.from_polylines(lines, aperture=[math.inf, 1e-3], law=[1, 2])
     growth = grow(cracks, only(tips_of(cracks), (0, 0.7)))
     after = growth.cracks
     assert after.n_segments == 4
     halves = after.crack == 0
     assert halves.sum() == 2 and np.isinf(after.aperture[halves]).all() and (after.birth_cycle[halves] == 0).all()
     assert sorted(after.aperture[~halves].tolist()) == [0.0, 1e-3]
+    np.testing.assert_array_equal(after.law, 1 + after.crack)  # grown segments have their crack's
 
 
 def test_step_that_would_cross_a_face_stops_at_it():

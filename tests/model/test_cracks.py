@@ -33,12 +33,15 @@ def test_mouths_and_junctions_are_no_tips():
         surface=np.zeros(4, bool),
         names=("a", "b"),
     )
+    assert star.law.tolist() == [0, 0, 0]
     assert star.valence.tolist() == [3, 1, 1, 1] and star.tips.tolist() == [1, 2, 3]
 
 
 def test_part_of_a_network_keeps_what_is_said_of_it():
-    cracks = Cracks.from_polylines([[[0, 0], [1, 0]], [[5, 0], [6, 0], [7, 1]]], block=[0, 2], names=["a", "b"])
+    lines = [[[0, 0], [1, 0]], [[5, 0], [6, 0], [7, 1]]]
+    cracks = Cracks.from_polylines(lines, block=[0, 2], names=["a", "b"], law=[0, 3])
     part = cracks.in_block(2)
+    assert part.law.tolist() == [3, 3]
     np.testing.assert_array_equal(part.nodes, [[5, 0], [6, 0], [7, 1]])
     assert part.segments.tolist() == [[0, 1], [1, 2]] and part.crack.tolist() == [1, 1] and part.names == ("a", "b")
     assert cracks.in_block(1).n_segments == 0
