@@ -145,20 +145,17 @@ _DECLARED = {
 }
 
 
-def conform(
-    series: str, place: str, count: int, arrays: Mapping[str, np.ndarray]
-) -> dict[str, tuple[Field, np.ndarray]]:
-    """``arrays`` as declared: name → (field, contiguous array of the declared dtype and ``count`` rows).
+def declared(series: str, place: str, count: int, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """A dictionary of ``arrays``, which must be those that ``series`` has at ``place``, with ``count`` rows each; vectors
+    in the plane may leave out their third component.
 
     Raises ValueError naming a missing, an undeclared or a wrongly shaped array."""
-    declared = _DECLARED[series, place]
-    if arrays.keys() != declared.keys():
-        missing, extra = sorted(declared.keys() - arrays.keys()), sorted(arrays.keys() - declared.keys())
+    fields = _DECLARED[series, place]
+    if arrays.keys() != fields.keys():
+        missing, extra = sorted(fields.keys() - arrays.keys()), sorted(arrays.keys() - fields.keys())
         raise ValueError(f"{series}: {place} arrays missing {missing}, undeclared {extra}")
-    out = {}
-    for name, field in declared.items():
-        array = np.ascontiguousarray(arrays[name], dtype=field.dtype)
-        if array.shape != (count, *field.shape):
-            raise ValueError(f"{series}: {name} has shape {array.shape}, declared {(count, *field.shape)}")
-        out[name] = (field, array)
-    return out
+    for name, array in arrays.items():
+        shape = (count, *fields[name].shape)
+        if array.shape != shape and not (shape[1:] == (3,) and array.shape == (count, 2)):
+            raise ValueError(f"{series}: {name} has shape {array.shape}, declared {shape}")
+    return dict(arrays)

@@ -16,7 +16,7 @@ from geomech.model.motion import Motion
 
 from .motion import carried, displacement, vertex_velocity
 from .triangulate import Triangles
-from .vtu import LINE, TRIANGLE, VERTEX, Grid, with_z
+from .vtu import LINE, TRIANGLE, VERTEX, Grid
 
 CONFIGURATIONS = ("reference", "current")
 
@@ -33,8 +33,8 @@ def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str,
         offsets=np.arange(3, 3 * len(cells) + 1, 3),
         types=np.full(len(cells), TRIANGLE),
         point_data={
-            "displacement": with_z(state.vertices - blocks.vertices),
-            "velocity": with_z(vertex_velocity(blocks, state)),
+            "displacement": state.vertices - blocks.vertices,
+            "velocity": vertex_velocity(blocks, state),
         },
         cell_data={
             "stress": stress[owner],
@@ -78,7 +78,7 @@ def cracks_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
         offsets=np.arange(2, 2 * len(lines) + 1, 2),
         types=np.full(len(lines), LINE),
         point_data={
-            "displacement": with_z(moved),
+            "displacement": moved,
             **{name: joined(name) for name in ("opening", "slip", "normal_traction", "shear_traction", "state")},
         },
         cell_data={
@@ -100,12 +100,12 @@ def tips_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
     return _cloud(
         tips["point"] if configuration == "reference" else tips["point"] + moved,
         {
-            "displacement": with_z(moved),
+            "displacement": moved,
             "K_I": tips["k_i"],
             "K_II": tips["k_ii"],
             "K_eq": tips["k_eq"],
             "growth_angle": np.degrees(tips["angle"]),
-            "growth_direction": with_z(growth),
+            "growth_direction": growth,
             "grown": tips["grown"],
             "crack_id": tips["crack"],
             "block_id": tips["block"],
@@ -122,8 +122,8 @@ def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
     return _cloud(
         reference if configuration == "reference" else contacts["point"],
         {
-            "displacement": with_z(cycle.state.vertices[contacts["vertex"]] - reference),
-            "force": with_z(force),
+            "displacement": cycle.state.vertices[contacts["vertex"]] - reference,
+            "force": force,
             "normal_force": contacts["normal_force"],
             "shear_force": contacts["shear_force"],
             "gap": contacts["gap"],

@@ -16,7 +16,7 @@ from geomech.model.motion import Motion
 from .grids import principal_stresses, six_components, von_mises
 from .motion import rotation
 from .triangulate import Triangles
-from .vtu import TRIANGLE, Grid, with_z
+from .vtu import TRIANGLE, Grid
 
 #: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
 _ASIDE = 1e-5
@@ -78,7 +78,7 @@ class InteriorMeshes:
             offsets=np.arange(3, 3 * len(cells) + 1, 3),
             types=np.full(len(cells), TRIANGLE),
             point_data={
-                "displacement": with_z(moved),
+                "displacement": moved,
                 "stress": stress,
                 "principal_stress": principal,
                 "von_mises": von_mises(principal),

@@ -14,7 +14,7 @@ from .beside import Beside
 from .fields import SERIES
 from .interior import InteriorMeshes
 from .triangulate import Triangles
-from .vtu import Collection, Grid, write_grid
+from .vtu import Collection, Grid, GridFiles
 
 #: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
 PASS_OFFSET = 1e-6
@@ -44,14 +44,15 @@ class Series:
     def on_start(self, problem: Problem, folder: Path) -> None:
         self._materials = problem.materials
         self._folder = Path(folder)
-        (self._folder / "vtk").mkdir(parents=True, exist_ok=True)
-        # A longer run before this one in the same folder must not leave its last files among ours.
+        self._vtk = self._folder / "vtk"
+        self._vtk.mkdir(parents=True, exist_ok=True)
         for name in SERIES:
             (self._folder / f"{name}.pvd").unlink(missing_ok=True)
-            for old in (self._folder / "vtk").glob(f"{name}_[0-9]*.vtu"):
-                old.unlink()
+        # Files of a run before this one in the same folder are written over.
+        self._old = {path.name for name in SERIES for path in self._vtk.glob(f"{name}_[0-9]*.vtu")}
         names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * bool(self.interior_every)
         self._collections = {name: Collection(self._folder / f"{name}.pvd") for name in names}
+        self._files = {name: GridFiles(name) for name in names}
         self._triangles, self._meshes = Triangles(), InteriorMeshes()
         self._beside = Beside()
         self._time = SeriesTime()
@@ -85,6 +86,9 @@ class Series:
         finally:
             for collection in self._collections.values():
                 collection.close()
+            # A longer run before this one must not leave its last files among ours.
+            for name in self._old:
+                (self._vtk / name).unlink(missing_ok=True)
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
 
@@ -120,15 +124,16 @@ class Series:
         self._save("interior", cycle, at, grid)
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
-        file = f"vtk/{name}_{cycle.number:06d}.vtu"
+        file = f"{name}_{cycle.number:06d}.vtu"
         numbers = {
             "CYCLE": cycle.number,
             "TIME": float(cycle.state.time),
             "LOAD": float(cycle.load),
             "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are the reference ones
         }
-        write_grid(self._folder / file, name, grid, numbers)
-        self._collections[name].add(at, file)
+        self._files[name].write(f"{self._vtk}/{file}", grid, numbers)
+        self._old.discard(file)
+        self._collections[name].add(at, f"vtk/{file}")
 
 
 class SeriesTime:

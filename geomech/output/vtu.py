@@ -15,13 +15,13 @@ import time
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .fields import conform
+from .fields import SERIES, declared
 
 #: Cell types of the VTK file format.
 VERTEX, LINE, TRIANGLE = 1, 3, 5
@@ -39,7 +39,7 @@ _size = struct.Struct("=Q").pack
 class Grid:
     """Points and cells with their arrays.
 
-    ``points`` (n, 2) or (n, 3) m; ``connectivity`` point indices, cell after cell; ``offsets`` (n_cells,) one past each
+    Vectors, the ``points`` (m) too, are (n, 2) or (n, 3); ``connectivity`` point indices, cell after cell; ``offsets`` (n_cells,) one past each
     cell's last index; ``types`` (n_cells,) VTK cell types; ``point_data`` and ``cell_data`` name → array.
     """
 
@@ -51,87 +51,145 @@ class Grid:
     cell_data: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
-def write_grid(path: Path, series: str, grid: Grid, numbers: Mapping[str, float | int]) -> None:
-    """Write ``grid`` as the .vtu file ``path`` of ``series``, with ``numbers`` as field data.
+class GridFiles:
+    """Writes the grids of one ``series`` as .vtu files.
 
-    Raises ValueError when an array is not as `geomech.output.fields` declares it."""
-    n_points, n_cells = len(grid.points), len(grid.types)
-    # Numbers not as text: VTK's parser stops at "nan", which is the load of a scene that has no leading one.
-    columns = [
-        ("FieldData", name, np.array([value], dtype="=i8" if isinstance(value, (int, np.integer)) else "=f8"), ())
-        for name, value in numbers.items()
-    ]
-    for section, place, count, arrays in (
-        ("PointData", "point", n_points, grid.point_data),
-        ("CellData", "cell", n_cells, grid.cell_data),
-    ):
-        for name, (declared, data) in conform(series, place, count, arrays).items():
-            columns.append((section, name, data, declared.components))
-    columns += [
-        ("Points", "Points", with_z(grid.points), ()),
-        ("Cells", "connectivity", np.ascontiguousarray(grid.connectivity, dtype="=i8"), ()),
-        ("Cells", "offsets", np.ascontiguousarray(grid.offsets, dtype="=i8"), ()),
-        ("Cells", "types", np.ascontiguousarray(grid.types, dtype="u1"), ()),
-    ]
-    compress = sum(data.nbytes for _, _, data, _ in columns) > SMALL
-    # The last array comes first: meshio gives arrays new offsets one by one as it reads, in the order of the data, and
-    # would take one of those for the offset of a later array, did it not meet that one first.
-    columns.reverse()
-    packed = [(_compressed if compress else _plain)(data) for _, _, data, _ in columns]
-    layout = tuple((section, name, data.dtype.str[1:], data.shape[1:], names) for section, name, data, names in columns)
-    _put(path, b"".join([_xml(n_points, n_cells, compress, layout, tuple(map(len, packed))), *packed, _TAIL]))
+    From cycle to cycle a small grid mostly keeps its numbers of points and cells: its file is laid out once, and the arrays
+    are put in place.
+    """
+
+    def __init__(self, series: str) -> None:
+        self.series = series
+        self._layout: _Layout | None = None
+
+    def write(self, path: Path | str, grid: Grid, numbers: Mapping[str, float | int]) -> None:
+        """Write ``grid`` as the file ``path``, with ``numbers`` as field data.
+
+        Raises ValueError when an array is not as `geomech.output.fields` declares it."""
+        n_points, n_cells = len(grid.points), len(grid.types)
+        data = declared(self.series, "point", n_points, grid.point_data)
+        data |= declared(self.series, "cell", n_cells, grid.cell_data)
+        # Numbers not as text: VTK's parser stops at "nan", which is the load of a scene that has no leading one.
+        data |= numbers
+        data["Points"], data["connectivity"] = grid.points, grid.connectivity
+        data["offsets"], data["types"] = grid.offsets, grid.types
+        kinds = tuple([(name, "i8" if isinstance(value, (int, np.integer)) else "f8") for name, value in numbers.items()])
+        key = (n_points, n_cells, len(grid.connectivity), kinds)
+        if self._layout is None or self._layout.key != key:
+            self._layout = _Layout(self.series, *key)
+        _put(path, self._layout.filled(data))
 
 
-# From cycle to cycle the text of a small grid mostly stays the same.
-@lru_cache(maxsize=16)
-def _xml(n_points: int, n_cells: int, compressed: bool, layout: tuple, sizes: tuple[int, ...]) -> bytes:
-    """The file up to its data: ``layout`` (section, name, dtype, trailing shape, component names) of every array and
-    ``sizes``, the bytes each takes in the file, both in the order of the data, which is the tags' backwards."""
-    tags: dict[str, list[str]] = {name: [] for name in ("FieldData", "PointData", "CellData", "Points", "Cells")}
-    at = 0
-    for (section, name, dtype, shape, components), size in zip(layout, sizes, strict=True):
-        tuples = 'NumberOfTuples="1" ' if section == "FieldData" else ""
-        attributes = f'type="{_TYPE[dtype]}" Name={quoteattr(name)} format="appended"'
-        attributes += f' NumberOfComponents="{shape[0]}"' if shape else ""
-        attributes += "".join(f' ComponentName{k}="{c}"' for k, c in enumerate(components))
-        tags[section].append(f'<DataArray {tuples}{attributes} offset="{at}"/>\n')
-        at += size
-    text = {name: f"<{name}>\n{''.join(reversed(lines))}</{name}>\n" for name, lines in tags.items()}
-    order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
-    packing = ' compressor="vtkZLibDataCompressor"' if compressed else ""
-    return (
-        '<?xml version="1.0"?>\n'
-        f'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="{order}" header_type="UInt64"{packing}>\n'
-        f"<UnstructuredGrid>\n{text.pop('FieldData')}"
-        f'<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n{"".join(text.values())}</Piece>\n'
-        '</UnstructuredGrid>\n<AppendedData encoding="raw">\n_'
-    ).encode()
+class _Column(NamedTuple):
+    """One array of a file: the tag that holds it, its name, type and shape, and its components' names."""
+
+    section: str
+    name: str
+    dtype: str
+    shape: tuple[int, ...]
+    components: tuple[str, ...] = ()
+
+    @property
+    def nbytes(self) -> int:
+        return math.prod(self.shape) * int(self.dtype[1])
 
 
-def with_z(vectors: np.ndarray) -> np.ndarray:
-    """(n, 2) vectors with a zero third component, as VTK wants them; (n, 3) ones are only made contiguous."""
-    vectors = np.asarray(vectors, dtype="=f8")
-    if vectors.shape[1] == 3:
-        return np.ascontiguousarray(vectors)
-    out = np.zeros((len(vectors), 3))
-    out[:, :2] = vectors
-    return out
+class _Layout:
+    """The file of a grid of so many points, cells and corners, with field data ``numbers`` (name, dtype)."""
+
+    def __init__(self, series: str, n_points: int, n_cells: int, n_corners: int, numbers: tuple) -> None:
+        self.key = (n_points, n_cells, n_corners, numbers)
+        columns = [_Column("FieldData", name, dtype, (1,)) for name, dtype in numbers]
+        for section, place, count in (("PointData", "point", n_points), ("CellData", "cell", n_cells)):
+            columns += [
+                _Column(section, f.name, np.dtype(f.dtype).str[1:], (count, *f.shape), f.components)
+                for f in SERIES[series]
+                if f.place == place
+            ]
+        columns += [
+            _Column("Points", "Points", "f8", (n_points, 3)),
+            _Column("Cells", "connectivity", "i8", (n_corners,)),
+            _Column("Cells", "offsets", "i8", (n_cells,)),
+            _Column("Cells", "types", "u1", (n_cells,)),
+        ]
+        # The last array comes first: meshio gives arrays new offsets one by one as it reads, in the order of the data, and
+        # would take one of those for the offset of a later array, did it not meet that one first.
+        self._columns = columns[::-1]
+        self._compress = sum(c.nbytes for c in columns) > SMALL
+        if not self._compress:
+            self._lay_out()
+
+    def _lay_out(self) -> None:
+        sizes = [8 + c.nbytes for c in self._columns]
+        head = self._head(sizes)
+        self._file = bytearray(head + bytes(sum(sizes)) + _TAIL)
+        self._places = []
+        at = len(head)
+        for column, size in zip(self._columns, sizes, strict=True):
+            self._file[at : at + 8] = _size(column.nbytes)
+            place = np.frombuffer(self._file, column.dtype, math.prod(column.shape), at + 8).reshape(column.shape)
+            self._places.append((column.name, place))
+            at += size
+
+    def filled(self, data: Mapping[str, Any]) -> bytes | bytearray:
+        """The file with the arrays of ``data``, good until it is filled again; vectors may lack their zero third
+        component."""
+        if self._compress:
+            arrays = [np.zeros(c.shape, c.dtype) for c in self._columns]
+            for column, array in zip(self._columns, arrays, strict=True):
+                _fill(array, data[column.name])
+            packed = [_compressed(array) for array in arrays]
+            return b"".join([self._head([len(p) for p in packed]), *packed, _TAIL])
+        for name, place in self._places:
+            _fill(place, data[name])
+        return self._file
+
+    def _head(self, sizes: list[int]) -> bytes:
+        """The file up to its data; ``sizes``: the bytes that each array takes in the file, in the order of the data, which
+        is the tags' backwards."""
+        tags: dict[str, list[str]] = {name: [] for name in ("FieldData", "PointData", "CellData", "Points", "Cells")}
+        at = 0
+        for column, size in zip(self._columns, sizes, strict=True):
+            tuples = 'NumberOfTuples="1" ' if column.section == "FieldData" else ""
+            attributes = f'type="{_TYPE[column.dtype]}" Name="{column.name}" format="appended"'
+            attributes += f' NumberOfComponents="{column.shape[1]}"' if len(column.shape) > 1 else ""
+            attributes += "".join(f' ComponentName{k}="{c}"' for k, c in enumerate(column.components))
+            tags[column.section].append(f'<DataArray {tuples}{attributes} offset="{at}"/>\n')
+            at += size
+        text = {name: f"<{name}>\n{''.join(reversed(lines))}</{name}>\n" for name, lines in tags.items()}
+        order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
+        packing = ' compressor="vtkZLibDataCompressor"' if self._compress else ""
+        n_points, n_cells = self.key[:2]
+        return (
+            '<?xml version="1.0"?>\n'
+            f'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="{order}" header_type="UInt64"{packing}>\n'
+            f"<UnstructuredGrid>\n{text.pop('FieldData')}"
+            f'<Piece NumberOfPoints="{n_points}" NumberOfCells="{n_cells}">\n{"".join(text.values())}</Piece>\n'
+            '</UnstructuredGrid>\n<AppendedData encoding="raw">\n_'
+        ).encode()
 
 
-def _put(path: Path, content: bytes) -> None:
-    """A file of ``content``: three system calls, half of what a buffered file object makes."""
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+def _fill(place: np.ndarray, value: Any) -> None:
+    if place.ndim == 2 and value.shape[1] == 2:
+        place = place[:, :2]
+    place[...] = value
+
+
+def _put(path: Path | str, content: bytes | bytearray) -> None:
+    """A file of ``content``; a file that is there already is written over where it stands.
+
+    Few system calls, a fraction of what a buffered file object takes. To empty a file first costs several times as much as to
+    write over it, and to delete and make thousands anew tens of times (ext4 will not take an inode again that was freed
+    minutes ago, and steps over all of these for every new one).
+    """
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
     try:
-        view = memoryview(content)
-        while view:
-            view = view[os.write(handle, view) :]
+        written = os.write(handle, content)
+        while written < len(content):
+            written += os.write(handle, memoryview(content)[written:])
+        os.ftruncate(handle, written)
     finally:
         os.close(handle)
-
-
-def _plain(data: np.ndarray) -> bytes:
-    """One array as it is, after its size in bytes."""
-    return _size(data.nbytes) + data.tobytes()
 
 
 def _compressed(data: np.ndarray) -> bytes:
@@ -165,7 +223,7 @@ class Collection:
         if not at > self._last:
             raise ValueError(f"{self.path.name}: time {at!r} does not follow {self._last!r}")
         self._last = at
-        self._entries.append(f'<DataSet timestep="{float(at)!r}" part="0" file={quoteattr(file)}/>\n')
+        self._entries.append(f'<DataSet timestep="{float(at)!r}" part="0" file="{escape(file)}"/>\n')
         if time.monotonic() - self._saved >= self.interval:
             self._save()
 

@@ -20,7 +20,7 @@ from geomech.model import TIP, Blocks, CrackFaces, Cracks, Motion, State
 from geomech.output import Series
 from geomech.output.fields import SERIES
 from geomech.output.series import PASS_OFFSET, SeriesTime
-from geomech.output.vtu import SMALL, Collection, Grid, read_collection, write_grid
+from geomech.output.vtu import SMALL, Collection, Grid, GridFiles, read_collection
 
 pv = pytest.importorskip("pyvista")
 
@@ -408,7 +408,7 @@ def test_arrays_of_any_length_survive(tmp_path):
         names = {f.name: rng.random((n, *f.shape)) for f in SERIES["tips"] if f.dtype == "float64"}
         names |= {f.name: rng.integers(0, 99, n) for f in SERIES["tips"] if f.dtype == "int32"}
         grid = Grid(rng.random((n, 2)), np.arange(n), np.arange(n) + 1, np.ones(n), names)
-        write_grid(tmp_path / "tips.vtu", "tips", grid, {"CYCLE": 1})
+        GridFiles("tips").write(tmp_path / "tips.vtu", grid, {"CYCLE": 1})
         assert (b"compressor" in (tmp_path / "tips.vtu").read_bytes()[:200]) == (n > last)
         mesh, other = pv.read(tmp_path / "tips.vtu"), meshio.read(tmp_path / "tips.vtu")
         for name, data in names.items():
@@ -419,7 +419,7 @@ def test_arrays_of_any_length_survive(tmp_path):
 def test_undeclared_and_missing_arrays_are_refused(tmp_path):
     grid = Grid(np.zeros((1, 2)), np.zeros(1), np.ones(1), np.ones(1), {"K_3": np.zeros(1)})
     with pytest.raises(ValueError, match=r"missing.*K_I.*undeclared \['K_3'\]"):
-        write_grid(tmp_path / "tips.vtu", "tips", grid, {})
+        GridFiles("tips").write(tmp_path / "tips.vtu", grid, {})
 
 
 def written_alone(folder: Path, cycle, **options) -> None:
