@@ -1,0 +1,69 @@
+"""Many cracks in the plane: closed forms of periodic arrays, and systems of straight cracks by `dislocations`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from .dislocations import Arm, stack, stress_intensity
+
+
+def collinear_array(stress: float, half_length: float, period: float) -> float:
+    """K_I (and, for a shear, K_II) of cracks 2a in a row, a ``period`` b from middle to middle: σ√(b tan(πa/b))
+    (Westergaard 1939; Irwin 1957)."""
+    return stress * math.sqrt(period * math.tan(math.pi * half_length / period))
+
+
+def stacked_array(half_length: float, period: float, n: int = 65) -> float:
+    """K_I/σ of cracks 2a above one another, a ``period`` h apart, pulled across (computed, `dislocations.stack`); √(h/2)
+    when they are long beside it (Koiter 1959)."""
+    pulled = np.array([0.0, 1.0, 0.0])
+    return float(stress_intensity([Arm(-half_length, half_length)], _uniform(pulled), stack(period), n)[0, 0])
+
+
+def stacked_array_limit(stress: float, period: float) -> float:
+    """K_I = σ√(h/2) of long cracks above one another (Koiter 1959): each strip's strain energy σ²h/2E' is released."""
+    return stress * math.sqrt(period / 2)
+
+
+def straight_cracks(ends: Sequence[np.ndarray], stress: np.ndarray, n: int = 33) -> np.ndarray:
+    """(2 n_cracks, 2) K_I, K_II at the start and end of every crack (2, 2) in a remote ``stress`` (3,), all of them
+    open (computed, `dislocations`)."""
+    arms = [Arm(complex(*a), complex(*b), crack=k) for k, (a, b) in enumerate(ends)]
+    return stress_intensity(arms, _uniform(stress), n=n)
+
+
+def near_surface(ends: np.ndarray, pressure: float, n: int = 65) -> np.ndarray:
+    """(2, 2) K_I, K_II at the start and end of a crack (2, 2) below the free surface y = 0 with a fluid's ``pressure``
+    in it (computed, `dislocations`)."""
+    (a, b), inside = ends, np.array([pressure, pressure, 0.0])
+    return stress_intensity([Arm(complex(*a), complex(*b))], _uniform(inside), "half-plane", n)
+
+
+#: Edge crack in a half-plane, K_I/(σ√(πa)) (Koiter 1965; digits as recomputed by many, here by `dislocations`).
+EDGE_CRACK_HALF_PLANE = 1.12152226
+
+
+def _uniform(stress: np.ndarray):
+    return lambda points: np.broadcast_to(np.asarray(stress, dtype=float), (len(points), 3))
+
+
+def random_cracks(number: int, seed: int = 7, length: float = 1.0, spacing: float = 1.0) -> list[np.ndarray]:
+    """``number`` cracks (2, 2) of a ``length`` between 0.4 and 1 times the given one in random directions in a square;
+    none comes nearer to another than a fifth of its own length. ``spacing`` is the side of the square a crack has."""
+    random = np.random.default_rng(seed)
+    side = spacing * math.sqrt(number) * length
+    chosen: list[np.ndarray] = []
+    t = np.linspace(-1, 1, 41)[:, None]
+    while len(chosen) < number:
+        half = 0.5 * length * random.uniform(0.4, 1.0)
+        angle = random.uniform(0, math.pi)
+        way = half * np.array([math.cos(angle), math.sin(angle)])
+        middle = random.uniform(0, side, 2)
+        line = middle + t * way
+        others = (c[0] + (t + 1) / 2 * (c[1] - c[0]) for c in chosen)
+        if all(np.hypot(*(line[:, None] - other[None]).T).min() > 0.4 * half for other in others):
+            chosen.append(np.array([middle - way, middle + way]))
+    return chosen

@@ -1,0 +1,58 @@
+"""Stress and displacement about a crack, point by point: Westergaard's whole field and Williams' at a tip."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def griffith_field(
+    points: np.ndarray, half_length: float, remote: np.ndarray, shear_modulus: float, poissons_ratio: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) stress and (n, 2) displacement about an open crack |x| < a, y = 0 in a ``remote`` stress (Westergaard 1939;
+    Muskhelishvili's potentials for the parallel field that Westergaard's lack, Sih 1966). Plane strain.
+
+    With T = σ_yy − iσ_xy of the remote field the crack adds Φ = T (z/√(z²−a²) − 1)/2 and as much to Ω with T's conjugate.
+    Its displacement vanishes at infinity, that of the uniform strain at the origin. On the crack: the upper face.
+    """
+    points = np.asarray(points, dtype=float)
+    z = points[:, 0] + 1j * points[:, 1]
+    # On the crack itself, −0 in y included, the root is that of the upper side.
+    z[points[:, 1] == 0] = points[points[:, 1] == 0, 0]
+    xx, yy, xy = np.asarray(remote, dtype=float)
+    a, t = half_length, yy - 1j * xy
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(z - a) * np.sqrt(z + a)
+        # What the crack adds: Φ = Ω = T (z/√ − 1)/2, its integral φ = ω = T (√ − z)/2.
+        phi = 0.5 * t * (z / root - 1)
+        d_phi = -0.5 * t * a**2 / root**3
+        omega = 0.5 * t * np.conj(z / root - 1)
+    # σ_xx + σ_yy = 4 Re Φ;  σ_yy − iσ_xy = Φ(z) + Ω(z̄) + (z − z̄) conj Φ'(z).
+    pulled = phi + omega + (z - np.conj(z)) * np.conj(d_phi)
+    total = 4 * phi.real
+    stress = np.column_stack([xx + total - pulled.real, yy + pulled.real, xy - pulled.imag])
+    kappa = 3 - 4 * poissons_ratio
+    moved = 0.5 * t * (root - z)
+    moved_back = 0.5 * t * np.conj(root - z)
+    # 2μ(u + iv) = κφ(z) − ω(z̄) − (z − z̄) conj Φ(z).
+    crack = (kappa * moved - moved_back - (z - np.conj(z)) * np.conj(phi)) / (2 * shear_modulus)
+    nu = poissons_ratio
+    strain = np.array([(1 - nu) * xx - nu * yy, (1 - nu) * yy - nu * xx, 2 * xy]) / (2 * shear_modulus)
+    x, y = points.T
+    u = crack.real + strain[0] * x + 0.5 * strain[2] * y
+    v = crack.imag + strain[1] * y + 0.5 * strain[2] * x
+    return stress, np.column_stack([u, v])
+
+
+def tip_stress(r: np.ndarray, angle: np.ndarray, k_i: float, k_ii: float) -> np.ndarray:
+    """(n, 3) singular stress at distance ``r`` and ``angle`` (rad) from the crack's own direction, in the crack's frame
+    (Williams 1957; Irwin 1957)."""
+    r, q = np.asarray(r, dtype=float), np.asarray(angle, dtype=float)
+    c, s, c3, s3 = np.cos(q / 2), np.sin(q / 2), np.cos(1.5 * q), np.sin(1.5 * q)
+    size = 1 / np.sqrt(2 * np.pi * r)
+    return np.column_stack(
+        [
+            size * (k_i * c * (1 - s * s3) - k_ii * s * (2 + c * c3)),
+            size * (k_i * c * (1 + s * s3) + k_ii * s * c * c3),
+            size * (k_i * s * c * c3 + k_ii * c * (1 - s * s3)),
+        ]
+    )
