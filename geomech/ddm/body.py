@@ -24,6 +24,7 @@ from .boundary import BoundarySystem
 from .crack_system import CrackSystem
 from .faces import settle_faces
 from .influence import ElementSet, influence, reuse
+from .iterative import compressed, is_compressed
 from .loads import BodyLoad, check_equilibrium
 from .mesh import Mesh, mesh, outline_edges
 from .particular import Particular
@@ -87,6 +88,7 @@ class Body:
             self._reach = float(np.ptp(self.loops[0], axis=0).max())
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
+        self.compressed = is_compressed(settings.solver, self.faces.n_unknowns)
         self._assemble(previous)
 
     @property
@@ -113,12 +115,19 @@ class Body:
         self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k))
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
+        self._loads = UnitLoads(self.mesh, self.centroid, self.material, tol, self._extent, self.outlined)
+        if same_boundary:
+            self._loads.inherit(old._loads, c_old)
+        if self.compressed:
+            self._w, self.crack_system = compressed(c, g, self.cracks.crack[c.source], system.solve, self._cg, nu, tol)
+            return
         # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
         # make again, should the boundary change, than to carry along.
         everything = np.arange(g.n)
         gc = block(g, c)
+        kept = same_boundary and not old.compressed
         self._w = reuse(
-            old._w if same_boundary else None,
+            old._w if kept else None,
             everything,
             c_old,
             g,
@@ -131,11 +140,8 @@ class Body:
             return cc(r, k) - self._cg[c.unknowns(r)] @ self._w[:, c.unknowns(k)]
 
         self.crack_system = CrackSystem(
-            reuse(old.crack_system.matrix if same_boundary else None, c_old, c_old, c, c, schur)
+            reuse(old.crack_system.matrix if kept else None, c_old, c_old, c, c, schur)
         )
-        self._loads = UnitLoads(self.mesh, self.centroid, self.material, tol, self._extent, self.outlined)
-        if same_boundary:
-            self._loads.inherit(old._loads, c_old)
 
     def _particular(self, load: BodyLoad) -> Particular:
         force = np.zeros(2) if load.body_force is None else load.body_force

@@ -36,7 +36,8 @@ class DdaSettings:
 
 @dataclass(frozen=True)
 class DdmSettings:
-    """How cracked blocks are meshed: order ``p``, node family, elements of a straight crack, of a boundary side."""
+    """How cracked blocks are meshed: order ``p``, node family, elements of a straight crack, of a boundary side; and how
+    they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the number of crack unknowns."""
 
     order: int = 4
     nodes: str = "chebyshev"
@@ -44,6 +45,7 @@ class DdmSettings:
     elements_per_side: int = 6
     grading_ratio: float = 0.3
     grading_layers: int = 2
+    solver: str = "auto"
 
 
 @dataclass(frozen=True)

@@ -235,6 +235,9 @@ class DdmTable(Table):
         0.3, description="ratio of neighbouring elements at kinks, junctions and mouths"
     )
     grading_layers: Annotated[int, Field(ge=0)] = Field(2, description="layers of that grading")
+    solver: Literal["auto", "dense", "compressed"] = Field(
+        "auto", description="how the cracks' equations are solved: factored, or iterated when they are many"
+    )
 
 
 class GrowthTable(Table):

@@ -129,6 +129,7 @@ elements_per_crack = 5
 elements_per_side = 7
 grading_ratio = 0.4
 grading_layers = 1
+solver = "compressed"
 [growth]
 criterion = "g"
 increment_m = 0.02
@@ -180,6 +181,7 @@ def test_every_setting_arrives(scene_file):
         "elements_per_side": 7,
         "grading_ratio": 0.4,
         "grading_layers": 1,
+        "solver": "compressed",
     }
     assert (p.growth.criterion, p.growth.increment, p.growth.min_increment) == ("g", 0.02, 0.001)
     assert (p.growth.join_distance, p.growth.max_passes) == (0.7, 11)

@@ -1,0 +1,249 @@
+"""The crack unknowns' equations where they are too many to factor: compressed influence, GMRES, neighbourhoods factored.
+
+Most of a crack network's stiffness lies within cracks and between neighbours. The elements are cut into patches; each,
+with the rest of the cracks that it cuts, is solved for exactly and its own unknowns are kept of that (restricted additive
+Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 20 to 40 products for networks of any size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .factor import Factor
+from .hierarchical import Compressed, Tree
+from .influence import ElementSet, influence
+
+#: Elements of a patch. Larger ones cost more to factor than they save in products.
+PATCH = 60
+#: Of the cracks that a patch cuts, elements nearer to its middle than this many of its radii join it.
+REACH = 2.0
+#: Residual of a solution, relative to the right-hand side. Contact tells closed from open at 1e-10.
+TOLERANCE = 1e-12
+#: What is good enough when round-off stops the residual.
+ENOUGH = 1e-9
+#: Crack unknowns from which "auto" compresses: there one solution, the matrices included, is as quick either way.
+CROSSOVER = 3000
+
+
+class NotSolved(np.linalg.LinAlgError):
+    """An iterative solution did not reach its tolerance, as where cracks cut a part of the body off."""
+
+
+def is_compressed(solver: str, n_unknowns: int) -> bool:
+    """Whether ``solver`` ("auto", "dense", "compressed") iterates on so many crack unknowns. Raises ValueError."""
+    if solver not in ("auto", "dense", "compressed"):
+        raise ValueError(f'solver: expected "auto", "dense" or "compressed", got {solver!r}')
+    return n_unknowns > 0 and (solver == "compressed" or (solver == "auto" and n_unknowns >= CROSSOVER))
+
+
+def gmres(
+    times: Callable[[np.ndarray], np.ndarray],
+    right: np.ndarray,
+    precondition: Callable[[np.ndarray], np.ndarray],
+    first: np.ndarray | None = None,
+    tolerance: float = TOLERANCE,
+    restart: int = 100,
+    limit: int = 1000,
+) -> tuple[np.ndarray, int]:
+    """x with |right − A x| ≤ ``tolerance`` |right| and the number of products ``times``, from the guess ``first``.
+
+    Preconditioned from the right (Saad & Schultz 1986), so that it is the true residual that falls. Raises NotSolved.
+    """
+    size = float(np.linalg.norm(right))
+    if size == 0.0:
+        return np.zeros_like(right), 0
+    x, rest, products = np.zeros_like(right), right, 0
+    if first is not None and first.any():
+        x, rest, products = first.copy(), right - times(first), 1
+    left = float(np.linalg.norm(rest))
+    while left > tolerance * size:
+        change, n = _cycle(times, precondition, rest, left, 0.5 * tolerance * size, restart)
+        x = x + change
+        rest = right - times(x)
+        products += n + 1
+        before, left = left, float(np.linalg.norm(rest))
+        if left > 0.5 * before or products > limit:
+            if left <= ENOUGH * size:
+                break
+            raise NotSolved(
+                f"the cracks' equations are left with a residual of {left / size:.1e} after {products} products; do "
+                "cracks cut a part of the body off?"
+            )
+    return x, products
+
+
+def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, longest: int) -> tuple[np.ndarray, int]:
+    """The change of x within one Krylov space of ``rest``, whose norm is ``left``, and the number of products."""
+    basis = [rest / left]
+    triangle = np.zeros((longest, longest))
+    turns = np.zeros((longest, 2))
+    target = np.zeros(longest + 1)
+    target[0] = left
+    k = 0
+    while k < longest and abs(target[k]) > goal:
+        v = times(precondition(basis[k]))
+        column = np.zeros(k + 2)
+        # Twice, or the basis loses its orthogonality with the last digits of the residual.
+        for _ in range(2):
+            for i, u in enumerate(basis):
+                h = u @ v
+                v -= h * u
+                column[i] += h
+        column[k + 1] = np.linalg.norm(v)
+        if column[k + 1] > 0:
+            v /= column[k + 1]
+        basis.append(v)
+        for i in range(k):
+            (c, s), (a, b) = turns[i], column[i : i + 2]
+            column[i : i + 2] = c * a + s * b, c * b - s * a
+        length = float(np.hypot(*column[k:]))
+        if length == 0.0:
+            break
+        turns[k] = column[k:] / length
+        triangle[: k + 1, k] = column[: k + 1]
+        triangle[k, k] = length
+        target[k + 1], target[k] = -turns[k, 1] * target[k], turns[k, 0] * target[k]
+        k += 1
+    if k == 0:
+        return np.zeros_like(rest), 1
+    y = np.linalg.solve(triangle[:k, :k], target[:k])
+    return precondition(sum(a * u for a, u in zip(y, basis))), k
+
+
+class Patches:
+    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element."""
+
+    def __init__(self, elements: ElementSet, crack: np.ndarray, nu: float, tol: float):
+        self._elements, self._nu, self._tol = elements, nu, tol
+        tree = Tree.over(elements, PATCH)
+        middle = 0.5 * (elements.start + elements.end) @ np.array([1.0, 1j])
+        at = np.argsort(crack, kind="stable")
+        first = np.searchsorted(crack[at], np.arange(int(crack.max()) + 2))
+        self._patches: list[tuple[np.ndarray, np.ndarray]] = []
+        for leaf in tree.leaves:
+            own = tree.elements(leaf)
+            cut = np.concatenate([at[first[k] : first[k + 1]] for k in np.unique(crack[own])])
+            near = cut[np.abs(middle[cut] - tree.centre[leaf]) <= REACH * tree.radius[leaf]]
+            whole = np.union1d(own, near)
+            self._patches.append((whole, elements.unknowns(np.sort(own))))
+        self._factors: list[tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor] | None]
+        self._factors = [None] * len(self._patches)
+
+    def hold(self, closed: np.ndarray) -> None:
+        """From now on the ``closed`` unknowns (n,) bool are given; only patches in which that is news are factored."""
+        for k, (elements, own) in enumerate(self._patches):
+            unknowns = self._elements.unknowns(elements)
+            held = closed[unknowns]
+            key = np.packbits(held).tobytes()
+            known = self._factors[k]
+            if known is not None and known[0] == key:
+                continue
+            part = self._elements.take(elements)
+            matrix = influence(part, part, self._nu, self._tol)
+            if held.any():
+                matrix = matrix[np.ix_(~held, ~held)]
+            free = unknowns[~held]
+            kept = np.flatnonzero(np.isin(free, own))
+            self._factors[k] = key, free, kept, free[kept], Factor(matrix, "cracks cut a part of the body off")
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are held."""
+        out = np.zeros_like(right)
+        for _, free, kept, to, factor in self._factors:
+            out[to] = factor.solve(right[free])[kept]
+        return out
+
+
+class Following:
+    """What the boundary does when crack faces move, A_ΓΓ⁻¹ A_ΓC, as an operator; ``influence`` is A_ΓC, a matrix or not."""
+
+    def __init__(self, solve: Callable[[np.ndarray], np.ndarray], influence):
+        self._solve, self._influence = solve, influence
+
+    def __matmul__(self, w: np.ndarray) -> np.ndarray:
+        return self._solve(self._influence @ w)
+
+
+class Reduced:
+    """S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC as an operator."""
+
+    def __init__(self, cracks: Compressed, on_cracks: np.ndarray, following: Following):
+        self.cracks, self._on_cracks, self._following = cracks, on_cracks, following
+
+    def __matmul__(self, w: np.ndarray) -> np.ndarray:
+        out = self.cracks @ w
+        return out - self._on_cracks @ (self._following @ w) if self._on_cracks.shape[1] else out
+
+
+class IterativeCrackSystem:
+    """`crack_system.CrackSystem` for many unknowns: ``matrix`` is S as an operator; see there.
+
+    ``products`` counts those with S. The last solution is the first guess of the next one.
+    """
+
+    def __init__(self, matrix: Reduced, elements: ElementSet, crack: np.ndarray, nu: float, tol: float):
+        self.matrix, self.n = matrix, elements.n_unknowns
+        self.products = 0
+        self._patches = Patches(elements, crack, nu, tol)
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def opened(self, right: np.ndarray) -> np.ndarray:
+        """Zeros: there is no inverse that would come free with every load."""
+        return np.zeros_like(right)
+
+    def constrained(
+        self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray, opened: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `crack_system.CrackSystem.constrained`. Raises NotSolved."""
+        if right.ndim == 2:
+            columns = [self.constrained(r, closed, f) for r, f in zip(right.T, fixed.T)]
+            return tuple(np.column_stack(part) for part in zip(*columns))
+        self._patches.hold(closed)
+        given = np.where(closed, fixed, 0.0)
+        rest = right - self.matrix @ given if given.any() else right.copy()
+        rest[closed] = 0.0
+
+        def times(v: np.ndarray) -> np.ndarray:
+            out = self.matrix @ v
+            out[closed] = 0.0
+            return out
+
+        x, n = gmres(times, rest, self._patches.solve, self._guess(right, closed))
+        self.products += n
+        w = x + given
+        self._last = right, w
+        reaction = np.zeros_like(right)
+        if closed.any():
+            reaction[closed] = (right - self.matrix @ w)[closed]
+        return w, reaction
+
+    def _guess(self, right: np.ndarray, closed: np.ndarray) -> np.ndarray | None:
+        """The last solution, as much of it as its right-hand side is in this one."""
+        if self._last is None:
+            return None
+        before, w = self._last
+        size = float(before @ before)
+        return np.where(closed, 0.0, float(before @ right) / size * w) if size else None
+
+    def rcond(self, closed: np.ndarray) -> float:
+        """Reciprocal condition of the patches solved with, the worst one: of the whole, none is known."""
+        self._patches.hold(closed)
+        return min(factor.rcond for *_, factor in self._patches._factors)
+
+
+def compressed(
+    cracks: ElementSet,
+    boundary: ElementSet,
+    crack: np.ndarray,
+    solve: Callable[[np.ndarray], np.ndarray],
+    on_cracks: np.ndarray,
+    nu: float,
+    tol: float,
+) -> tuple[Following, IterativeCrackSystem]:
+    """A_ΓΓ⁻¹ A_ΓC and the crack system of a body; ``crack`` (n,) is the crack of every element, ``solve`` applies A_ΓΓ⁻¹ and
+    ``on_cracks`` is A_CΓ."""
+    following = Following(solve, influence(boundary, cracks, nu, tol))
+    matrix = Reduced(Compressed(cracks, cracks, nu, tol), on_cracks, following)
+    return following, IterativeCrackSystem(matrix, cracks, crack, nu, tol)

@@ -1,0 +1,118 @@
+"""Bodies with compressed matrices against the same bodies factored."""
+
+import numpy as np
+import pytest
+
+from geomech import ddm
+from geomech.conventions import traction
+from geomech.ddm.iterative import CROSSOVER, NotSolved, gmres
+from geomech.model import Cracks, DdmSettings, Material
+
+ROCK = Material("rock", youngs_modulus=10e9, poissons_ratio=0.25)
+
+
+def network(n: int, seed: int = 0) -> Cracks:
+    """n² cracks of lengths 1 : 6, one in each cell of a grid of 1 m, anywhere in it and in any direction."""
+    rng = np.random.default_rng(seed)
+    half = 0.48 * 6 ** -rng.uniform(0, 1, n * n)
+    turn = rng.uniform(0, np.pi, n * n)
+    arm = half[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    room = 0.49 - np.abs(arm)
+    cell = np.stack(np.meshgrid(np.arange(n), np.arange(n)), axis=-1).reshape(-1, 2) + 0.5
+    middle = cell + rng.uniform(-1, 1, (n * n, 2)) * room
+    return Cracks.from_polylines(list(np.stack([middle - arm, middle + arm], axis=1)))
+
+
+def both(loops, cracks, load):
+    """The solution of the two solvers."""
+    bodies = (ddm.Body(loops, cracks, ROCK, DdmSettings(solver=solver)) for solver in ("dense", "compressed"))
+    return [body.solve(load) for body in bodies]
+
+
+def agree(dense, other, tolerance=1e-10):
+    """K to a hundredth of what a mesh of order 4 is good for; measured 1e-13 to 1e-12."""
+    size = max(np.abs(dense.tips["k_i"]).max(), np.abs(dense.tips["k_ii"]).max())
+    for name in ("k_i", "k_ii"):
+        np.testing.assert_allclose(other.tips[name], dense.tips[name], rtol=0, atol=tolerance * size)
+    assert (other.closed == dense.closed).all()
+
+
+PLANE: list[np.ndarray] = []
+SQUARE = [np.array([[-0.1, -0.1], [5.1, -0.1], [5.1, 5.1], [-0.1, 5.1]])]
+
+
+def pressed(stress) -> ddm.BodyLoad:
+    """Uniform ``stress`` carried by tractions on the outline of SQUARE."""
+    corner = SQUARE[0]
+    segments = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    normals = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+    t = traction(np.broadcast_to(stress, (4, 3)), normals)
+    return ddm.BodyLoad(segments=segments, tractions=np.repeat(t[:, None], 2, axis=1))
+
+
+@pytest.mark.parametrize("stress", [[0.0, 1e6, 3e5], [2e5, -1e6, 1e5]], ids=["tension", "compression"])
+@pytest.mark.parametrize("loops", [PLANE, SQUARE], ids=["plane", "square"])
+def test_compressed_bodies_solve_as_dense_ones(loops, stress):
+    cracks = network(5)
+    load = pressed(stress) if loops else ddm.BodyLoad(remote_stress=stress)
+    dense, other = both(loops, cracks, load)
+    assert other.body.compressed and not dense.body.compressed and other.body.faces.n_unknowns > 1000
+    agree(dense, other)
+    # What is left at the boundary's own nodes is the discretisation's, and the same.
+    assert other.residual < max(1e-10, 1.01 * dense.residual)
+    points = np.random.default_rng(1).uniform(0, 5, (20, 2))
+    for one, two in zip(dense.fields(points), other.fields(points)):
+        np.testing.assert_allclose(two, one, rtol=0, atol=1e-10 * np.abs(one).max())
+    if loops:
+        np.testing.assert_allclose(other.body.compliance(other), dense.body.compliance(dense), rtol=1e-9, atol=1e-22)
+
+
+def test_growth_may_cross_from_dense_to_compressed():
+    """Bodies of either kind follow one another."""
+    cracks = network(4)
+    load = pressed([0.0, 1e6, 0.0])
+    dense = ddm.Body(SQUARE, cracks, ROCK, DdmSettings(solver="dense"))
+    for settings in (DdmSettings(solver="compressed"), DdmSettings(solver="dense")):
+        body = ddm.Body(SQUARE, cracks, ROCK, settings, previous=dense)
+        agree(dense.solve(load), body.solve(load))
+        again = ddm.Body(SQUARE, cracks, ROCK, settings, previous=body)
+        agree(dense.solve(load), again.solve(load, warm=body.solve(load)))
+
+
+def test_a_load_that_comes_again_costs_no_iterations():
+    body = ddm.Body(PLANE, network(5), ROCK, DdmSettings(solver="compressed"))
+    body.solve(ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0], crack_pressure=2e6))
+    before = body.crack_system.products
+    body.solve(ddm.BodyLoad(remote_stress=[0.0, 2e6, 0.0], crack_pressure=4e6))
+    assert body.crack_system.products - before <= 2
+
+
+def test_small_bodies_stay_dense_and_unknown_solvers_are_refused():
+    cracks = network(2)
+    body = ddm.Body(PLANE, cracks, ROCK)
+    assert body.faces.n_unknowns < CROSSOVER and not body.compressed
+    with pytest.raises(ValueError, match="solver"):
+        ddm.Body(PLANE, cracks, ROCK, DdmSettings(solver="sparse"))
+
+
+def test_a_part_cut_off_is_refused():
+    ring = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+    segments = np.column_stack([np.arange(4), np.roll(np.arange(4), -1)])
+    four = np.zeros(4, int)
+    ring = Cracks(ring, segments, four, four, four, np.full(4, np.inf), np.zeros(4, bool), ("ring",))
+    body = ddm.Body(PLANE, ring, ROCK, DdmSettings(solver="compressed"))
+    with pytest.raises(np.linalg.LinAlgError, match="cut a part"):
+        body.solve(ddm.BodyLoad(remote_stress=[0.0, 1e6, 2e5]))
+
+
+def test_gmres_solves_and_says_when_it_does_not():
+    rng = np.random.default_rng(0)
+    matrix = np.eye(80) + 0.05 * rng.standard_normal((80, 80))
+    right = rng.standard_normal(80)
+    x, products = gmres(matrix.__matmul__, right, np.copy, restart=15)
+    np.testing.assert_allclose(matrix @ x, right, atol=1e-11)
+    assert products < 80
+    assert gmres(matrix.__matmul__, right, np.copy, first=x)[1] == 1
+    singular = np.diag(np.r_[0.0, np.ones(79)])
+    with pytest.raises(NotSolved):
+        gmres(singular.__matmul__, right, np.copy)
