@@ -153,11 +153,15 @@ class Coupling:
             if mismatch < COMPLIANCE_TOLERANCE:
                 break
         imbalance = max(load.imbalance for load in self.loads.values())
-        return result, solutions, {
-            "compliance_passes": attempt + 1,
-            "compliance_mismatch": mismatch,
-            "traction_imbalance": imbalance,
-        }
+        return (
+            result,
+            solutions,
+            {
+                "compliance_passes": attempt + 1,
+                "compliance_mismatch": mismatch,
+                "traction_imbalance": imbalance,
+            },
+        )
 
     def _solve_bodies(self, result) -> dict:
         """Every body under what the block solver's forces are on it; keeps loads and solutions."""
@@ -220,7 +224,10 @@ class Coupling:
             for b, solution in solutions.items():
                 body = self.bodies[b]
                 s, e = crack_response(
-                    self._compliance(b, body, solution), solution.crack_strain, state.stress[b], float(state.rotation[b])
+                    self._compliance(b, body, solution),
+                    solution.crack_strain,
+                    state.stress[b],
+                    float(state.rotation[b]),
                 )
                 found, assumed = e + s @ state.stress[b], state.crack_strain[b]
                 material = self.problem.materials[self.blocks.material[b]]
@@ -409,9 +416,7 @@ class Coupling:
             faces=joined_faces(self.cracks, solutions),
             bodies=solutions,
             events=tuple(events),
-            monitors={
-                name: motion.current(b, point) - np.asarray(point) for name, (b, point) in self.monitors.items()
-            },
+            monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in self.monitors.items()},
             statistics=statistics,
             seconds=dict(self.seconds),
         )

@@ -35,11 +35,11 @@ MeanStress = Callable[[list[np.ndarray]], np.ndarray]
 class Split:
     """The scene after a split.
 
-        blocks     the children stand where their parent stood, the others as they were
-        state      its velocity, stress, rotation and crack strain handed down, contacts renumbered
-        cracks     what is not a block face now, each segment with the child that holds it
-        parent     (n_blocks,) the block before the split that each one comes from
-        lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, for slivers are merged
+    blocks     the children stand where their parent stood, the others as they were
+    state      its velocity, stress, rotation and crack strain handed down, contacts renumbered
+    cracks     what is not a block face now, each segment with the child that holds it
+    parent     (n_blocks,) the block before the split that each one comes from
+    lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, for slivers are merged
     """
 
     blocks: Blocks
@@ -129,12 +129,12 @@ def split_blocks(
 class _Graph:
     """Nodes of a block: its vertices first, then the crack nodes that are not vertices.
 
-        points    (n, 2)
-        node      crack node → node here
-        vertex    (n,) old vertex, −1 for others
-        edges     (m, 2) boundary pieces, rock on the left; ``edge`` (m,) the old edge, ``span`` (m, 2) the part of it
-        segments  rows in the crack network; ``ends`` (k, 2) their nodes here
-        loop      (n,) the loop that a node lies on, −1 inside the rock
+    points    (n, 2)
+    node      crack node → node here
+    vertex    (n,) old vertex, −1 for others
+    edges     (m, 2) boundary pieces, rock on the left; ``edge`` (m,) the old edge, ``span`` (m, 2) the part of it
+    segments  rows in the crack network; ``ends`` (k, 2) their nodes here
+    loop      (n,) the loop that a node lies on, −1 inside the rock
     """
 
     block: int

@@ -15,19 +15,17 @@ a body force, linear in x, so that the elastic problem is in equilibrium to roun
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..conventions import normal_of
 from ..ddm.loads import resultants
 from ..model import Blocks, Motion
 
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = np.radians(10.0)
-
-#: Edges lie in one line when the tangent of their angle is below this: straight sides stay straight as blocks strain.
-STRAIGHT = 1e-6
 
 #: A face that ends within this part of its edge's length of the edge's end ends there.
 SNAP = 1e-9
@@ -92,16 +90,21 @@ def boundary_load(
     that geometry (any block's); ``edge_tractions`` (edge, traction per reference length) of this block;
     ``point_loads`` (reference point, force); ``acceleration`` (6,) and ``spin`` (rad/s) the block's own.
     """
-    turn_back = _rotation(-rotation)
+    c, s = math.cos(rotation), math.sin(rotation)
     pieces = _Pieces()
-    faces, lone = _faces_and_lone(block, blocks, vertices, contacts)
-    for (edge, _), rows in faces.items():
-        _add_face(pieces, blocks, motion, block, _side(blocks, vertices, edge), rows, turn_back)
-    for row in lone:
-        _add_lone(pieces, blocks, motion, block, row, turn_back)
+    faces, lone = _faces_and_lone(blocks, vertices, _touches(block, motion, contacts, c, s))
+    for (edge, _), touches in faces.items():
+        _add_face(pieces, blocks, blocks.sides[edge], touches)
+    for touch in lone:
+        if touch.own:
+            _add_corner_force(pieces, blocks, touch.vertex, np.array(touch.force))
+        else:
+            _add_edge_force(pieces, blocks, touch.edge, np.array(touch.point), np.array(touch.force))
+    turn_back = np.array([[c, s], [-s, c]])
     for edge, traction in edge_tractions:
         a, b = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
-        pieces.add(a, b, turn_back @ traction, turn_back @ traction)
+        t = turn_back @ traction
+        pieces.add(a, b, t, t)
     for point, force in point_loads:
         _add_point_load(
             pieces, blocks, block, np.asarray(point, dtype=float), turn_back @ np.asarray(force, dtype=float)
@@ -111,14 +114,14 @@ def boundary_load(
 
 
 class _Pieces:
-    """Loaded pieces of the outline as they are found."""
+    """Loaded pieces of the outline as they are found: pairs of x and y at their two ends."""
 
     def __init__(self) -> None:
-        self.segments: list[tuple[np.ndarray, np.ndarray]] = []
-        self.tractions: list[tuple[np.ndarray, np.ndarray]] = []
+        self.segments: list[tuple] = []
+        self.tractions: list[tuple] = []
 
-    def add(self, a: np.ndarray, b: np.ndarray, t_a: np.ndarray, t_b: np.ndarray) -> None:
-        if t_a.any() or t_b.any():
+    def add(self, a, b, t_a, t_b) -> None:
+        if any(t_a) or any(t_b):
             self.segments.append((a, b))
             self.tractions.append((t_a, t_b))
 
@@ -126,17 +129,47 @@ class _Pieces:
         return np.array(self.segments).reshape(-1, 2, 2), np.array(self.tractions).reshape(-1, 2, 2)
 
 
-def _rotation(angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s], [s, c]])
+class _Touch(NamedTuple):
+    """A contact that carries force, as one of its blocks feels it. There are few, so they are plain numbers.
+
+    ``own``: the block owns the vertex, not the edge; ``normal`` of the edge, current axes; ``point`` and the ``force`` on
+    the block in its reference frame.
+    """
+
+    own: bool
+    vertex: int
+    edge: int
+    normal: list[float]
+    point: list[float]
+    force: tuple[float, float]
 
 
-def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: np.ndarray) -> tuple[int, float]:
+def _touches(block: int, motion: Motion, contacts: np.ndarray, c: float, s: float) -> list[_Touch]:
+    """What touches ``block``, which has turned by the angle of cosine ``c`` and sine ``s``."""
+    owner = contacts["block"]
+    acting = (contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)
+    rows = contacts[acting & ((owner == block) | (contacts["other"] == block))]
+    columns = (rows[name].tolist() for name in ("block", "vertex", "edge", "normal", "normal_force", "shear_force"))
+    touches = []
+    for owner, vertex, edge, normal, push, shear, point in zip(
+        *columns, motion.reference(block, rows["point"]).tolist(), strict=True
+    ):
+        own = owner == block
+        if not own:
+            push, shear = -push, -shear
+        # Shear acts along the edge's direction: its outward normal turned by +90°.
+        x, y = push * normal[0] - shear * normal[1], push * normal[1] + shear * normal[0]
+        touches.append(_Touch(own, vertex, edge, normal, point, (c * x + s * y, c * y - s * x)))
+    return touches
+
+
+def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: list[float]) -> tuple[int, float]:
     """Which of the two edges at ``vertex`` lies against an edge with outward ``normal``, and the angle between."""
     best = (-1, math.inf)
-    nx, ny = normal.tolist()
+    nx, ny = normal
     for edge in (vertex, int(blocks.previous_vertex[vertex])):
-        x, y = (vertices[blocks.next_vertex[edge]] - vertices[edge]).tolist()
+        (x0, y0), (x1, y1) = vertices[edge].tolist(), vertices[blocks.next_vertex[edge]].tolist()
+        x, y = x1 - x0, y1 - y0
         # The outward normal of the edge is (y, −x) over its length.
         angle = math.atan2(abs(y * ny + x * nx), x * ny - y * nx)
         if angle < best[1]:
@@ -144,116 +177,84 @@ def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: np
     return best
 
 
-def _line_start(blocks: Blocks, vertices: np.ndarray, edge: int) -> int:
-    """The first of the edges that lie in one straight line with ``edge``: a vertex in a straight side, as the end of a
-    named piece, must not part what touches it into faces of their own."""
-    first = edge
-    start, end = vertices[edge].tolist(), vertices[blocks.next_vertex[edge]].tolist()
-    ax, ay = end[0] - start[0], end[1] - start[1]
-    while True:
-        before = int(blocks.previous_vertex[first])
-        x, y = vertices[before].tolist()
-        bx, by = start[0] - x, start[1] - y
-        along = ax * bx + ay * by
-        if along <= 0 or abs(ax * by - ay * bx) > STRAIGHT * along or before == edge:
-            return first
-        first, start = before, (x, y)
-
-
-def _side(blocks: Blocks, vertices: np.ndarray, first: int) -> list[int]:
-    """The vertices along the straight side that begins with edge ``first``, its two ends included."""
-    side = [first, int(blocks.next_vertex[first])]
-    while side[-1] != first and _line_start(blocks, vertices, side[-1]) == first:
-        side.append(int(blocks.next_vertex[side[-1]]))
-    return side
-
-
 def _faces_and_lone(
-    block: int, blocks: Blocks, vertices: np.ndarray, contacts: np.ndarray
-) -> tuple[dict[tuple[int, int], np.ndarray], np.ndarray]:
-    """The acting contacts of ``block``: joint faces with at least two distinct points, (first edge of the own straight
-    side, first edge of the other's) → rows, and the rows left alone."""
-    acting = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
-    rows = acting[(acting["block"] == block) | (acting["other"] == block)]
-    found: dict[tuple[int, int], list[int]] = {}
+    blocks: Blocks, vertices: np.ndarray, touches: list[_Touch]
+) -> tuple[dict[tuple[int, int], list[_Touch]], list[_Touch]]:
+    """What touches a block as joint faces with at least two distinct points, (first edge of the own straight side, first
+    edge of the other's) → contacts, and the contacts left alone. A vertex in a straight side, as the end of a named piece,
+    does not part what touches it into faces of their own."""
+    found: dict[tuple[int, int], list[_Touch]] = {}
     lone = []
-    columns = (rows[name].tolist() for name in ("vertex", "edge", "block"))
-    for k, (vertex, edge, owner) in enumerate(zip(*columns, strict=True)):
-        touching, angle = _touching_edge(blocks, vertices, vertex, rows["normal"][k])
+    for touch in touches:
+        touching, angle = _touching_edge(blocks, vertices, touch.vertex, touch.normal)
         if angle > FACE_ANGLE:
-            lone.append(k)
+            lone.append(touch)
         else:
-            own, facing = (touching, edge) if owner == block else (edge, touching)
-            face = _line_start(blocks, vertices, own), _line_start(blocks, vertices, facing)
-            found.setdefault(face, []).append(k)
+            own, facing = (touching, touch.edge) if touch.own else (touch.edge, touching)
+            found.setdefault((blocks.side_start[own], blocks.side_start[facing]), []).append(touch)
     faces = {}
     for face, members in found.items():
-        if _spread(rows["point"][members], vertices, blocks, face[0]):
-            faces[face] = rows[members]
+        start, _, along, length = _line(blocks, blocks.sides[face[0]])
+        places = [_along(touch.point, start, along) for touch in members]
+        # Points apart by no more than round-off are one.
+        if max(places) - min(places) > 1e-6 * length:
+            faces[face] = members
         else:
             lone += members
-    return faces, rows[lone]
+    return faces, lone
 
 
-def _spread(points: np.ndarray, vertices: np.ndarray, blocks: Blocks, edge: int) -> float:
-    """Distance between the outermost contact ``points`` along ``edge``, 0 when it is round-off of the edge's length."""
-    along = vertices[blocks.next_vertex[edge]] - vertices[edge]
-    length = np.hypot(*along)
-    reach = float(np.ptp((points - vertices[edge]) @ along / length))
-    return reach if reach > 1e-6 * length else 0.0
+def _line(blocks: Blocks, side: list[int]) -> tuple[list[float], list[float], tuple[float, float], float]:
+    """Start, end, direction and length of a straight ``side``, reference frame."""
+    start, end = blocks.vertices[side[0]].tolist(), blocks.vertices[side[-1]].tolist()
+    x, y = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(x, y)
+    return start, end, (x / length, y / length), length
 
 
-def _force_on(block: int, rows: np.ndarray) -> np.ndarray:
-    """(..., 2) N/m of CONTACT ``rows`` on ``block``."""
-    normal = rows["normal"]
-    along = normal_of(normal)  # the edge's direction: its outward normal turned by +90°
-    force = rows["normal_force"][..., None] * normal + rows["shear_force"][..., None] * along
-    return np.where((rows["block"] == block)[..., None], force, -force)
+def _along(point: Sequence[float], start: Sequence[float], direction: tuple[float, float]) -> float:
+    return (point[0] - start[0]) * direction[0] + (point[1] - start[1]) * direction[1]
 
 
-def _add_face(pieces, blocks, motion, block, side, rows, turn_back) -> None:
-    corners = blocks.vertices[side]
-    start, end = corners[0], corners[-1]
-    length = np.hypot(*(end - start))
-    along = (end - start) / length
-    inward = np.array([-along[1], along[0]])
-    places = (motion.reference(block, rows["point"]) - start) @ along
-    forces = _force_on(block, rows) @ turn_back.T
-    first, last = max(places.min(), 0.0), min(places.max(), length)
+def _add_face(pieces: _Pieces, blocks: Blocks, side: list[int], touches: list[_Touch]) -> None:
+    start, end, (ax, ay), length = _line(blocks, side)
+    places = [_along(touch.point, start, (ax, ay)) for touch in touches]
+    first, last = max(min(places), 0.0), min(max(places), length)
     # Round-off of the mapping must not make a new load segment every step: the body keeps what it knows of a segment.
     # The pressure below has the force and moment of the contacts on whatever length it is given.
     first = 0.0 if first < SNAP * length else first
     last = length if last > (1 - SNAP) * length else last
-    push, shear = forces @ inward, forces @ along
-    total, moment = push.sum(), push @ (places - first)
+    total = moment = shear = size = 0.0
+    for place, (x, y) in zip(places, (touch.force for touch in touches)):
+        push = ax * y - ay * x  # inward: the direction turned by +90°
+        total += push
+        moment += push * (place - first)
+        shear += ax * x + ay * y
+        size += abs(x) + abs(y)
     a, b, p_a, p_b = linear_pressure(last - first, total, moment)
     # Shear in proportion to the pressure, or evenly where there is none to go by.
-    if abs(total) > 1e-9 * np.abs(forces).sum():
-        q_a, q_b = shear.sum() / total * p_a, shear.sum() / total * p_b
+    if abs(total) > 1e-9 * size:
+        q_a, q_b = shear / total * p_a, shear / total * p_b
     else:
-        q_a = q_b = shear.sum() / (b - a)
-    t_a, t_b = p_a * inward + q_a * along, p_b * inward + q_b * along
+        q_a = q_b = shear / (b - a)
+    t_a = (q_a * ax - p_a * ay, q_a * ay + p_a * ax)
+    t_b = (q_b * ax - p_b * ay, q_b * ay + p_b * ax)
     # One piece an edge of the side: a load segment lies on one edge.
     a, b = first + a, first + b
-    marks = (corners - start) @ along
-    marks[-1] = length
+    corners = [start, *(blocks.vertices[k].tolist() for k in side[1:-1]), end]
+    marks = [0.0, *(_along(corner, start, (ax, ay)) for corner in corners[1:-1]), length]
+
+    def at(place: float, k: int) -> Sequence[float]:
+        return corners[k] if place == marks[k] else (start[0] + place * ax, start[1] + place * ay)
+
+    def traction(place: float) -> tuple[float, float]:
+        part = (place - a) / (b - a)
+        return t_a[0] + part * (t_b[0] - t_a[0]), t_a[1] + part * (t_b[1] - t_a[1])
+
     for k in range(len(side) - 1):
         low, high = max(a, marks[k]), min(b, marks[k + 1])
         if high - low > SNAP * length:
-            pieces.add(
-                corners[k] if low == marks[k] else start + low * along,
-                corners[k + 1] if high == marks[k + 1] else start + high * along,
-                t_a + (low - a) / (b - a) * (t_b - t_a),
-                t_a + (high - a) / (b - a) * (t_b - t_a),
-            )
-
-
-def _add_lone(pieces, blocks, motion, block, row, turn_back) -> None:
-    force = turn_back @ _force_on(block, row)
-    if row["block"] == block:
-        _add_corner_force(pieces, blocks, int(row["vertex"]), force)
-    else:
-        _add_edge_force(pieces, blocks, int(row["edge"]), motion.reference(block, row["point"]), force)
+            pieces.add(at(low, k), at(high, k + 1), traction(low), traction(high))
 
 
 def _add_corner_force(pieces, blocks, vertex: int, force: np.ndarray) -> None:

@@ -10,6 +10,9 @@ import numpy as np
 
 from .polygon import area_moments, signed_area
 
+#: Edges lie in one line when the tangent of their angle is below this.
+STRAIGHT = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -127,6 +130,58 @@ class Blocks:
             return np.empty(0, int)
         return np.flatnonzero(self.edge_name == self.edge_names.index(name))
 
+    def mean_vertices(self, vertices: np.ndarray) -> np.ndarray:
+        """(n_blocks, 2) the mean of each block's ``vertices``."""
+        # About each block's first vertex, or digits are lost far from the origin.
+        start = self.vertex_start[:-1]
+        first = vertices[start]
+        return first + np.add.reduceat(vertices - first[self.vertex_block], start, axis=0) / self._vertex_count
+
+    @cached_property
+    def _vertex_count(self) -> np.ndarray:
+        return np.diff(self.vertex_start)[:, None]
+
+    @cached_property
+    def affine_fit(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n_blocks, 2) the mean c of each block's reference vertices, and weights w (n_vertices, 2): the affine motion that
+        fits given vertices x best has the gradient Σ (x − mean x) ⊗ w."""
+        centre, start = self.mean_vertices(self.vertices), self.vertex_start[:-1]
+        arm = self.vertices - centre[self.vertex_block]
+        moments = np.add.reduceat(arm[:, :, None] * arm[:, None, :], start, axis=0)
+        return centre, np.einsum("ij,ijk->ik", arm, np.linalg.inv(moments)[self.vertex_block])
+
+    @cached_property
+    def side_start(self) -> list[int]:
+        """(n_vertices,) the first edge of the straight side that each edge is part of: a block's strain, which is the same
+        all over it, leaves straight sides straight."""
+        along = self.vertices[self.next_vertex] - self.vertices
+        before = along[self.previous_vertex]
+        ahead = before[:, 0] * along[:, 0] + before[:, 1] * along[:, 1]
+        turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
+        goes_on = ((ahead > 0) & (np.abs(turn) <= STRAIGHT * ahead)).tolist()
+        previous = self.previous_vertex.tolist()
+        first = [-1] * self.n_vertices
+        for edge in range(self.n_vertices):
+            chain = [edge]
+            while first[chain[-1]] < 0 and goes_on[chain[-1]]:
+                chain.append(previous[chain[-1]])
+            start = max(first[chain[-1]], -1)
+            for k in chain:
+                first[k] = chain[-1] if start < 0 else start
+        return first
+
+    @cached_property
+    def sides(self) -> dict[int, list[int]]:
+        """First edge of a straight side → the vertices along it, its two ends included."""
+        following = self.next_vertex.tolist()
+        sides = {}
+        for start in sorted(set(self.side_start)):
+            side = [start, following[start]]
+            while self.side_start[side[-1]] == start:
+                side.append(following[side[-1]])
+            sides[start] = side
+        return sides
+
     @cached_property
     def _area_moments(self) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
         return {}
@@ -156,7 +211,9 @@ def _oriented(loop: np.ndarray, label: list[str], counter_clockwise: bool, name:
     if loop.ndim != 2 or loop.shape[1] != 2 or len(loop) < 3:
         raise ValueError(f"{name}: an outline needs at least three vertices (x, y), got an array of shape {loop.shape}")
     if not np.isfinite(loop).all():
-        raise ValueError(f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not a finite point")
+        raise ValueError(
+            f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not a finite point"
+        )
     if len(label) != len(loop):
         raise ValueError(f"{name}: {len(loop)} edges but {len(label)} edge names")
     span = np.ptp(loop, axis=0).max()
@@ -164,7 +221,9 @@ def _oriented(loop: np.ndarray, label: list[str], counter_clockwise: bool, name:
     short = np.hypot(step[:, 0], step[:, 1]) <= 1e-12 * span
     if short.any():
         at = int(np.flatnonzero(short)[0])
-        raise ValueError(f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide at ({loop[at, 0]:g}, {loop[at, 1]:g})")
+        raise ValueError(
+            f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide at ({loop[at, 0]:g}, {loop[at, 1]:g})"
+        )
     area = signed_area(loop)
     if abs(area) <= 1e-14 * span**2:
         raise ValueError(f"{name}: the outline encloses no area")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -25,33 +24,21 @@ class Motion:
     @classmethod
     def of(cls, blocks: Blocks, vertices: np.ndarray) -> Motion:
         """The motion that takes ``blocks.vertices`` to ``vertices`` (least squares, exact for an affine motion)."""
-        owner, n = blocks.vertex_block, blocks.n_blocks
-        count = np.bincount(owner, minlength=n)[:, None]
-
-        def means(points: np.ndarray) -> np.ndarray:
-            # About each block's first vertex, or digits are lost far from the origin.
-            first = points[blocks.vertex_start[:-1]]
-            own = points - first[owner]
-            return first + np.column_stack([np.bincount(owner, own[:, k], n) for k in (0, 1)]) / count
-
-        reference_centre, centre = means(blocks.vertices), means(vertices)
-        before, moved = blocks.vertices - reference_centre[owner], vertices - centre[owner]
-
-        def products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-            return np.array([[np.bincount(owner, a[:, i] * b[:, j], n) for j in (0, 1)] for i in (0, 1)]).transpose(2, 0, 1)
-
-        gradient = products(moved, before) @ np.linalg.inv(products(before, before))
+        reference_centre, fit = blocks.affine_fit
+        centre = blocks.mean_vertices(vertices)
+        moved = vertices - centre[blocks.vertex_block]
+        gradient = np.add.reduceat(moved[:, :, None] * fit[:, None, :], blocks.vertex_start[:-1], axis=0)
         return cls(reference_centre, centre, gradient)
 
     def current(self, block: int, points: np.ndarray) -> np.ndarray:
         """Where the material points ``points`` (..., 2) of ``block``, in reference coordinates, are now."""
-        return self.centre[block] + (np.asarray(points, dtype=float) - self.reference_centre[block]) @ self.gradient[block].T
+        return (
+            self.centre[block]
+            + (np.asarray(points, dtype=float) - self.reference_centre[block]) @ self.gradient[block].T
+        )
 
     def reference(self, block: int, points: np.ndarray) -> np.ndarray:
         """Which material points, in reference coordinates, are now at ``points`` (..., 2)."""
-        back = self._inverse[block]
-        return self.reference_centre[block] + (np.asarray(points, dtype=float) - self.centre[block]) @ back.T
-
-    @cached_property
-    def _inverse(self) -> np.ndarray:
-        return np.linalg.inv(self.gradient)
+        (a, b), (c, d) = self.gradient[block].tolist()
+        back = np.array([[d, -c], [-b, a]]) / (a * d - b * c)  # transposed
+        return self.reference_centre[block] + (np.asarray(points, dtype=float) - self.centre[block]) @ back

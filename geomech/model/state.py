@@ -58,13 +58,13 @@ TIP = np.dtype(
 class State:
     """Motion and stress of the blocks at one time.
 
-        time          s
-        vertices      (n_vertices, 2)   current coordinates, m
-        velocity      (n_blocks, 6)     rates of (u0, v0, r0, εx, εy, γxy) about the current centroid
-        stress        (n_blocks, 3)     Pa, current axes
-        rotation      (n_blocks,)       accumulated rotation, rad
-        crack_strain  (n_blocks, 3)     mean strain that the block's cracks carry, current axes
-        contacts      CONTACT rows      open ones that are near included
+    time          s
+    vertices      (n_vertices, 2)   current coordinates, m
+    velocity      (n_blocks, 6)     rates of (u0, v0, r0, εx, εy, γxy) about the current centroid
+    stress        (n_blocks, 3)     Pa, current axes
+    rotation      (n_blocks,)       accumulated rotation, rad
+    crack_strain  (n_blocks, 3)     mean strain that the block's cracks carry, current axes
+    contacts      CONTACT rows      open ones that are near included
     """
 
     time: float
@@ -105,12 +105,12 @@ class Event:
 class CrackFaces:
     """Opening and slip along every crack, sampled element by element (they jump between elements).
 
-        segment   (n_elements,)             row in the crack network
-        points    (n_elements, n, 2)        sampling points, reference coordinates, from start to end
-        opening   (n_elements, n)           n·(u⁺ − u⁻), m
-        slip      (n_elements, n)           t·(u⁺ − u⁻), m
-        traction  (n_elements, n, 2)        (normal, shear) on the faces, Pa, normal negative when they press
-        state     (n_elements, n)           OPEN, STICK or SLIP
+    segment   (n_elements,)             row in the crack network
+    points    (n_elements, n, 2)        sampling points, reference coordinates, from start to end
+    opening   (n_elements, n)           n·(u⁺ − u⁻), m
+    slip      (n_elements, n)           t·(u⁺ − u⁻), m
+    traction  (n_elements, n, 2)        (normal, shear) on the faces, Pa, normal negative when they press
+    state     (n_elements, n)           OPEN, STICK or SLIP
     """
 
     segment: np.ndarray
@@ -125,18 +125,18 @@ class CrackFaces:
 class Cycle:
     """One coupling cycle, complete: what observers (writers, progress, pictures) see.
 
-        number      0, 1, 2 …, one a cycle
-        load_step   the load step it belongs to; ``growth_pass`` counts the passes at that step's load
-        load        the scene's leading load at ``state.time``: for a specimen the axial stress, Pa, positive in
-                    compression
-        strain      axial strain that goes with it, positive when shortening; nan where the scene names no axis
-        tips        TIP rows of all blocks
-        faces       the crack faces, or None when no block holds a crack
-        bodies      block index → solved elastic body with ``fields(points)``: stress (n, 3) and displacement (n, 2)
-                    in reference coordinates, for interior fields
-        monitors    name → displacement (2,) of the monitor point, m
-        statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
-        seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
+    number      0, 1, 2 …, one a cycle
+    load_step   the load step it belongs to; ``growth_pass`` counts the passes at that step's load
+    load        the scene's leading load at ``state.time``: for a specimen the axial stress, Pa, positive in
+                compression
+    strain      axial strain that goes with it, positive when shortening; nan where the scene names no axis
+    tips        TIP rows of all blocks
+    faces       the crack faces, or None when no block holds a crack
+    bodies      block index → solved elastic body with ``fields(points)``: stress (n, 3) and displacement (n, 2)
+                in reference coordinates, for interior fields
+    monitors    name → displacement (2,) of the monitor point, m
+    statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
+    seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
     """
 
     number: int

@@ -73,7 +73,9 @@ class GridFiles:
         data |= numbers
         data["Points"], data["connectivity"] = grid.points, grid.connectivity
         data["offsets"], data["types"] = grid.offsets, grid.types
-        kinds = tuple([(name, "i8" if isinstance(value, (int, np.integer)) else "f8") for name, value in numbers.items()])
+        kinds = tuple(
+            [(name, "i8" if isinstance(value, (int, np.integer)) else "f8") for name, value in numbers.items()]
+        )
         key = (n_points, n_cells, len(grid.connectivity), kinds)
         if self._layout is None or self._layout.key != key:
             self._layout = _Layout(self.series, *key)
