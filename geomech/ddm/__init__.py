@@ -19,6 +19,7 @@ _PUBLIC = {
     "OutOfEquilibrium": ".loads",
     "Pressure": ".loads",
     "Support": ".supports",
+    "LoadHistory": ".loads",
     "NotConverged": ".faces",
     "Solution": ".solution",
     "propagate": ".propagation",
@@ -28,6 +29,7 @@ _MODULES = ("criteria", "growth", "shapes")
 __all__ = [
     "Body",
     "BodyLoad",
+    "LoadHistory",
     "NotConverged",
     "OutOfEquilibrium",
     "Pressure",

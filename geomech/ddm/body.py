@@ -20,14 +20,15 @@ import numpy as np
 from ..model import TIP, Cracks, DdmSettings, Material
 from ..model.polygon import area_moments
 from . import shapes
+from .applied import Applied, apply, check_equilibrium
 from .boundary import BoundarySystem
 from .crack_system import CrackSystem
 from .faces import settle_faces
 from .influence import ElementSet, influence, reuse
 from .iterative import compressed, is_compressed
-from .loads import BodyLoad, check_equilibrium
+from .loads import BodyLoad
 from .mesh import Mesh, mesh, outline_edges
-from .particular import Particular
+from .placing import OFF
 from .solution import Solution
 from .supports import Holds, Support, called, marks, place, values_at
 from .unit_loads import UnitLoads, on_elements
@@ -86,6 +87,7 @@ class Body:
         if self.outlined:
             self.area, self.centroid, self._second = area_moments(self.loops)
             self._reach = float(np.ptp(self.loops[0], axis=0).max())
+            self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
         self.compressed = is_compressed(settings.solver, self.faces.n_unknowns)
@@ -143,24 +145,14 @@ class Body:
             reuse(old.crack_system.matrix if kept else None, c_old, c_old, c, c, schur)
         )
 
-    def _particular(self, load: BodyLoad) -> Particular:
-        force = np.zeros(2) if load.body_force is None else load.body_force
-        gradient = np.zeros((2, 2)) if load.body_force_gradient is None else load.body_force_gradient
-        if not self.outlined and (force.any() or gradient.any()):
-            raise ValueError("a body force needs a body with an outline")
-        if load.about is not None:
-            force = force + gradient @ (self.centroid - load.about)
-        uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
-        return Particular(self.centroid, force, gradient, uniform, self.material)
-
-    def _imposed(self, load: BodyLoad, particular: Particular) -> np.ndarray:
-        """(h_unknowns,) 2μ times what the supports hold of displacement, less that of the ``particular`` field."""
-        holds = self._outside.holds
+    def _imposed(self, applied: Applied) -> np.ndarray:
+        """(h_unknowns,) 2μ times what the supports hold of displacement, less that of particular fields."""
+        holds, load = self._outside.holds, applied.load
         values = () if load.displacements is None else load.displacements
         if load.displacements is not None and len(values) != len(self.supports):
             raise ValueError(f"{len(self.supports)} supports but {len(values)} imposed displacements")
         points = holds.sources.nodes
-        shift = -particular.displacement(points.reshape(-1, 2)).reshape(points.shape)
+        shift = -applied.regular(points.reshape(-1, 2)).reshape(points.shape)
         for k, value in enumerate(values):
             here, segment = holds.support == k, np.array(self._straight(k))
             at = points[here].reshape(-1, 2)
@@ -180,25 +172,28 @@ class Body:
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
         `faces.NotConverged` when the contact of crack faces does not settle.
         """
-        particular = self._particular(load)
+        applied = apply(load, self)
         if self.outlined:
-            check_equilibrium(
-                load, self._reach, self.area, self.centroid, self._second, particular.force, particular.gradient,
-                equilibrium_tolerance, self._outside.free_motions,
-            )  # fmt: skip
-        rest = np.zeros(self.boundary.n_unknowns + self.faces.n_unknowns)
-        if particular.uniform.any() and (self.outlined or not self.loops):
-            rest[self.boundary.n_unknowns :] = on_elements(self.faces, particular.uniform)
+            check_equilibrium(applied, self, equilibrium_tolerance)
+        n_g, uniform = self.boundary.n_unknowns, applied.particular.uniform
+        rest = np.zeros(n_g + self.faces.n_unknowns)
+        if uniform.any() and (self.outlined or not self.loops):
+            rest[n_g:] = on_elements(self.faces, uniform)
+        if not applied.plain:
+            tol = 2 * OFF * self._extent
+            rest[:n_g] += applied.on(self.boundary, True, self.nu, tol)
+            rest[n_g:] += applied.on(self.faces, False, self.nu, tol)
         imposed = np.zeros(0)
         if self.supports:
-            imposed = self._imposed(load, particular)
+            imposed = self._imposed(applied)
             rest += np.concatenate([self._outside.known @ imposed, self._c_known @ imposed])
-        units = self._loads.of(load, particular)
+        units = self._loads.of(applied)
         g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
-        w, closed, traction, solves = settle_faces(self, reduced, opened, load.crack_pressure, warm)
+        pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
+        w, closed, traction, solves = settle_faces(self, reduced, opened, pressure, warm)
         on_edges = [np.tensordot(unit.densities, size, 1) for unit, size in units if unit.densities is not None]
         edge_density = sum(on_edges) if on_edges else None
-        return Solution(self, load, particular, y, w, closed, traction, g, r, solves, imposed, edge_density)
+        return Solution(self, applied, y, w, closed, traction, g, r, solves, imposed, edge_density)
 
     @cached_property
     def tip_elements(self) -> tuple[np.ndarray, ...]:

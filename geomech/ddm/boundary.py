@@ -96,6 +96,14 @@ class FreeMotions:
     radius: float
     combinations: np.ndarray
 
+    def part(self, force: np.ndarray, moment: float, about: np.ndarray) -> tuple[np.ndarray, float]:
+        """The part of a ``force`` (2,) and a ``moment`` about a point that does work on these motions."""
+        arm = self.centre - about
+        own = moment - (arm[0] * force[1] - arm[1] * force[0])
+        ways = self.combinations
+        x, y, turn = ways @ (ways.T @ np.array([force[0], force[1], own / self.radius]))
+        return np.array([x, y]), turn * self.radius + arm[0] * y - arm[1] * x
+
 
 def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
     """Length of ``g``, mean (2,) of its points and their root mean square distance from it."""

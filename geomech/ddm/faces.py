@@ -61,17 +61,16 @@ def settle(
 
 
 def settle_faces(
-    body: Body, load_traction: np.ndarray, opened: np.ndarray, pressure: np.ndarray | float, warm: Solution | None
+    body: Body, load_traction: np.ndarray, opened: np.ndarray, pressure: np.ndarray, warm: Solution | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Slip and opening (times 2μ), closed unknowns (bool), traction on the faces and the number of solves; ``opened`` is
-    S⁻¹ ``load_traction``."""
+    S⁻¹ ``load_traction``, ``pressure`` (n_elements, p+1) that of a fluid at the nodes."""
     c = body.faces
     n = c.n_unknowns
     if n == 0:
         return np.zeros(0), np.zeros(0, bool), np.zeros(0), 0
-    pressure = np.broadcast_to(np.asarray(pressure, dtype=float), (body.cracks.n_segments,))
     applied = np.zeros((c.n, 2, c.per))
-    applied[:, 1] = -pressure[c.source, None]
+    applied[:, 1] = -pressure
     applied = applied.ravel()
     right = applied - load_traction
     opened = body.crack_system.opened(applied) - opened if applied.any() else -opened

@@ -197,6 +197,14 @@ def _line_forces(points, tangents, start, end, degree, nu, tol, side):
 _AT_END = 0.01
 
 
+def _clustered() -> tuple[np.ndarray, np.ndarray]:
+    """Points in (0, 1) and weights (of a piece of length 2) of a quadrature for logarithms at both ends."""
+    x, q = np.polynomial.legendre.leggauss(14)
+    # s²(3 − 2s) takes the edge off them.
+    s = 0.5 * (1 + x)
+    return s * s * (3 - 2 * s), 3 * s * (1 - s) * q
+
+
 def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, tol: float, side: float) -> None:
     """Where line forces end on an element their traction jumps and is logarithmic: replace the nodal values in ``unit``
     (`line_forces`) by those of the polynomial with the same moments, in place.
@@ -207,10 +215,7 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
     t, n, c = targets.tangent, targets.normal, 0.5 * targets.length
     middle = 0.5 * (targets.start + targets.end)
     rows = unit.reshape(targets.n, 2, targets.per, *unit.shape[1:])
-    x, q = np.polynomial.legendre.leggauss(14)
-    # s²(3 − 2s) takes the edge off logarithms at both ends of a piece.
-    s = 0.5 * (1 + x)
-    clustered, q = s * s * (3 - 2 * s), 3 * s * (1 - s) * q
+    clustered, q = _clustered()
     degrees = np.arange(targets.per)
     at_nodes = np.polynomial.legendre.legvander(shapes.nodes(targets.family, targets.order), targets.order)
     for m, (a, b) in enumerate(zip(start, end)):
@@ -227,6 +232,33 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
             values = values.reshape(2, len(u), 2, -1)
             legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (degrees + 0.5)
             rows[e, :, :, m] = np.einsum("jk,uk,cuxd->cjxd", at_nodes, legendre, values)
+
+
+def project_total(
+    rows: np.ndarray, targets: ElementSet, start, end, density: np.ndarray, nu: float, tol: float, side: float
+) -> None:
+    """The same for the traction ``rows`` (n_unknowns,) that line forces of monomial ``density`` (m, 2, p+1) add up to, in
+    place: where any of them ends inside an element, that element gets moments of the sum, in which singularities of pieces
+    that meet cancel."""
+    values = rows.reshape(targets.n, 2, targets.per)
+    clustered, q = _clustered()
+    ends = np.unique(np.concatenate([start, end]), axis=0)
+    at_nodes = np.polynomial.legendre.legvander(shapes.nodes(targets.family, targets.order), targets.order)
+    for e in range(targets.n):
+        c = 0.5 * targets.length[e]
+        rel = (ends - 0.5 * (targets.start[e] + targets.end[e])) / c
+        along, across = rel @ targets.tangent[e], rel @ targets.normal[e]
+        inside = along[(np.abs(across) * c <= 2 * tol) & (np.abs(along) < 1 - _AT_END)]
+        if not len(inside):
+            continue
+        cuts = np.unique(np.concatenate([[-1.0, 1.0], inside]))
+        u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
+        w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
+        points = (0.5 * (targets.start[e] + targets.end[e]) + c * u[:, None] * targets.tangent[e])[None]
+        unit = _line_forces(points, targets.tangent[e : e + 1], start, end, density.shape[2] - 1, nu, tol, side)
+        total = (unit.reshape(2 * len(u), -1) @ density.ravel()).reshape(2, len(u))
+        legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (np.arange(targets.per) + 0.5)
+        values[e] = total @ legendre @ at_nodes.T
 
 
 def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, out):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .boundary import FreeMotions
+from ..model import History
 
 
 class OutOfEquilibrium(ValueError):
@@ -55,11 +53,20 @@ class BodyLoad:
     about                (2,)       m; the centroid when left out
     remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
                                     that carry it act on the boundary in addition to ``tractions``
-    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses
+    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a `Pressure`,
+                         or a function of points (n, 2) to (n,)
     hole_pressure        the same in all holes, or of each: a number, Pa, or a `Pressure`
     displacements        for every support of the body what it imposes, m: None (zero), constant (2,), linear (2, 2) from
                          its values at the support's ends, or a function of points (n, 2); components that the
                          support does not hold are ignored
+    sides                {where: traction}: an edge's number or a straight piece ((x, y), (x, y)) to a traction (Pa, x
+                         and y) that is constant (2,), linear (2, 2) from its values at the ends, or a function of
+                         points (n, 2) to (n, 2)
+    points, forces       (k, 2) m and N/m: point loads, inside the rock or on its boundary. They are singular, except
+                         on holes and where the plane beyond the boundary holds rock: there a hundredth of the extent
+                         carries them
+
+    Raises ValueError naming the part that is not finite or of the wrong shape.
     """
 
     segments: np.ndarray | None = None
@@ -71,6 +78,61 @@ class BodyLoad:
     crack_pressure: np.ndarray | float = 0.0
     hole_pressure: Pressure | Sequence[Pressure | float] | float = 0.0
     displacements: Sequence | None = None
+    sides: Mapping | Sequence[tuple] = ()
+    points: np.ndarray | None = None
+    forces: np.ndarray | None = None
+
+    def scaled(self, factor: float) -> BodyLoad:
+        """``factor`` times everything."""
+        changed = {
+            name: _times(getattr(self, name), factor)
+            for name in ("tractions", "body_force", "body_force_gradient", "remote_stress", "crack_pressure", "forces")
+        }
+        displacements, holes = self.displacements, self.hole_pressure
+        if displacements is not None:
+            displacements = [_times(value, factor) for value in displacements]
+        if isinstance(holes, (Sequence, np.ndarray)):
+            holes = [_times(p, factor) for p in holes]
+        else:
+            holes = _times(holes, factor)
+        sides = [(where, _times(value, factor)) for where, value in self.sides]
+        return replace(self, **changed, displacements=displacements, hole_pressure=holes, sides=sides)
+
+    def with_added(self, other: BodyLoad) -> BodyLoad:
+        """Both loads together. Raises ValueError when body forces are given about different points."""
+        joined = {
+            name: _joined(getattr(self, name), getattr(other, name))
+            for name in ("segments", "tractions", "points", "forces")
+        }
+        summed = {
+            name: _plus(getattr(self, name), getattr(other, name))
+            for name in ("body_force", "body_force_gradient", "remote_stress", "crack_pressure")
+        }
+        graded = [load for load in (self, other) if load.body_force_gradient is not None]
+        if len(graded) == 2 and not np.array_equal(self.about, other.about):
+            raise ValueError("body forces given about different points cannot be added")
+        about = graded[0].about if graded else None
+        holes = self.hole_pressure, other.hole_pressure
+        lists = [isinstance(p, (Sequence, np.ndarray)) for p in holes]
+        if any(lists):
+            n = len(holes[lists.index(True)])
+            pair = [list(p) if many else [p] * n for p, many in zip(holes, lists)]
+            pressure = [_plus(p, q) for p, q in zip(*pair, strict=True)]
+        else:
+            pressure = _plus(*holes)
+        moved = self.displacements, other.displacements
+        if moved[0] is None or moved[1] is None:
+            displacements = moved[0] if moved[1] is None else moved[1]
+        else:
+            displacements = [_plus(a, b) for a, b in zip(*moved, strict=True)]
+        return BodyLoad(
+            **joined,
+            **summed,
+            about=about,
+            hole_pressure=pressure,
+            displacements=displacements,
+            sides=self.sides + other.sides,
+        )
 
     def hole_pressures(self, n_holes: int) -> list[Pressure]:
         """That of every hole, [] when there is none. Raises ValueError when there are not as many."""
@@ -85,6 +147,21 @@ class BodyLoad:
             raise ValueError(f"{n_holes} holes but {len(given)} pressures")
         return [p if isinstance(p, Pressure) else Pressure(float(p)) for p in given]
 
+    def face_pressure(self, points: np.ndarray, segment: np.ndarray, n_segments: int) -> np.ndarray:
+        """(n, m) Pa at ``points`` (n, m, 2) on crack elements of ``segment`` (n,). Raises ValueError."""
+        p = self.crack_pressure
+        if isinstance(p, Pressure):
+            return p.at(points)
+        if callable(p):
+            out = np.asarray(p(points.reshape(-1, 2)), dtype=float)
+            if out.size != points[..., 0].size or not np.isfinite(out).all():
+                raise ValueError("crack_pressure: the function must give a finite number for every point")
+            return out.reshape(points.shape[:-1])
+        if np.ndim(p) and np.shape(p) != (n_segments,):
+            raise ValueError(f"crack_pressure: {n_segments} crack segments but shape {np.shape(p)}")
+        out = np.broadcast_to(np.asarray(p, dtype=float), (n_segments,))[segment]
+        return np.broadcast_to(out[:, None], points.shape[:-1])
+
     def __post_init__(self) -> None:
         shapes = {
             "segments": (-1, 2, 2),
@@ -93,6 +170,8 @@ class BodyLoad:
             "body_force_gradient": (2, 2),
             "about": (2,),
             "remote_stress": (3,),
+            "points": (-1, 2),
+            "forces": (-1, 2),
         }
         for name, shape in shapes.items():
             value = getattr(self, name)
@@ -107,52 +186,81 @@ class BodyLoad:
         for p in self.hole_pressure if isinstance(self.hole_pressure, Sequence) else [self.hole_pressure]:
             if not isinstance(p, Pressure) and not np.isfinite(p).all():
                 raise ValueError("hole_pressure: not finite")
-        if not np.isfinite(self.crack_pressure).all():
+        p = self.crack_pressure
+        if not callable(p) and not isinstance(p, Pressure) and not np.isfinite(p).all():
             raise ValueError("crack_pressure: not finite")
         n = [0 if x is None else len(x) for x in (self.segments, self.tractions)]
         if n[0] != n[1]:
             raise ValueError(f"{n[0]} load segments but {n[1]} tractions")
+        n = [0 if x is None else len(x) for x in (self.points, self.forces)]
+        if n[0] != n[1]:
+            raise ValueError(f"{n[0]} loaded points but {n[1]} forces")
+        pairs = self.sides.items() if isinstance(self.sides, Mapping) else self.sides
+        object.__setattr__(self, "sides", tuple(_side(where, value) for where, value in pairs))
 
 
-def check_equilibrium(
-    load: BodyLoad,
-    reach: float,
-    area: float,
-    centroid: np.ndarray,
-    second: np.ndarray,
-    force: np.ndarray,
-    gradient: np.ndarray,
-    tolerance: float,
-    free: FreeMotions | None = None,
-) -> None:
-    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size.
-
-    ``reach`` is the body's extent; ``area``, ``centroid`` and ``second`` (2, 2) its area moments; ``force`` and
-    ``gradient`` the body force about the centroid. With supports only the ``free`` rigid motions count.
-    """
-    total, moment, size = np.zeros(2), 0.0, 0.0
-    if load.segments is not None and len(load.segments):
-        total, moment, size = resultants(load.segments, load.tractions, centroid)
-    if force.any() or gradient.any():
-        total = total + area * force
-        turned = gradient @ second
-        moment += turned[1, 0] - turned[0, 1]
-        size += area * (float(np.hypot(*force)) + float(np.abs(gradient).max()) * reach)
-    if size > 0:
-        if free is not None:
-            total, moment = _unheld(total, moment, centroid, free)
-        relative = max(float(np.hypot(*total)), abs(moment) / reach) / size
-        if relative > tolerance:
-            raise OutOfEquilibrium(total, moment, relative)
+def _times(value, factor: float):
+    """``factor`` times an array, a pressure or a function; None stays."""
+    if value is None:
+        return None
+    if callable(value):
+        return lambda points: factor * np.asarray(value(points), dtype=float)
+    if isinstance(value, Pressure):
+        return Pressure(factor * value.value, tuple(factor * np.asarray(value.gradient, dtype=float)), value.about)
+    return factor * np.asarray(value, dtype=float)
 
 
-def _unheld(total: np.ndarray, moment: float, centroid: np.ndarray, free: FreeMotions) -> tuple[np.ndarray, float]:
-    """The part of a force (2,) and a moment about ``centroid`` that does work on the ``free`` rigid motions."""
-    arm = free.centre - centroid
-    about = moment - (arm[0] * total[1] - arm[1] * total[0])
-    work = free.combinations @ (free.combinations.T @ np.array([total[0], total[1], about / free.radius]))
-    force, about = work[:2], work[2] * free.radius
-    return force, about + arm[0] * force[1] - arm[1] * force[0]
+def _plus(a, b):
+    """The sum of two arrays, pressures, functions or None (nothing)."""
+    if a is None or b is None:
+        return b if a is None else a
+    if not callable(a) and not callable(b):
+        if isinstance(a, Pressure) or isinstance(b, Pressure):
+            a, b = (p if isinstance(p, Pressure) else Pressure(_number(p)) for p in (a, b))
+            slope = np.asarray(a.gradient, dtype=float) + b.gradient
+            return Pressure(float(a.value + b.at(np.asarray(a.about, dtype=float))), tuple(slope), a.about)
+        return np.asarray(a, dtype=float) + np.asarray(b, dtype=float)
+
+    def part(value, points: np.ndarray):
+        if callable(value):
+            return np.asarray(value(points), dtype=float)
+        return value.at(points) if isinstance(value, Pressure) else value
+
+    for value in (a, b):
+        if not callable(value) and not isinstance(value, Pressure) and np.shape(value) not in ((), (2,)):
+            raise ValueError("what differs from place to place by a list of values cannot be added to a function")
+    return lambda points: part(a, points) + part(b, points)
+
+
+def _number(p) -> float:
+    if np.ndim(p):
+        raise ValueError("a pressure that is linear in position cannot be added to one of each crack")
+    return float(p)
+
+
+def _joined(a: np.ndarray | None, b: np.ndarray | None) -> np.ndarray | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return np.concatenate([a, b])
+
+
+def _side(where, value) -> tuple:
+    """A pair of `BodyLoad.sides`, checked: an int or (2, 2) as tuples, a function or an array."""
+    name = f"side {where}"
+    if not isinstance(where, (int, np.integer)):
+        piece = np.asarray(where, dtype=float)
+        if piece.shape != (2, 2) or not np.isfinite(piece).all():
+            raise ValueError(f"{name}: expected an edge's number or the two ends of a piece of the boundary")
+        where = tuple(map(tuple, piece.tolist()))
+    else:
+        where = int(where)
+    if not callable(value):
+        value = np.array(value, dtype=float)
+        if value.shape not in ((2,), (2, 2)):
+            raise ValueError(f"{name}: expected a traction (2,), (2, 2) or a function, got shape {value.shape}")
+        if not np.isfinite(value).all():
+            raise ValueError(f"{name}: its traction is not finite")
+    return where, value
 
 
 def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, float, float]:
@@ -172,3 +280,21 @@ def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -
     moments = length / 6 * (cross(a, t_a) + 4 * cross(middle, t_middle) + cross(b, t_b))
     size = float(np.sum(length * (np.hypot(*t_a.T) + np.hypot(*t_b.T)) / 2))
     return forces.sum(axis=0), float(moments.sum()), size
+
+
+@dataclass(frozen=True, eq=False)
+class LoadHistory:
+    """Loads whose sizes are functions of time: ``parts`` are pairs of a `BodyLoad` and a factor, a number, a function of
+    time (s), or a `model.History` of one component."""
+
+    parts: Sequence[tuple[BodyLoad, float | Callable[[float], float] | History]]
+
+    def at(self, time: float) -> BodyLoad:
+        """What acts at ``time``."""
+        out: BodyLoad | None = None
+        for load, factor in self.parts:
+            if isinstance(factor, History):
+                factor = factor.at(time)[0]
+            part = load.scaled(float(factor(time) if callable(factor) else factor))
+            out = part if out is None else out.with_added(part)
+        return BodyLoad() if out is None else out

@@ -10,10 +10,9 @@ import numpy as np
 from ..conventions import normal_of
 from ..model import OPEN, SLIP, CrackFaces
 from . import shapes
+from .applied import Applied
 from .boundary import middle_of
 from .influence import add_fields
-from .loads import BodyLoad
-from .particular import Particular
 from .placing import OFF, onto_boundary
 from .reactions import Reactions, reactions
 
@@ -38,8 +37,7 @@ class Solution:
     def __init__(
         self,
         body: Body,
-        load: BodyLoad,
-        particular: Particular,
+        applied: Applied,
         eliminated: np.ndarray,
         jumps: np.ndarray,
         closed: np.ndarray,
@@ -50,9 +48,9 @@ class Solution:
         imposed: np.ndarray,
         edge_density: np.ndarray | None,
     ):
-        self.body, self.load, self.solves = body, load, solves
+        self.body, self.load, self.solves = body, applied.load, solves
         self.closed = closed
-        self._particular, self._eliminated = particular, eliminated
+        self._applied, self._eliminated = applied, eliminated
         self._w, self._traction = jumps, traction
         self._boundary_load, self._face_load, self._imposed = boundary_load, face_load, imposed
         self._edge_density = edge_density
@@ -75,7 +73,7 @@ class Solution:
     @cached_property
     def reactions(self) -> Reactions:
         """What the supports do to the body: tractions along them and their resultants."""
-        return reactions(self.body, self._on_supports[1], self._particular)
+        return reactions(self.body, self._on_supports[1], self._applied.particular)
 
     @cached_property
     def states(self) -> np.ndarray:
@@ -182,21 +180,23 @@ class Solution:
         if body.supports:
             held = body._outside.holds.sources
             add(held.start, held.end, held.kind, held.densities(self._on_supports[1]), body._tol, True)
-        if self.load.segments is not None and len(self.load.segments):
+        if len(self._applied.segments):
             start, end, density = self._line_forces
             add(start, end, np.zeros(len(start), np.int64), density, 2 * OFF * body._extent, True)
         if self._edge_density is not None:
             edges = body.mesh.edges
             kind = np.zeros(len(edges), np.int64)
             add(edges[:, 0], edges[:, 1], kind, self._edge_density, body._tol, True)
+        for part in self._applied.lines:
+            add(part.start, part.end, np.zeros(len(part.start), np.int64), part.density, 2 * OFF * body._extent, True)
         shift /= 2 * body.material.shear_modulus
-        return stress + self._particular.stress(where), shift + self._particular.displacement(where)
+        return stress + self._applied.stress(where), shift + self._applied.displacement(where)
 
     @cached_property
     def _line_forces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         body = self.body
         start, end, density = [], [], []
-        for k, (segment, ends) in enumerate(zip(self.load.segments, self.load.tractions)):
+        for k, (segment, ends) in enumerate(zip(self._applied.segments, self._applied.tractions)):
             (a, b), against, _ = onto_boundary(body.mesh.edges, segment, f"load segment {k}", body._extent)
             ends = ends[::-1] if against else ends
             t = (b - a) / np.hypot(*(b - a))
@@ -248,7 +248,7 @@ class Solution:
         u = self._u.reshape(g.n, 2, g.per)[here] / (2 * body.material.shear_modulus)
         x, ds = g.nodes[here], g.quadrature[here]
         total = u[:, 0, :, None] * g.tangent[here, None] + u[:, 1, :, None] * g.normal[here, None]
-        total = total + self._particular.displacement(x.reshape(-1, 2)).reshape(x.shape)
+        total = total + self._applied.regular(x.reshape(-1, 2)).reshape(x.shape)
         perimeter, middle, radius = middle_of(g.take(here))
         mean = np.einsum("ej,ejc->c", ds, total) / perimeter
         rel = x - middle

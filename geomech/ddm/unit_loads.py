@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import Material
 from .boundary import BoundarySystem
 from .influence import ElementSet, line_forces, project_jumps
-from .loads import BodyLoad
 from .mesh import Mesh
 from .particular import Particular, edge_densities
 from .placing import OFF, onto_boundary
+
+if TYPE_CHECKING:
+    from .applied import Applied
 
 #: Loads on so many different segments are remembered.
 _REMEMBERED = 400
@@ -78,9 +81,10 @@ class UnitLoads:
             unit.eliminated = before.eliminated
         self._recent = keys
 
-    def of(self, load: BodyLoad, particular: Particular) -> list[tuple[UnitLoad, np.ndarray]]:
-        """The unit loads of which ``load`` is made and their sizes."""
-        units = self._unit_segments(load)
+    def of(self, applied: Applied) -> list[tuple[UnitLoad, np.ndarray]]:
+        """The unit loads of which what is ``applied`` is made, all but functions and point loads, and their sizes."""
+        load, particular = applied.load, applied.particular
+        units = self._unit_segments(applied.segments, applied.tractions)
         sizes: dict[str | int, np.ndarray] = {}
         if particular.force.any() or particular.gradient.any():
             sizes["force"] = np.concatenate([particular.force, particular.gradient.ravel()])
@@ -138,20 +142,20 @@ class UnitLoads:
             reduced = unit.applied[n_g:] - cg @ unit.eliminated
             unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
 
-    def _unit_segments(self, load: BodyLoad) -> list[tuple[UnitLoad, np.ndarray]]:
-        """The load's segments and their (4,) tractions."""
-        if load.segments is None or not len(load.segments):
+    def _unit_segments(self, segments: np.ndarray, tractions: np.ndarray) -> list[tuple[UnitLoad, np.ndarray]]:
+        """The ``segments`` (m, 2, 2) and their (4,) tractions."""
+        if not len(segments):
             return []
         if not len(self.mesh.edges):
             raise ValueError("load segments need a body with an outline")
-        keys = [segment.tobytes() for segment in load.segments]
+        keys = [segment.tobytes() for segment in segments]
         missing = [k for k, key in enumerate(keys) if key not in self._segments]
         if missing:
             if len(self._segments) > _REMEMBERED:
                 self._segments.clear()
-                return self._unit_segments(load)
+                return self._unit_segments(segments, tractions)
             placed = [
-                onto_boundary(self.mesh.edges, load.segments[k], f"load segment {k}", self.extent)[:2] for k in missing
+                onto_boundary(self.mesh.edges, segments[k], f"load segment {k}", self.extent)[:2] for k in missing
             ]
             straight = np.array([segment for segment, _ in placed])
             parts = (self._linear_forces(targets, straight) for targets in (self.boundary, self.faces))
@@ -159,7 +163,7 @@ class UnitLoads:
                 self._segments[keys[k]] = UnitLoad(np.concatenate(rows), segment, against)
         self._recent = keys
         units = [self._segments[key] for key in keys]
-        return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, load.tractions)]
+        return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, tractions)]
 
     def _linear_forces(self, targets: ElementSet, segments: np.ndarray) -> np.ndarray:
         """(m, n_unknowns, 4) traction from unit (x, y) forces at the start, then at the end of straight segments,
