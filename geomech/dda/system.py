@@ -77,7 +77,7 @@ class BlockSystem:
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
         self._no_compliance = np.zeros((blocks.n_blocks, 3, 3))
         self._no_offset = np.zeros((blocks.n_blocks, 3))
-        self._sparse: tuple[bytes, assembly.Pattern] | None = None
+        self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
 
         vertices = blocks.vertices
         areas = blocks.areas()
@@ -232,12 +232,12 @@ class BlockSystem:
             law = self._law_of[a, b]
         return law
 
-    def _pattern(self, block: np.ndarray, other: np.ndarray) -> assembly.Pattern:
+    def _pattern(self, block: np.ndarray, other: np.ndarray, moments: np.ndarray) -> assembly.Pattern:
         if int(self._free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self._free, block, other)
-        key = block.tobytes() + other.tobytes()
-        if self._sparse is None or self._sparse[0] != key:
-            self._sparse = key, assembly.sparse_pattern(self._free, block, other)
+        if self._sparse is None or self._sparse[0] is not block:
+            kept = None if self._sparse is None else self._sparse[1].solver
+            self._sparse = block, assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
         return self._sparse[1]
 
     def _attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> tuple[StepResult, float]:
@@ -262,7 +262,7 @@ class BlockSystem:
             damping, dt,
         )  # fmt: skip
         n_free = int((~self._fixed).sum())
-        pattern = self._pattern(found["block"], found["other"]) if n_free else None
+        pattern = self._pattern(found["block"], found["other"], moments) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assembly.assemble_blocks(
             order, moments, density, self._stiffness, self._compliance, carried, stress, crack_strain, given,
