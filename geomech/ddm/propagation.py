@@ -10,7 +10,6 @@ whether the factor rises (stable) or falls (it would run away under a dead load)
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -138,7 +137,7 @@ class _Run:
     def _load_at(self, factor: float, cracks: Cracks) -> BodyLoad:
         if callable(self.load):
             return self.load(factor, cracks)
-        return self.load if factor == 1.0 else times(self.load, factor)
+        return self.load if factor == 1.0 else self.load.scaled(factor)
 
     def _solve(self, body: Body, factor: float) -> tuple[Solution, np.ndarray]:
         solution = body.solve(self._load_at(factor, body.cracks), warm=self.solution)
@@ -246,18 +245,3 @@ class _Run:
 
     def _event(self, kind: str, point, detail: str) -> Event:
         return Event(kind, self.number, 0.0, self.factor, (float(point[0]), float(point[1])), detail)
-
-
-def times(load: BodyLoad, factor: float) -> BodyLoad:
-    """``load``, every part of it multiplied. Raises ValueError when a part is no number or array of numbers: such a load is
-    given as a function of the factor."""
-    where = {"segments", "about"}
-    scaled = {}
-    for field in dataclasses.fields(load):
-        value = getattr(load, field.name)
-        if value is None or field.name in where:
-            continue
-        if not np.issubdtype(np.asarray(value).dtype, np.number):
-            raise ValueError(f"{field.name} cannot be multiplied: give the load as a function of the load factor")
-        scaled[field.name] = factor * np.asarray(value, dtype=float)
-    return dataclasses.replace(load, **scaled)
