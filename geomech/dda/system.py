@@ -67,7 +67,7 @@ class BlockSystem:
         of = np.asarray(blocks.material, dtype=int)
         self.density = np.array([m.density for m in self.materials])[of]
         self._stiffness = np.ascontiguousarray(np.array([m.stiffness() for m in self.materials])[of])
-        self._compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
+        self.compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
         self._modulus = np.array([m.plane_modulus for m in self.materials])[of]
         self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
@@ -265,7 +265,7 @@ class BlockSystem:
         pattern = self._pattern(found["block"], found["other"], moments) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assembly.assemble_blocks(
-            order, moments, density, self._stiffness, self._compliance, carried, stress, crack_strain, given,
+            order, moments, density, self._stiffness, self.compliance, carried, stress, crack_strain, given,
             compliance, offset, gravity, load, dt, damping, n_free,
         )  # fmt: skip
         vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
@@ -324,7 +324,7 @@ class BlockSystem:
             "step_cuts": cuts,
             "kinetic_energy": self._kinetic_energy(density, velocity, moments),
             "elastic_energy": 0.5
-            * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self._compliance, new_stress))),
+            * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self.compliance, new_stress))),
             "contact_energy": 0.5
             * float(
                 np.sum(new_gap[closed] ** 2 * found["springs"].normal[closed])

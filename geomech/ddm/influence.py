@@ -106,6 +106,14 @@ class ElementSet:
             return np.arange(self.n)
         return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
 
+    @cached_property
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, p+3, 2) the ends and between them the collocation points of every element, and (n, p+1, p+3) what nodal values
+        have to be multiplied by (from the left) for the values there."""
+        t = np.concatenate([[-1.0], shapes.nodes(self.family, self.order), [1.0]])
+        table = np.array([shapes.at(self.family, self.order, kind, t).T for kind in range(4)])
+        return self.at(t), table[self.kind]
+
     def take(self, which: np.ndarray) -> ElementSet:
         return ElementSet(
             self.start[which], self.end[which], self.kind[which], self.source[which], self.order, self.family
@@ -115,10 +123,6 @@ class ElementSet:
         """Indices of the unknowns (and rows) of ``elements``."""
         width = 2 * self.per
         return (np.asarray(elements)[:, None] * width + np.arange(width)).ravel()
-
-    @cached_property
-    def _by_kind(self) -> list[tuple[int, np.ndarray]]:
-        return [(int(kind), np.flatnonzero(self.kind == kind)) for kind in np.unique(self.kind)]
 
     @cached_property
     def _inverse_weight(self) -> np.ndarray:
@@ -131,14 +135,6 @@ class ElementSet:
         """(n, 2, p+1) monomial coefficients of nodal ``values`` (n_unknowns,)."""
         scaled = values.reshape(self.n, 2, self.per) * self._inverse_weight[:, None, :]
         return np.ascontiguousarray(scaled @ shapes.to_monomials(self.family, self.order, shapes.ORDINARY).T)
-
-    def evaluate(self, values: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """(n, 2, len(t)) local components at ``t`` of nodal ``values`` (n_unknowns,)."""
-        rows = values.reshape(self.n, 2, self.per)
-        out = np.empty((self.n, 2, len(t)))
-        for kind, which in self._by_kind:
-            out[which] = rows[which] @ shapes.at(self.family, self.order, kind, t).T
-        return out
 
     @cached_property
     def quadrature(self) -> np.ndarray:
