@@ -38,7 +38,7 @@ def test_controlled_load_follows_griffith():
 
 
 def test_a_load_that_wedges_the_crack_open_arrests_it():
-    """Pressure on the first length only: K = 2p √(a/π) arcsin(a₀/a) falls with a (Tada, Paris & Irwin 1973, 5.11), so that
+    """Pressure on the first length only: K = 2p √(a/π) arcsin(a₀/a) falls with a (Tada, Paris & Irwin 1973), so that
     under a dead load the crack runs to where that is K_Ic, and stops there within an increment."""
     pressure = 12e6
 
