@@ -23,6 +23,7 @@ _PUBLIC = {
     "NotConverged": ".faces",
     "Solution": ".solution",
     "propagate": ".propagation",
+    "solve_to": ".automatic",
 }
 _MODULES = ("criteria", "growth", "shapes")
 
@@ -39,6 +40,7 @@ __all__ = [
     "growth",
     "propagate",
     "shapes",
+    "solve_to",
 ]
 
 

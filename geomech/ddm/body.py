@@ -21,6 +21,7 @@ from ..model import TIP, Cracks, DdmSettings, Material
 from ..model.polygon import area_moments
 from . import shapes
 from .applied import Applied, apply, check_equilibrium
+from .automatic import for_target
 from .boundary import BoundarySystem
 from .crack_system import CrackSystem
 from .faces import settle_faces
@@ -55,7 +56,7 @@ class Body:
         supports: Sequence[Support] = (),
     ):
         self.material, self.cracks = material, cracks
-        self.settings = settings = DdmSettings() if settings is None else settings
+        self.settings = settings = for_target(DdmSettings() if settings is None else settings)
         self.supports = tuple(supports)
         if previous is not None and (
             previous.settings != settings
@@ -96,6 +97,18 @@ class Body:
     @property
     def nu(self) -> float:
         return self.material.effective_poissons_ratio
+
+    def remeshed(self, settings: DdmSettings) -> Body:
+        """The same body with another mesh."""
+        n_outlines = int(self.outlined)
+        return Body(
+            self.loops[:n_outlines],
+            self.cracks,
+            self.material,
+            settings,
+            holes=self.loops[n_outlines:],
+            supports=self.supports,
+        )
 
     def _assemble(self, previous: Body | None) -> None:
         nu, tol = self.nu, self._tol

@@ -19,13 +19,9 @@ import numpy as np
 from ..model import Cracks, DdmSettings
 from ..model.polygon import signed_area
 from . import proximity, shapes
+from .grading import FINEST, KINK, Grading
 from .influence import ElementSet
 
-#: A turn by more than this is a kink that is graded, rad.
-KINK = math.radians(20)
-#: A turn by more than this is a sharp kink, graded for good and by so many layers more (two of them: K_I 3.5 % → 1 %).
-SHARP_KINK = math.radians(60)
-SHARP_LAYERS = 2
 #: Neighbouring segments whose elements differ more than this in length are graded.
 JUMP = 10.0
 #: Increments between a slight kink and the tip from which the kink is not graded any more.
@@ -66,10 +62,11 @@ def mesh(
     """Elements of a body with outline ``loops`` (counter-clockwise, holes clockwise; holes alone or [] for the
     infinite plane). ``marks``: further points (2,) of the boundary that are to be nodes, with graded layers at each."""
     edges, edge_loop = outline_edges(loops)
-    boundary = _boundary(loops, edges, cracks, settings, marks)
-    crack = _cracks(cracks, settings)
     points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
     extent = np.ptp(points, axis=0).max() if len(points) else 0.0
+    grading = Grading.of(settings)
+    boundary = _boundary(loops, edges, cracks, settings, grading, FINEST * extent, marks)
+    crack = _cracks(cracks, settings, grading, FINEST * extent, edges)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     start, end, kind, source = _halved(
@@ -89,23 +86,24 @@ def mesh(
     )  # fmt: skip
 
 
-def _graded(ratio: float, layers: int) -> list[float]:
-    """Fractions inside (0, 1) that grade an element towards 0."""
-    return [ratio**k for k in range(layers, 0, -1)]
-
-
-def _boundary(loops, edges, cracks, settings, marks):
+def _boundary(loops, edges, cracks, settings, grading, finest, marks):
     if not len(edges):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     spans = [math.sqrt(abs(signed_area(loop))) for loop in loops]
     if signed_area(loops[0]) > 0:
         spans = spans[:1] * len(loops)
-    layers, ratio = settings.grading_layers, settings.grading_ratio
-    mouths = [(cracks.nodes[k], layers) for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))]
+    mouths = [
+        (cracks.nodes[k], _layers_at(cracks, k, edges, grading))
+        for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))
+    ]
     mouths += marks
-    angles = np.concatenate([_interior_angles(loop) for loop in loops])
-    corner = [_corner_layers(angle, layers) for angle in angles]
+    angles = np.concatenate([interior_angles(loop) for loop in loops])
+    corner = [grading.at_corner(angle) for angle in angles]
+    if grading.target is not None:
+        for point, deep in mouths:
+            for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
+                corner[k] = deep
     for point, deep in marks:
         for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
             corner[k] = max(corner[k], deep)
@@ -120,16 +118,17 @@ def _boundary(loops, edges, cracks, settings, marks):
                 span / settings.elements_per_side,
                 corner[edge],
                 corner[first[k] + (i + 1) % n_edges],
-                ratio,
+                grading,
+                finest,
             )
-            line = _with_mouths(edges[edge], fractions, mouths, ratio, span)
+            line = _with_mouths(edges[edge], fractions, mouths, grading, span, finest)
             nodes.append(np.stack([line[:-1], line[1:]], axis=1))
             source.append(np.full(len(line) - 1, edge))
     pairs = np.concatenate(nodes)
     return pairs[:, 0], pairs[:, 1], np.zeros(len(pairs), np.int64), np.concatenate(source)
 
 
-def _interior_angles(loop: np.ndarray) -> np.ndarray:
+def interior_angles(loop: np.ndarray) -> np.ndarray:
     """(n,) angle of rock at each vertex, rad, in (0, 2π)."""
     out = np.roll(loop, -1, axis=0) - loop
     back = np.roll(loop, 1, axis=0) - loop
@@ -137,24 +136,18 @@ def _interior_angles(loop: np.ndarray) -> np.ndarray:
     return np.mod(turn, 2 * np.pi)
 
 
-def _corner_layers(angle: float, layers: int) -> int:
-    """Re-entrant corners are singular and get all layers and one more, convex ones one, straight ones none."""
-    if angle > math.pi + KINK:
-        return layers + 1
-    return 1 if angle < math.pi - KINK and layers else 0
-
-
-def _side(length: float, size: float, layers_start: int, layers_end: int, ratio: float) -> np.ndarray:
+def _side(length: float, size: float, at_start: int, at_end: int, grading: Grading, finest: float) -> np.ndarray:
     """(n + 1,) fractions along a side, from 0 to 1."""
     n = max(1, math.ceil(length / size - 1e-9))
-    if n == 1 and layers_start and layers_end:
+    if n == 1 and at_start and at_end:
         n = 2
     inner = list(range(1, n))
-    fine = [f for f in _graded(ratio, layers_start)] + inner + [n - f for f in _graded(ratio, layers_end)][::-1]
+    least = finest * n / length
+    fine = grading.fractions(at_start, least) + inner + [n - f for f in grading.fractions(at_end, least)][::-1]
     return np.array([0.0, *(f / n for f in fine), 1.0])
 
 
-def _with_mouths(edge, fractions, mouths, ratio, span) -> np.ndarray:
+def _with_mouths(edge, fractions, mouths, grading, span, finest) -> np.ndarray:
     """(n, 2) points along an ``edge`` with ``mouths`` (point, layers) as nodes, graded; elsewhere as without them."""
     a, b = edge
     along = b - a
@@ -179,14 +172,17 @@ def _with_mouths(edge, fractions, mouths, ratio, span) -> np.ndarray:
                 k = int(np.searchsorted(fractions, f))
                 break
         before, after = fractions[k - 1], fractions[k]
-        left = [f - (f - before) * g for g in _graded(ratio, layers)][::-1]
-        right = [f + (after - f) * g for g in _graded(ratio, layers)]
+        left, right = (
+            [f + way * g for g in grading.fractions(layers, finest / (abs(way) * length))]
+            for way in (before - f, after - f)
+        )
+        left.reverse()
         fractions[k:k] = [*left, f, *right]
         points[k:k] = [*((1 - q) * a + q * b for q in left), mouth, *((1 - q) * a + q * b for q in right)]
     return np.array(points)
 
 
-def _cracks(cracks: Cracks, settings: DdmSettings):
+def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, finest: float, edges: np.ndarray):
     n = cracks.n_segments
     if n == 0:
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
@@ -195,7 +191,7 @@ def _cracks(cracks: Cracks, settings: DdmSettings):
     total = np.bincount(cracks.crack, weights=np.where(drawn, length, 0.0), minlength=cracks.crack.max() + 1)
     share = np.where(drawn, length / np.maximum(total[cracks.crack], 1e-300), 0.0)
     count = np.maximum(1, np.rint(settings.elements_per_crack * share).astype(int))
-    layers = _node_layers(cracks, length / count, settings)
+    layers = _node_layers(cracks, length / count, grading, edges)
     tip = np.zeros(len(cracks.nodes), bool)
     tip[cracks.tips] = True
     start, end, kind, source = [], [], [], []
@@ -205,8 +201,9 @@ def _cracks(cracks: Cracks, settings: DdmSettings):
         at_start, at_end = int(layers[s, 0]), int(layers[s, 1])
         if m == 1 and at_start and at_end:
             m = 2
-        fine = _graded(settings.grading_ratio, at_start) + list(range(1, m))
-        fine += [m - f for f in _graded(settings.grading_ratio, at_end)][::-1]
+        least = finest * m / length[s]
+        fine = grading.fractions(at_start, least) + list(range(1, m))
+        fine += [m - f for f in grading.fractions(at_end, least)][::-1]
         f = np.array([q / m for q in fine])[:, None]
         a, b = cracks.nodes[i], cracks.nodes[j]
         line = np.concatenate([a[None], (1 - f) * a + f * b, b[None]])
@@ -222,9 +219,8 @@ def _cracks(cracks: Cracks, settings: DdmSettings):
     return np.concatenate(start), np.concatenate(end), np.concatenate(kind), np.concatenate(source)
 
 
-def _node_layers(cracks: Cracks, size: np.ndarray, settings: DdmSettings) -> np.ndarray:
+def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
     """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
-    full = settings.grading_layers
     layers = np.zeros((cracks.n_segments, 2), int)
     ends: list[list[tuple[int, int]]] = [[] for _ in range(len(cracks.nodes))]
     for s, (i, j) in enumerate(cracks.segments):
@@ -232,29 +228,56 @@ def _node_layers(cracks: Cracks, size: np.ndarray, settings: DdmSettings) -> np.
         ends[j].append((s, 1))
     direction = (cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]) / cracks.lengths[:, None]
     for node, here in enumerate(ends):
-        if len(here) == 1:
-            if cracks.surface[node]:
-                layers[here[0]] = full
+        if not here or (len(here) == 1 and not cracks.surface[node]):
             continue
-        if len(here) > 2 or len({cracks.crack[s] for s, _ in here}) > 1 or cracks.surface[node]:
+        if len(here) != 2 or cracks.surface[node] or cracks.crack[here[0][0]] != cracks.crack[here[1][0]]:
+            deep = _layers_at(cracks, node, edges, grading)
             for at in here:
-                layers[at] = full
-            continue
-        if not here:
-            continue
-        (s, e), (r, f) = here
-        # Both directions away from the node: straight on means opposite.
-        u, v = direction[s] * (1 - 2 * e), direction[r] * (1 - 2 * f)
-        turn = math.pi - abs(math.atan2(u[0] * v[1] - u[1] * v[0], float(u @ v)))
-        if turn > SHARP_KINK and full:
-            layers[s, e] = layers[r, f] = full + SHARP_LAYERS
-        elif turn > KINK and not _forgotten(cracks, ends, here):
-            layers[s, e] = layers[r, f] = full
-        if max(size[s], size[r]) > JUMP * min(size[s], size[r]):
-            longer = (s, e) if size[s] > size[r] else (r, f)
-            needed = math.log(min(size[s], size[r]) / max(size[s], size[r])) / math.log(settings.grading_ratio)
-            layers[longer] = max(layers[longer], round(needed))
+                layers[at] = deep
+            if grading.target is None:
+                continue
+        else:
+            (s, e), (r, f) = here
+            # Both directions away from the node: straight on means opposite.
+            u, v = direction[s] * (1 - 2 * e), direction[r] * (1 - 2 * f)
+            turn = math.pi - abs(math.atan2(u[0] * v[1] - u[1] * v[0], float(u @ v)))
+            layers[s, e] = layers[r, f] = grading.at_kink(turn, KINK < turn and _forgotten(cracks, ends, here))
+        least = min(size[s] for s, _ in here)
+        for at in here:
+            if size[at[0]] > JUMP * least:
+                needed = round(math.log(least / size[at[0]]) / math.log(grading.ratio))
+                layers[at] = max(layers[at], needed) if grading.target is None else layers[at] + needed
     return layers
+
+
+def _layers_at(cracks: Cracks, node: int, edges: np.ndarray, grading: Grading) -> int:
+    """Graded layers at a junction or mouth."""
+    if grading.target is None:
+        return grading.layers
+    return grading.at_node(wedges(cracks, node, edges), "mouth" if cracks.surface[node] else "crack")
+
+
+def wedges(cracks: Cracks, node: int, edges: np.ndarray) -> np.ndarray:
+    """(n,) angles of rock, rad, between the faces that meet at a ``node``, which may lie on the boundary."""
+    here = np.argwhere(cracks.segments == node)
+    to = cracks.nodes[cracks.segments[here[:, 0], 1 - here[:, 1]]] - cracks.nodes[node]
+    rays = np.arctan2(to[:, 1], to[:, 0])
+    if not cracks.surface[node] or not len(edges):
+        rays = np.sort(rays)
+        return np.diff(np.r_[rays, rays[0] + 2 * np.pi])
+    # On the boundary rock runs from the direction in which it goes on, turning left, to that from which it came.
+    a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
+    rel, length = cracks.nodes[node] - a, np.hypot(*d.T)
+    along = np.sum(rel * d, axis=1) / length
+    off = np.hypot(*(rel - np.clip(along, 0.0, length)[:, None] * d / length[:, None]).T)
+    near = 1e-7 * np.ptp(edges.reshape(-1, 2), axis=0).max()
+    at = np.flatnonzero(off <= max(near, 1.001 * off.min()))
+    onward = at[along[at] < length[at] - near][-1:] if len(at) > 1 else at
+    back = at[along[at] > near][:1] if len(at) > 1 else at
+    first = math.atan2(d[onward[0], 1], d[onward[0], 0])
+    last = math.atan2(-d[back[0], 1], -d[back[0], 0])
+    turn = np.mod(rays - first, 2 * np.pi)
+    return np.diff(np.sort(np.r_[0.0, turn, np.mod(last - first, 2 * np.pi)]))
 
 
 def _forgotten(cracks: Cracks, ends, here) -> bool:

@@ -99,6 +99,13 @@ class Solution:
         return rows
 
     @cached_property
+    def tip_errors(self) -> np.ndarray:
+        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, against a finer mesh (`estimate`): as much work again."""
+        from .estimate import tip_errors
+
+        return tip_errors(self)
+
+    @cached_property
     def faces(self) -> CrackFaces:
         """Opening, slip, traction and state at the ends and collocation nodes of every element. Traction and state are
         those of the nodes; between and beyond them traction is interpolated linearly, state is the nearest node's."""

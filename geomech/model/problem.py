@@ -37,7 +37,12 @@ class DdaSettings:
 @dataclass(frozen=True)
 class DdmSettings:
     """How cracked blocks are meshed: order ``p``, node family, elements of a straight crack, of a boundary side; and how
-    they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the number of crack unknowns."""
+    they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the number of crack unknowns.
+
+    With ``target_error``, the relative error of K that is asked for, order, elements and grading follow from it instead.
+    With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs there, in place
+    of ``grading_layers`` everywhere.
+    """
 
     order: int = 4
     nodes: str = "chebyshev"
@@ -46,6 +51,8 @@ class DdmSettings:
     grading_ratio: float = 0.3
     grading_layers: int = 2
     solver: str = "auto"
+    target_error: float | None = None
+    grading_error: float | None = None
 
 
 @dataclass(frozen=True)

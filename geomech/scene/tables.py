@@ -227,6 +227,9 @@ class DdaTable(Table):
 
 
 class DdmTable(Table):
+    target_error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="relative error of K asked for; order, elements and grading then follow from it"
+    )
     order: Annotated[int, Field(ge=0, le=10)] = Field(4, description="polynomial order of the elements")
     nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points of an element")
     elements_per_crack: Annotated[int, Field(ge=1)] = Field(4, description="elements of a straight crack")

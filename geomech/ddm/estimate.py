@@ -1,0 +1,96 @@
+"""How far a stress intensity factor is to be trusted: a solution against a finer one.
+
+Estimates from one solution alone (decay of its coefficients, order p against p−1) follow the error of K only within
+factors of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ. One
+order more, graded one step deeper, sees what is there.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import automatic
+from .grading import FINEST, ungraded
+from .mesh import interior_angles, wedges
+
+if TYPE_CHECKING:
+    from .body import Body
+    from .solution import Solution
+
+_log = logging.getLogger(__name__)
+
+#: The estimate is so many times the difference to the finer solution. Over the battery of `tests/validation/test_automatic.py`
+#: the difference alone is 0.3 to 2.5 times the error.
+SAFETY = 2.0
+#: An estimated error above this part of the largest K is told to the log.
+WORTH_A_WARNING = 0.01
+
+
+def tip_errors(solution: Solution) -> np.ndarray:
+    """(n_tips, 2) estimated absolute error of K_I and K_II at every tip, Pa √m, for the price of another body, somewhat
+    larger than the solution's own. Logs a warning when it exceeds 1 % of the largest K."""
+    body = solution.body
+    k = factors(solution)
+    if not len(k):
+        return k
+    other = body.remeshed(automatic.finer(body.settings)).solve(solution.load, equilibrium_tolerance=np.inf)
+    errors = SAFETY * np.abs(factors(other) - k) + floor(body) * largest(k)
+    warn(errors, k)
+    return errors
+
+
+def factors(solution: Solution) -> np.ndarray:
+    """(n_tips, 2) K_I and K_II, Pa √m."""
+    return np.stack([solution.tips["k_i"], solution.tips["k_ii"]], axis=1)
+
+
+def largest(k: np.ndarray) -> float:
+    """The largest √(K_I² + K_II²) of (n_tips, 2) factors: what errors are relative to."""
+    return float(np.hypot(*k.T).max(initial=0.0))
+
+
+def warn(errors: np.ndarray, k: np.ndarray) -> None:
+    """Log a warning when ``errors`` exceed 1 % of the largest of ``k``, both (n_tips, 2)."""
+    if errors.max(initial=0.0) > WORTH_A_WARNING * largest(k):
+        at = int(np.argmax(errors.max(axis=1)))
+        _log.warning(
+            "stress intensity factors are uncertain by %.1f %% at tip %d: ask for a smaller target_error",
+            100 * errors.max() / max(largest(k), np.finfo(float).tiny),
+            at,
+        )
+
+
+def floor(body: Body) -> float:
+    """Relative error of K that grading leaves where it ends for round-off's sake (`grading.FINEST`), which a finer
+    solution shares and cannot show. Only meshes made for a target error go that far."""
+    if body.settings.grading_error is None:
+        return 0.0
+    faces, network, edges = body.faces, body.cracks, body.mesh.edges
+    finest = FINEST * body._extent / body.settings.grading_ratio
+    left = 0.0
+    for elements in (faces, body.boundary):
+        for e in np.flatnonzero(elements.length <= finest):
+            for point in (elements.start[e], elements.end[e]):
+                left = max(left, _left_at(body, network, edges, point, elements.length[e]))
+    return left
+
+
+def _left_at(body: Body, network, edges, point: np.ndarray, length: float) -> float:
+    """What an element of ``length`` that ends at ``point`` leaves, if that is a node of the geometry."""
+    left = 0.0
+    for node in np.flatnonzero((network.nodes == point).all(axis=1)):
+        span = network.lengths[(network.segments == node).any(axis=1)].min(initial=np.inf)
+        where = "mouth" if network.surface[node] else "crack"
+        if np.isfinite(span):
+            for angle in wedges(network, node, edges):
+                error, power = ungraded(float(angle), where)
+                left = max(left, error * (length / span) ** power)
+    for loop in body.loops:
+        for corner in np.flatnonzero((loop == point).all(axis=1)):
+            sides = np.hypot(*(loop - np.roll(loop, -1, axis=0)).T)
+            error, power = ungraded(float(interior_angles(loop)[corner]), "outline")
+            left = max(left, error * (length / min(sides[corner], sides[corner - 1])) ** power)
+    return left

@@ -1,0 +1,104 @@
+"""How finely elements shrink into corners, kinks, junctions and mouths, where displacement is not smooth.
+
+Between two free faces that enclose an angle α of rock displacement goes like r^λ(α) (Williams 1952). Elements that shrink
+by ``ratio`` a layer leave an error of A ratio^(λ m) in the stress intensity factors after m layers. Either m is given, for
+every node alike, or it follows from the error that is asked for, with the A(α) that were measured on kinks of 7° to 150°,
+notches and slanted mouths (`tests/validation/test_automatic.py` holds what comes of it).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import DdmSettings
+
+#: A turn by more than this is a kink that is graded, rad.
+KINK = math.radians(20)
+#: A turn by more than this is a sharp kink, graded for good and by so many layers more (two of them: K_I 3.5 % → 1 %).
+SHARP_KINK = math.radians(60)
+SHARP_LAYERS = 2
+#: Layers that any node gets. The smallest element stays above `FINEST` anyhow.
+MOST_LAYERS = 12
+#: Elements are not graded below this part of the largest extent: collocation points on shorter ones are rounded too
+#: coarsely (an element of length h loses about 1e-13/h of K, h in extents).
+FINEST = 1e-7
+
+_ANGLES = np.radians(
+    [45, 60, 75, 90, 105, 120, 135, 146, 150, 160, 170, 180, 190, 200, 210, 225, 240, 270, 300, 330, 360]
+)
+_EXPONENTS = np.array(
+    [5.390, 4.059, 3.265, 2.740, 2.368, 2.094, 1.885, 1.763, 1.534, 1.288, 1.125, 1.0, 0.900, 0.819, 0.752, 0.674, 0.616,
+     0.5445, 0.512, 0.5015, 0.5]
+)  # fmt: skip
+
+
+def exponent(angle: float) -> float:
+    """Real part of the least exponent λ, but rigid motions and λ = 1, of a wedge of rock of ``angle`` (rad) between free
+    faces: roots of sin λα = ± λ sin α (Williams 1952), interpolated."""
+    return float(np.interp(angle, _ANGLES, _EXPONENTS))
+
+
+def ungraded(angle: float, where: str) -> tuple[float, float]:
+    """Relative error of K that a wedge of rock of ``angle`` makes where elements are not graded into it (measured), and
+    the power of the element's length with which it falls; ``where`` is "crack", "outline" or "mouth".
+
+    At the outline it is larger: elements there are long beside their distance to a crack. And where one face of a wedge
+    is loaded, but for right angles under a normal load, the wedge turns like r log r, however blunt.
+    """
+    turn = angle - math.pi
+    if abs(turn) < 1e-6:
+        return 0.0, 1.0
+    if turn > 0:
+        error = 2.4e-2 * (turn / (math.pi / 2)) ** 2.5
+        return (error if where == "crack" else 4 * error), exponent(angle)
+    if where == "crack" or abs(turn + math.pi / 2) < math.radians(1):
+        return (1e-3 if angle > math.radians(100) else 1e-4), exponent(angle)
+    return (1e-2 if where == "mouth" else 1e-3), 1.0
+
+
+@dataclass(frozen=True)
+class Grading:
+    """``ratio`` of neighbouring layers; ``layers`` of them at each node, or as many as the ``target`` error needs."""
+
+    ratio: float
+    layers: int
+    target: float | None = None
+
+    @classmethod
+    def of(cls, settings: DdmSettings) -> Grading:
+        return cls(settings.grading_ratio, settings.grading_layers, settings.grading_error)
+
+    def needed(self, angle: float, where: str) -> int:
+        """Layers at a wedge of rock of ``angle`` (rad) for the target; ``where`` as in `ungraded`."""
+        error, power = ungraded(angle, where)
+        if error <= self.target:
+            return 0
+        return min(MOST_LAYERS, math.ceil(math.log(error / self.target) / (power * -math.log(self.ratio))))
+
+    def at_corner(self, angle: float) -> int:
+        """At a corner of the outline. Re-entrant ones are singular and get all layers and one more, convex ones one,
+        straight ones none."""
+        if self.target is not None:
+            return self.needed(angle, "outline")
+        if angle > math.pi + KINK:
+            return self.layers + 1
+        return 1 if angle < math.pi - KINK and self.layers else 0
+
+    def at_kink(self, turn: float, forgotten: bool) -> int:
+        """At a kink of a crack by ``turn``; one that growth has left behind is ``forgotten`` unless it is sharp."""
+        if self.target is not None:
+            return self.needed(math.pi + turn, "crack")
+        if turn > SHARP_KINK and self.layers:
+            return self.layers + SHARP_LAYERS
+        return self.layers if turn > KINK and not forgotten else 0
+
+    def at_node(self, wedges: np.ndarray, where: str) -> int:
+        """At a junction ("crack") or "mouth" whose faces enclose ``wedges`` (n,) of rock, rad, for the target."""
+        return max((self.needed(float(angle), where) for angle in wedges), default=0)
+
+    def fractions(self, layers: int, least: float = 0.0) -> list[float]:
+        """Fractions inside (0, 1) that grade an element towards 0, none below ``least``."""
+        return [f for f in (self.ratio**k for k in range(layers, 0, -1)) if f >= least]
