@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import automatic
-from .grading import FINEST, ungraded
+from .grading import Grading, ungraded
 from .mesh import interior_angles, wedges
 
 if TYPE_CHECKING:
@@ -64,33 +64,34 @@ def warn(errors: np.ndarray, k: np.ndarray) -> None:
 
 
 def floor(body: Body) -> float:
-    """Relative error of K that grading leaves where it ends for round-off's sake (`grading.FINEST`), which a finer
+    """Relative error of K that grading leaves where it ends for round-off's sake (`grading.Grading.finest`), which a finer
     solution shares and cannot show. Only meshes made for a target error go that far."""
-    if body.settings.grading_error is None:
+    grading = Grading.of(body.settings)
+    if grading.target is None:
         return 0.0
-    faces, network, edges = body.faces, body.cracks, body.mesh.edges
-    finest = FINEST * body._extent / body.settings.grading_ratio
-    left = 0.0
-    for elements in (faces, body.boundary):
-        for e in np.flatnonzero(elements.length <= finest):
+    network, edges, left = body.cracks, body.mesh.edges, 0.0
+    faces, boundary = body.faces, body.boundary
+    segment_lengths = network.lengths
+    edge_lengths = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
+    for elements, spans in ((faces, segment_lengths), (boundary, edge_lengths)):
+        for e in np.flatnonzero(elements.length <= 1e-6 * body._extent):
+            span, length = spans[elements.source[e]], elements.length[e]
             for point in (elements.start[e], elements.end[e]):
-                left = max(left, _left_at(body, network, edges, point, elements.length[e]))
+                if length <= grading.finest(point, span, body._extent) / grading.ratio:
+                    left = max(left, _left_at(body, point, length / span))
     return left
 
 
-def _left_at(body: Body, network, edges, point: np.ndarray, length: float) -> float:
-    """What an element of ``length`` that ends at ``point`` leaves, if that is a node of the geometry."""
-    left = 0.0
-    for node in np.flatnonzero((network.nodes == point).all(axis=1)):
-        span = network.lengths[(network.segments == node).any(axis=1)].min(initial=np.inf)
+def _left_at(body: Body, point: np.ndarray, part: float) -> float:
+    """What an element of ``part`` of its side or segment that ends at ``point`` leaves, if that is a node of the geometry."""
+    network, left = body.cracks, 0.0
+    for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)):
         where = "mouth" if network.surface[node] else "crack"
-        if np.isfinite(span):
-            for angle in wedges(network, node, edges):
-                error, power = ungraded(float(angle), where)
-                left = max(left, error * (length / span) ** power)
+        for angle in wedges(network, node, body.mesh.edges):
+            error, power = ungraded(float(angle), where)
+            left = max(left, error * part**power)
     for loop in body.loops:
         for corner in np.flatnonzero((loop == point).all(axis=1)):
-            sides = np.hypot(*(loop - np.roll(loop, -1, axis=0)).T)
             error, power = ungraded(float(interior_angles(loop)[corner]), "outline")
-            left = max(left, error * (length / min(sides[corner], sides[corner - 1])) ** power)
+            left = max(left, error * part**power)
     return left

@@ -20,11 +20,13 @@ KINK = math.radians(20)
 #: A turn by more than this is a sharp kink, graded for good and by so many layers more (two of them: K_I 3.5 % → 1 %).
 SHARP_KINK = math.radians(60)
 SHARP_LAYERS = 2
-#: Layers that any node gets. The smallest element stays above `FINEST` anyhow.
+#: Layers that any node gets; the smallest element stays above `Grading.finest` anyhow.
 MOST_LAYERS = 12
-#: Elements are not graded below this part of the largest extent: collocation points on shorter ones are rounded too
-#: coarsely (an element of length h loses about 1e-13/h of K, h in extents).
-FINEST = 1e-7
+#: An element of length h at a distance r from the origin loses 1e-13 r/h of K, since its collocation points are rounded;
+#: what grading leaves at a sharp kink of a segment L falls like √(h/L). Their sum is least near h = 1e-7 r^⅔ L^⅓.
+_FINEST = 1e-7
+#: No element is shorter than this part of the extent, whatever number of layers is asked for.
+_SHORTEST = 1e-12
 
 _ANGLES = np.radians(
     [45, 60, 75, 90, 105, 120, 135, 146, 150, 160, 170, 180, 190, 200, 210, 225, 240, 270, 300, 330, 360]
@@ -98,6 +100,14 @@ class Grading:
     def at_node(self, wedges: np.ndarray, where: str) -> int:
         """At a junction ("crack") or "mouth" whose faces enclose ``wedges`` (n,) of rock, rad, for the target."""
         return max((self.needed(float(angle), where) for angle in wedges), default=0)
+
+    def finest(self, point: np.ndarray, length: float, extent: float) -> float:
+        """Length, m, of the shortest element at ``point`` (2,) on a side or segment of ``length`` in a body of ``extent``.
+        Farther from the origin than its extent the body is graded as at its extent."""
+        if self.target is None:
+            return _SHORTEST * extent
+        reach = min(max(abs(point[0]), abs(point[1])), extent)
+        return max(_FINEST * reach ** (2 / 3) * length ** (1 / 3), _SHORTEST * extent)
 
     def fractions(self, layers: int, least: float = 0.0) -> list[float]:
         """Fractions inside (0, 1) that grade an element towards 0, none below ``least``."""

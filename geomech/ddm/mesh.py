@@ -19,7 +19,7 @@ import numpy as np
 from ..model import Cracks, DdmSettings
 from ..model.polygon import signed_area
 from . import proximity, shapes
-from .grading import FINEST, KINK, Grading
+from .grading import KINK, Grading
 from .influence import ElementSet
 
 #: Neighbouring segments whose elements differ more than this in length are graded.
@@ -65,8 +65,8 @@ def mesh(
     points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
     extent = np.ptp(points, axis=0).max() if len(points) else 0.0
     grading = Grading.of(settings)
-    boundary = _boundary(loops, edges, cracks, settings, grading, FINEST * extent, marks)
-    crack = _cracks(cracks, settings, grading, FINEST * extent, edges)
+    boundary = _boundary(loops, edges, cracks, settings, grading, extent, marks)
+    crack = _cracks(cracks, settings, grading, extent, edges)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     start, end, kind, source = _halved(
@@ -86,7 +86,7 @@ def mesh(
     )  # fmt: skip
 
 
-def _boundary(loops, edges, cracks, settings, grading, finest, marks):
+def _boundary(loops, edges, cracks, settings, grading, extent, marks):
     if not len(edges):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
@@ -114,14 +114,15 @@ def _boundary(loops, edges, cracks, settings, grading, finest, marks):
         for i in range(n_edges):
             edge = first[k] + i
             fractions = _side(
+                edges[edge],
                 length[edge],
                 span / settings.elements_per_side,
                 corner[edge],
                 corner[first[k] + (i + 1) % n_edges],
                 grading,
-                finest,
+                extent,
             )
-            line = _with_mouths(edges[edge], fractions, mouths, grading, span, finest)
+            line = _with_mouths(edges[edge], fractions, mouths, grading, span, extent)
             nodes.append(np.stack([line[:-1], line[1:]], axis=1))
             source.append(np.full(len(line) - 1, edge))
     pairs = np.concatenate(nodes)
@@ -136,18 +137,18 @@ def interior_angles(loop: np.ndarray) -> np.ndarray:
     return np.mod(turn, 2 * np.pi)
 
 
-def _side(length: float, size: float, at_start: int, at_end: int, grading: Grading, finest: float) -> np.ndarray:
+def _side(edge, length: float, size: float, at_start: int, at_end: int, grading: Grading, extent: float) -> np.ndarray:
     """(n + 1,) fractions along a side, from 0 to 1."""
     n = max(1, math.ceil(length / size - 1e-9))
     if n == 1 and at_start and at_end:
         n = 2
     inner = list(range(1, n))
-    least = finest * n / length
-    fine = grading.fractions(at_start, least) + inner + [n - f for f in grading.fractions(at_end, least)][::-1]
+    least = [grading.finest(end, length, extent) * n / length for end in edge]
+    fine = grading.fractions(at_start, least[0]) + inner + [n - f for f in grading.fractions(at_end, least[1])][::-1]
     return np.array([0.0, *(f / n for f in fine), 1.0])
 
 
-def _with_mouths(edge, fractions, mouths, grading, span, finest) -> np.ndarray:
+def _with_mouths(edge, fractions, mouths, grading, span, extent) -> np.ndarray:
     """(n, 2) points along an ``edge`` with ``mouths`` (point, layers) as nodes, graded; elsewhere as without them."""
     a, b = edge
     along = b - a
@@ -173,7 +174,10 @@ def _with_mouths(edge, fractions, mouths, grading, span, finest) -> np.ndarray:
                 break
         before, after = fractions[k - 1], fractions[k]
         left, right = (
-            [f + way * g for g in grading.fractions(layers, finest / (abs(way) * length))]
+            [
+                f + way * g
+                for g in grading.fractions(layers, grading.finest(mouth, length, extent) / (abs(way) * length))
+            ]
             for way in (before - f, after - f)
         )
         left.reverse()
@@ -182,7 +186,7 @@ def _with_mouths(edge, fractions, mouths, grading, span, finest) -> np.ndarray:
     return np.array(points)
 
 
-def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, finest: float, edges: np.ndarray):
+def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: float, edges: np.ndarray):
     n = cracks.n_segments
     if n == 0:
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
@@ -201,11 +205,11 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, finest: flo
         at_start, at_end = int(layers[s, 0]), int(layers[s, 1])
         if m == 1 and at_start and at_end:
             m = 2
-        least = finest * m / length[s]
-        fine = grading.fractions(at_start, least) + list(range(1, m))
-        fine += [m - f for f in grading.fractions(at_end, least)][::-1]
-        f = np.array([q / m for q in fine])[:, None]
         a, b = cracks.nodes[i], cracks.nodes[j]
+        part = m / length[s]
+        fine = grading.fractions(at_start, grading.finest(a, length[s], extent) * part) + list(range(1, m))
+        fine += [m - f for f in grading.fractions(at_end, grading.finest(b, length[s], extent) * part)][::-1]
+        f = np.array([q / m for q in fine])[:, None]
         line = np.concatenate([a[None], (1 - f) * a + f * b, b[None]])
         kinds = np.full(len(line) - 1, shapes.ORDINARY)
         if tip[i]:
