@@ -43,9 +43,7 @@ VTK_STRESS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 def normal_of(tangent: np.ndarray) -> np.ndarray:
     """The crack normal: ``tangent`` (..., 2) turned by +90°."""
     tangent = np.asarray(tangent, dtype=float)
-    normal = np.empty_like(tangent)
-    normal[..., 0], normal[..., 1] = -tangent[..., 1], tangent[..., 0]
-    return normal
+    return np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
 
 
 def outward_normal_of(tangent: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ from importlib import import_module
 #: Topic → module with ``measure(quick: bool) -> str``, the printed table.
 TOPICS = {
     "accuracy": "geomech.bench.accuracy",
-    "ddm": "geomech.bench.crack_accuracy",
+    "ddm": "geomech.bench.work_precision",
     "startup": "geomech.bench.startup",
 }
 

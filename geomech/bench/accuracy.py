@@ -123,7 +123,12 @@ def _coupled() -> Iterator[Row]:
         body = Body(problem.blocks.loops(0), problem.cracks, rock, problem.ddm)
         alone = body.solve(_pulled(0.03, 0.06, -last.load))
         at = int(np.argmax(np.abs(last.tips["k_i"] - alone.tips["k_i"])))
-        yield f"two_cracks φ = {phi}, coupled: K_I of the worst tip", last.tips["k_i"][at], alone.tips["k_i"][at], "DDM alone"
+        yield (
+            f"two_cracks φ = {phi}, coupled: K_I of the worst tip",
+            last.tips["k_i"][at],
+            alone.tips["k_i"][at],
+            "DDM alone",
+        )
         if phi == 90:
             yield "the same: axial stress in the block, Pa", last.state.stress[0, 1], -last.load, "load / width"
             strain = last.load / rock.plane_modulus - alone.crack_strain[1]

@@ -8,15 +8,14 @@ cracks are softer than the rock, which every nearly split block reaches).
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
+
+from ..conventions import rotate_stress
 
 
 def stress_rotation(angle: float) -> np.ndarray:
     """Q (3, 3): components of a stress carried along by a rotation of ``angle`` rad, σ' = Q σ."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c * c, s * s, -2 * s * c], [s * s, c * c, 2 * s * c], [s * c, -s * c, c * c - s * s]])
+    return rotate_stress(np.eye(3), angle).T
 
 
 def strain_rotation(angle: float) -> np.ndarray:

@@ -1,0 +1,264 @@
+"""Run time against error of the stress intensity factors: this solver, constant and quadratic elements, finite elements.
+
+Everything is timed in one run of one process: assembly and solution from nothing (mesh included), the median of
+repetitions after one that is not counted. The error is the largest of any tip's K_I or K_II, relative to the largest K.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+
+from ..model import DdmSettings
+from . import constant_elements, crack_problems, finite_elements, growth_run
+from .crack_problems import CrackProblem, factors, with_reference
+
+#: Where the picture and the numbers go, below the working folder.
+FOLDER = Path("outputs/bench_ddm")
+
+#: The methods, in the order of the table and the legend.
+OURS, LOW, QUADRATIC = "this solver, p = 2 … 10", "constant elements, √r at the tips", "quadratic elements, equal nodes"
+FITTED, CALIBRATED, FEM = (
+    "constant elements, K by √r fit",
+    "constant elements, K calibrated",
+    "finite elements, scikit-fem",
+)
+METHODS = (OURS, LOW, QUADRATIC, FITTED, CALIBRATED, FEM)
+
+#: Goals: K to 1e-6 in so many seconds, and how many times less than constant elements at 1e-4.
+ONE_CRACK_S, SPECIMEN_S, RATIO = 1e-3, 30e-3, 200.0
+
+
+@dataclass(frozen=True)
+class Point:
+    """``size`` is what was varied: the order, or the number of elements of a crack."""
+
+    problem: str
+    method: str
+    size: int
+    unknowns: int
+    error: float
+    seconds: float
+
+
+def measure(quick: bool = False) -> str:
+    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` stops each method after
+    about a second."""
+    from ..render.work_precision import draw
+
+    longest = 0.6 if quick else 12.0
+    points = [point for name in PROBLEMS for point in _curves(name, longest)]
+    growth = growth_run.measure(10 if quick else 40)
+    goals = _goals(points)
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    written = {
+        "machine": _machine(), "points": [asdict(p) for p in points], "growth": growth, "goals": goals, "quick": quick
+    }  # fmt: skip
+    (FOLDER / "work_precision.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
+    draw(points, METHODS, FOLDER / "work_precision.png")
+    return _table(points, growth, goals)
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    """Median; as many repetitions as a tenth of a second has room for, three at least below a second."""
+    began = time.perf_counter()
+    work()
+    first = time.perf_counter() - began
+    if first > 1.0:
+        return first
+    spent = []
+    while len(spent) < 3 or (sum(spent) < 0.1 and len(spent) < 60):
+        began = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - began)
+    return statistics.median(spent)
+
+
+def _curves(name: str, longest: float) -> Iterator[Point]:
+    make, low, ours = PROBLEMS[name]
+    given = make()
+    problem = with_reference(given) if given is not None else None
+    yield from _until(longest, name, OURS, range(2, 11), lambda p: _solved(*ours(problem, p)))
+
+    def with_elements(order: int, nodes: str):
+        def solve(n: int):
+            refined = crack_problems.arc_of_chords(n) if problem is None else problem
+            elements = 1 if problem is None else n
+            side = max(2, round(n * low)) if refined.outline is not None else 1
+            settings = DdmSettings(order, nodes, elements, side, grading_layers=0)
+            return _solved(refined, settings)
+
+        return solve
+
+    counts = [2**k for k in range(2, 13)]
+    yield from _until(longest, name, LOW, counts, with_elements(0, "chebyshev"))
+    yield from _until(longest, name, QUADRATIC, counts, with_elements(2, "equal"))
+    # One solution has both ways to K.
+    rows: dict[str, list[Point]] = {FITTED: [], CALIBRATED: []}
+    for n in counts:
+        refined = crack_problems.arc_of_chords(n) if problem is None else problem
+        solve = partial(constant_elements.stress_intensity, refined, n, round(n * low))
+        *found, unknowns = solve()
+        seconds = _seconds(solve)
+        for method, k in zip((FITTED, CALIBRATED), found):
+            rows[method].append(Point(name, method, n, unknowns, refined.error(k), seconds))
+        if 6 * seconds > longest:
+            break
+    yield from rows[FITTED]
+    yield from rows[CALIBRATED]
+    run = {"edge crack in a strip": finite_elements.edge_crack, "two-crack specimen": finite_elements.specimen}.get(
+        name
+    )
+    if run and finite_elements.available():
+        run(problem, 1)
+        for refinement in (1, 2, 3, 4):
+            k, unknowns, seconds = run(problem, refinement)
+            yield Point(name, FEM, refinement, unknowns, problem.error(k), seconds)
+            if 4 * seconds > longest:
+                break
+
+
+def _until(longest: float, name: str, method: str, sizes, solve) -> Iterator[Point]:
+    """Points for growing sizes until the next one would take longer than ``longest``."""
+    for size in sizes:
+        unknowns, error, again = solve(size)
+        seconds = _seconds(again)
+        yield Point(name, method, int(size), unknowns, max(error, 1e-15), seconds)
+        if 4 * seconds > longest:
+            return
+
+
+def _solved(problem: CrackProblem, settings: DdmSettings):
+    """Unknowns, error, and what to time."""
+    solution = problem.solve(settings)
+    unknowns = solution.body.boundary.n_unknowns + solution.body.faces.n_unknowns
+    return unknowns, problem.error(factors(solution)), lambda: problem.solve(settings)
+
+
+def _one_crack(problem: CrackProblem, order: int):
+    return problem, DdmSettings(order=order)
+
+
+def _arc(_: None, order: int):
+    # Elements are straight: an order deserves a polygon that follows the arc as closely.
+    return crack_problems.arc_of_tangents(round(8 * 1.6 ** (order - 2))), DdmSettings(order=order, elements_per_crack=1)
+
+
+def _body(problem: CrackProblem, order: int):
+    return problem, DdmSettings(order=order, grading_layers=2 if order < 6 else 3)
+
+
+def _many(problem: CrackProblem, order: int):
+    return problem, DdmSettings(order=order, elements_per_crack=2)
+
+
+#: Name → the problem (None: another one for every number of elements), elements of the outline's shortest side per
+#: element of a crack, and our own mesh for an order.
+PROBLEMS = {
+    "Griffith crack": (crack_problems.griffith, 0.0, _one_crack),
+    "arc": (lambda: None, 0.0, _arc),
+    "edge crack in a strip": (crack_problems.edge_crack, 2.0, _body),
+    "two-crack specimen": (crack_problems.specimen, 2.0, _body),
+    "50 random cracks": (crack_problems.random_cracks, 0.0, _many),
+}
+
+
+def time_to(points: list[Point], problem: str, method: str, error: float) -> float | None:
+    """Least time at which ``method`` has come down to ``error`` for good, interpolated in logarithms; None where it has
+    not in the time it was given."""
+    curve = sorted((p for p in points if (p.problem, p.method) == (problem, method)), key=lambda p: p.size)
+    for k, p in enumerate(curve):
+        if all(q.error <= error for q in curve[k:]):
+            if k == 0:
+                return p.seconds
+            before = curve[k - 1]
+            share = math.log(before.error / error) / math.log(before.error / p.error)
+            return before.seconds * (p.seconds / before.seconds) ** share
+    return None
+
+
+def _goals(points: list[Point]) -> dict:
+    goals: dict = {f"{name}: s to 1e-6": time_to(points, name, OURS, 1e-6) for name in PROBLEMS}
+    goals["time at error 1e-4 over this solver's"] = ratios = []
+    for name in PROBLEMS:
+        ours = time_to(points, name, OURS, 1e-4)
+        for method in METHODS[1:]:
+            curve = [p for p in points if (p.problem, p.method) == (name, method)]
+            if not curve or ours is None:
+                continue
+            theirs = time_to(points, name, method, 1e-4)
+            best, longest = min(p.error for p in curve), max(p.seconds for p in curve)
+            ratio = (longest if theirs is None else theirs) / ours
+            ratios.append(
+                {"problem": name, "method": method, "ratio": ratio, "reached": theirs is not None, "best": best}
+            )
+    return goals
+
+
+def _table(points: list[Point], growth: dict, goals: dict) -> str:
+    lines = ["Stress intensity factors: error and time of assembly and solution", ""]
+    for name in PROBLEMS:
+        lines.append(f"{name}")
+        for method in METHODS:
+            curve = [p for p in points if (p.problem, p.method) == (name, method)]
+            for p in curve:
+                what = f"p = {p.size}" if method == OURS else f"{p.size}"
+                label = method if p is curve[0] else ""
+                lines.append(
+                    f"  {label:<36}{what:>8}{p.unknowns:>8} unknowns   {p.error:8.1e}   {1e3 * p.seconds:10.2f} ms"
+                )
+        lines.append("")
+    if not finite_elements.available():
+        lines += ["scikit-fem is not installed: finite elements left out (pip install 'geomech[bench]')", ""]
+    g = growth
+    lines += [
+        f"growth, {g['increments']} increments at two tips of the specimen ({g['elements_at_the_end']} elements at the end)",
+        f"  an increment with what is known {1e3 * g['incremental_s']:.1f} ms, all {g['all_incremental_s']:.2f} s",
+        f"  fresh bodies {1e3 * g['fresh_s']:.1f} ms ({g['fresh_s'] / g['incremental_s']:.1f} times),"
+        + f" all {g['all_fresh_s']:.2f} s; K differs by {g['difference']:.1e}",
+        "",
+        f"K to 1e-6: one crack {_said(goals['Griffith crack: s to 1e-6'])} (goal {1e3 * ONE_CRACK_S:.0f} ms),"
+        + f" specimen {_said(goals['two-crack specimen: s to 1e-6'])} (goal {1e3 * SPECIMEN_S:.0f} ms)",
+        "",
+        f"time at error 1e-4 over this solver's (goal {RATIO:.0f} for constant elements)",
+    ]
+    for row in goals["time at error 1e-4 over this solver's"]:
+        said = f"{row['ratio']:6.0f}" if row["reached"] else f"{row['ratio']:6.0f}, and then still at {row['best']:.0e}"
+        lines.append(f"  {row['problem']:<24}{row['method']:<36}{said}")
+    return "\n".join(lines)
+
+
+def _said(seconds: float | None) -> str:
+    return "not reached" if seconds is None else f"{1e3 * seconds:.2g} ms"
+
+
+def _machine() -> dict:
+    processor = platform.processor() or platform.machine()
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        names = [line.split(":", 1)[1].strip() for line in information.read_text().splitlines() if "model name" in line]
+        processor = names[0] if names else processor
+    packages = ("geomech", "numpy", "scipy", "numba", "scikit-fem")
+    versions = {}
+    for package in packages:
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return {
+        "processor": processor,
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        "threads of BLAS": os.environ.get("OPENBLAS_NUM_THREADS", "all"),
+        "versions": versions,
+    }

@@ -1,0 +1,66 @@
+"""The picture of `geomech bench ddm`: run time against error, a panel a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+_STYLES = (
+    ("#1f6f8b", "o", "-"), ("#8d6a9f", "v", "-"), ("#588157", "s", "-"),
+    ("#b9a394", "x", "--"), ("#c8553d", "^", "-"), ("#b08900", "D", "-"),
+)  # fmt: skip
+
+
+class Measured(Protocol):
+    problem: str
+    method: str
+    size: int
+    error: float
+    seconds: float
+
+
+def draw(points: Sequence[Measured], methods: Sequence[str], path: Path) -> Path:
+    """``points`` as one curve a method (at most six, in the legend's order), logarithmic axes shared by all panels."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
+
+    problems = list(dict.fromkeys(p.problem for p in points))
+    figure = Figure(figsize=(12.4, 7.6), dpi=130, layout="constrained")
+    axes = figure.subplots(2, 3, sharex=True, sharey=True)
+    handles = {}
+    for panel, problem in zip(axes.flat, problems):
+        for method, (colour, marker, line) in zip(methods, _STYLES):
+            curve = [p for p in points if (p.problem, p.method) == (problem, method)]
+            if not curve:
+                continue
+            ours = method == methods[0]
+            handles[method] = panel.loglog(
+                [p.error for p in curve], [1e3 * p.seconds for p in curve], color=colour, marker=marker, ls=line,
+                lw=2.2 if ours else 1.2, ms=5.5 if ours else 4, zorder=3 if ours else 2,
+            )[0]  # fmt: skip
+            if ours:
+                for p, shift in ((curve[0], (0, -14)), (curve[-1], (6, 7))):
+                    panel.annotate(
+                        f"p = {p.size}", (p.error, 1e3 * p.seconds), textcoords="offset points", xytext=shift,
+                        ha="center", fontsize=8, color=colour,
+                    )  # fmt: skip
+        panel.set_title(problem, fontsize=11, loc="left")
+        panel.grid(which="major", color="#e4e4e4", lw=0.7)
+        panel.set_axisbelow(True)
+        panel.tick_params(which="minor", length=0)
+        panel.axvline(1e-4, color="#999999", lw=0.8, ls=":")
+        panel.xaxis.set_major_locator(LogLocator(numticks=9))
+        for side in ("top", "right"):
+            panel.spines[side].set_visible(False)
+    for panel in axes.flat[len(problems) :]:
+        panel.set_axis_off()
+    axes.flat[0].invert_xaxis()
+    figure.supxlabel("largest error of a stress intensity factor, better to the right", fontsize=10)
+    figure.supylabel("assembly and solution, ms", fontsize=10)
+    last = axes.flat[-1] if len(problems) < axes.size else figure
+    order = [m for m in methods if m in handles]
+    last.legend([handles[m] for m in order], order, loc="center", frameon=False, fontsize=10)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+    return path

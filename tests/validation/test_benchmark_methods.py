@@ -1,0 +1,80 @@
+"""What `geomech bench ddm` compares with must itself be right: constant elements and finite elements on known problems."""
+
+import numpy as np
+import pytest
+
+from geomech.bench import constant_elements, crack_problems, finite_elements, growth_run, work_precision
+from geomech.bench.work_precision import Point, time_to
+from geomech.model import DdmSettings
+from geomech.render.work_precision import draw
+
+
+def test_constant_elements_are_of_first_order():
+    """Calibrated by √(2/π) the tip element gives K with an error of 1/8N: exactly first order (Griffith crack)."""
+    problem, sizes = crack_problems.griffith(), np.array([16, 64, 256])
+    errors = [problem.error(constant_elements.stress_intensity(problem, n, 0)[1]) for n in sizes]
+    orders = -np.diff(np.log(errors)) / np.log(4)
+    print("constant elements, calibrated:", errors, "observed orders", orders)
+    assert np.allclose(orders, 1, atol=0.02) and errors[-1] == pytest.approx(1 / (8 * 256), rel=0.02)
+
+
+def test_constant_elements_in_a_body():
+    """The specimen by constant elements on its outline too: 2 % with 32 elements a crack, all signs right."""
+    problem = crack_problems.with_reference(crack_problems.specimen())
+    fitted, calibrated, _ = constant_elements.stress_intensity(problem, 32, 64)
+    assert problem.error(calibrated) < 0.02 and problem.error(fitted) < 0.3
+
+
+def test_an_arc_of_tangents_is_followed_with_second_order_or_better():
+    sizes, errors = np.array([8, 16, 32]), []
+    for n in sizes:
+        problem = crack_problems.arc_of_tangents(n)
+        solution = problem.solve(DdmSettings(elements_per_crack=1))
+        errors.append(problem.error(crack_problems.factors(solution)))
+    orders = -np.diff(np.log(errors)) / np.log(2)
+    print("arc of tangents:", errors, "observed orders", orders)
+    assert orders.min() > 1.9 and errors[-1] < 1e-4
+
+
+@pytest.mark.skipif(not finite_elements.available(), reason="scikit-fem is not installed")
+def test_finite_elements_agree():
+    """A method that shares nothing with ours: J on a graded grid 1.5e-4; interaction integrals on triangles 2.5e-3."""
+    strip = crack_problems.with_reference(crack_problems.edge_crack())
+    assert strip.error(finite_elements.edge_crack(strip, 2)[0]) < 2e-4
+    specimen = crack_problems.with_reference(crack_problems.specimen())
+    assert specimen.error(finite_elements.specimen(specimen, 0)[0]) < 4e-3
+
+
+def test_growth_by_increments_gives_what_fresh_bodies_give():
+    """1e-12: the matrices are the same, what differs is how they were put together."""
+    found = growth_run.measure(3)
+    assert found["difference"] < 1e-12
+
+
+def test_time_to_an_error_is_interpolated_and_not_guessed():
+    points = [Point("a", "m", n, n, 1.0 / n, 1e-3 * n) for n in (1, 10, 100)]
+    assert time_to(points, "a", "m", 1.0 / 31.6227766) == pytest.approx(31.6227766e-3)
+    assert time_to(points, "a", "m", 1e-3) is None
+    assert time_to(points, "a", "other", 1e-3) is None
+
+
+def test_table_and_picture(tmp_path):
+    """From made-up curves: a method that gets there has a ratio, one that does not the time it was given."""
+    growth = dict.fromkeys(("increments", "elements_at_the_end"), 1)
+    growth |= dict.fromkeys(("incremental_s", "fresh_s", "all_incremental_s", "all_fresh_s", "difference"), 1.0)
+    points = []
+    for name in work_precision.PROBLEMS:
+        points += [Point(name, work_precision.OURS, p, 10 * p, 10.0 ** (-p), 1e-3) for p in range(2, 11)]
+        points += [Point(name, work_precision.CALIBRATED, n, 2 * n, 0.1 / n, 1e-3 * n) for n in (10, 1000, 10000)]
+        points += [Point(name, work_precision.QUADRATIC, n, 2 * n, 1e-3, 1e-3 * n) for n in (10, 500)]
+    goals = work_precision._goals(points)
+    rows = {row["method"]: row for row in goals["time at error 1e-4 over this solver's"]}
+    assert rows[work_precision.CALIBRATED]["reached"] and rows[work_precision.CALIBRATED]["ratio"] == pytest.approx(
+        1000
+    )
+    assert not rows[work_precision.QUADRATIC]["reached"] and rows[work_precision.QUADRATIC]["ratio"] == pytest.approx(
+        500
+    )
+    assert "500, and then still at 1e-03" in work_precision._table(points, growth, goals)
+    path = draw(points, work_precision.METHODS, tmp_path / "picture.png")
+    assert path.read_bytes().startswith(b"\x89PNG")
