@@ -7,20 +7,13 @@ from geomech import ddm
 from geomech.conventions import traction
 from geomech.ddm.iterative import CROSSOVER, NotSolved, gmres
 from geomech.model import Cracks, DdmSettings, Material
+from geomech.reference.crack_arrays import cracks_in_cells
 
 ROCK = Material("rock", youngs_modulus=10e9, poissons_ratio=0.25)
 
 
-def network(n: int, seed: int = 0) -> Cracks:
-    """n² cracks of lengths 1 : 6, one in each cell of a grid of 1 m, anywhere in it and in any direction."""
-    rng = np.random.default_rng(seed)
-    half = 0.48 * 6 ** -rng.uniform(0, 1, n * n)
-    turn = rng.uniform(0, np.pi, n * n)
-    arm = half[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-    room = 0.49 - np.abs(arm)
-    cell = np.stack(np.meshgrid(np.arange(n), np.arange(n)), axis=-1).reshape(-1, 2) + 0.5
-    middle = cell + rng.uniform(-1, 1, (n * n, 2)) * room
-    return Cracks.from_polylines(list(np.stack([middle - arm, middle + arm], axis=1)))
+def network(n: int) -> Cracks:
+    return Cracks.from_polylines(cracks_in_cells(n))
 
 
 def both(loops, cracks, load):
