@@ -1,0 +1,95 @@
+"""K of a pressurised crack below a free surface beside an independent solution and the limits for shallow and deep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from geomech.model import Cracks
+from geomech.reference.crack_arrays import near_surface
+from geomech.reference.surface_crack import thin_layer
+
+#: Depths above this are within reach of the independent solution, whose kernels peak like 1/depth².
+RESOLVED = 0.05
+GRIFFITH = np.sqrt(np.pi)
+
+LIMITS = """\
+What this does and does not say
+  - The half-plane is a block 40 (1 + depth) crack half-lengths wide, free on all sides.
+  - K of straight cracks depends on nothing but depth/half-length. The thin layer's error is of first order in it:
+    the first two depths extrapolated to zero give the published factors.
+  - Paths are those of a dead pressure without a fluid's weight, flow or lag: cracks turn up to the surface as sills
+    do (Pollard & Holzhausen 1979), but nothing is said of when."""
+
+
+def independent(depths: np.ndarray) -> np.ndarray:
+    """(n, 2) K_I, K_II at the right-hand tip by dislocations in the half-plane, pressure and half-length one; nan where
+    they are not resolved."""
+    out = np.full((len(depths), 2), np.nan)
+    for k, depth in enumerate(depths):
+        if depth >= RESOLVED:
+            ends = np.array([[-1.0, -depth], [1.0, -depth]])
+            out[k] = near_surface(ends, 1.0, 129 if depth < 0.1 else 65)[1]
+    return out
+
+
+def shallow_limit(depths: np.ndarray, k: np.ndarray) -> np.ndarray:
+    """(2,) ratio of K_I, K_II to the thin layer's, extrapolated to no depth from the first two ``depths``."""
+    ratio = np.array([np.abs(k[m]) / thin_layer(1.0, depths[m], 1.0) for m in (0, 1)])
+    return ratio[0] + (ratio[0] - ratio[1]) * depths[0] / (depths[1] - depths[0])
+
+
+def report(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> str:
+    """The comparison as text; ``k`` (n, 2) at pressure and half-length one."""
+    exact = independent(depths)
+    rows = [
+        "depth    K_I      K_II       relative to dislocations       relative to a thin layer",
+        "         (p√πa = 1)",
+    ]
+    for depth, got, other in zip(depths, k, exact):
+        off = np.abs(got - other).max() / np.hypot(*other)
+        thin = np.abs(got) / thin_layer(1.0, depth, 1.0)
+        beside = f"{off:.1e}" if np.isfinite(off) else "-"
+        rows.append(
+            f"{depth:5.2f} {got[0] / GRIFFITH:9.4f} {got[1] / GRIFFITH:9.4f}      {beside:>12}     {thin[0]:18.4f} {thin[1]:7.4f}"
+        )
+    limit = shallow_limit(depths, k)
+    rows += ["", f"thin layer, extrapolated to no depth: {limit[0]:.4f}, {limit[1]:.4f} of the published K_I, K_II", ""]
+    for depth, cracks in paths.items():
+        top = cracks.nodes[np.argmax(cracks.nodes[:, 1])]
+        rows.append(
+            f"from depth {depth:g} the crack comes up {abs(top[0]):.2f} from its middle, {abs(top[1]):.2f} below the surface"
+        )
+    return "\n".join([*rows, "", LIMITS])
+
+
+def draw(path: Path, depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> None:
+    """K against depth with the limits, and the paths, as one picture."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7, 7), layout="constrained")
+    upper, lower = figure.subplots(2, 1, height_ratios=[2.6, 1])
+    fine = np.geomspace(depths[0], depths[-1], 60)
+    thin = np.array([thin_layer(1.0, d, 1.0) for d in fine]) / GRIFFITH
+    exact = np.abs(independent(depths)) / GRIFFITH
+    for mode, colour in ((0, "#1f6f8b"), (1, "#c8553d")):
+        name = ("K_I", "K_{II}")[mode]
+        upper.loglog(depths, np.abs(k[:, mode]) / GRIFFITH, "-o", ms=4, color=colour, label=f"$|{name}|$")
+        upper.loglog(depths, exact[:, mode], "x", ms=8, color="#222222", label="dislocations" if mode else None)
+        upper.loglog(fine[fine < 0.6], thin[fine < 0.6, mode], ":", color=colour, label=f"thin layer, $|{name}|$")
+    upper.set_title("A pressurised crack below a free surface", fontsize=10)
+    upper.axhline(1.0, color="#999999", lw=0.8)
+    upper.text(depths[0], 1.08, "Griffith", color="#777777", fontsize=8)
+    upper.set(xlabel="depth / half-length", ylabel=r"$|K| / p\sqrt{\pi a}$")
+    upper.legend(frameon=False, fontsize=8)
+    lower.axhline(0, color="#3d405b", lw=2)
+    for (depth, cracks), colour in zip(paths.items(), ("#b08900", "#588157", "#8d6a9f")):
+        for a, b in cracks.nodes[cracks.segments]:
+            lower.plot([a[0], b[0]], [a[1], b[1]], color=colour, lw=1.8, solid_capstyle="round")
+        lower.plot([-1, 1], [-depth, -depth], color=colour, lw=4, alpha=0.35)
+    lower.set(xlabel="x / half-length", ylabel="y / half-length", aspect="equal")
+    lower.set_title("The way to the surface, pressure held", fontsize=10)
+    for axes in (upper, lower):
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=150)
