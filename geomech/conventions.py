@@ -43,7 +43,9 @@ VTK_STRESS = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 def normal_of(tangent: np.ndarray) -> np.ndarray:
     """The crack normal: ``tangent`` (..., 2) turned by +90°."""
     tangent = np.asarray(tangent, dtype=float)
-    return np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1)
+    normal = np.empty_like(tangent)
+    normal[..., 0], normal[..., 1] = -tangent[..., 1], tangent[..., 0]
+    return normal
 
 
 def outward_normal_of(tangent: np.ndarray) -> np.ndarray:

@@ -8,14 +8,15 @@ cracks are softer than the rock, which every nearly split block reaches).
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from ..conventions import rotate_stress
+import numpy as np
 
 
 def stress_rotation(angle: float) -> np.ndarray:
     """Q (3, 3): components of a stress carried along by a rotation of ``angle`` rad, σ' = Q σ."""
-    return rotate_stress(np.eye(3), angle).T
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c * c, s * s, -2 * s * c], [s * s, c * c, 2 * s * c], [s * c, -s * c, c * c - s * s]])
 
 
 def strain_rotation(angle: float) -> np.ndarray:

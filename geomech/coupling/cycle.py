@@ -230,8 +230,7 @@ class Coupling:
                     float(state.rotation[b]),
                 )
                 found, assumed = e + s @ state.stress[b], state.crack_strain[b]
-                material = self.problem.materials[self.blocks.material[b]]
-                elastic = material.compliance() @ state.stress[b]
+                elastic = self.system.compliance[b] @ state.stress[b]
                 size = np.abs(elastic).max() + np.abs(found).max()
                 if size > 0:
                     worst = max(worst, float(np.abs(found - assumed).max() / size))
@@ -262,7 +261,7 @@ class Coupling:
                 tips["k_i"], tips["k_ii"], self.problem.materials[self.blocks.material[b]]
             )
             rows.append(tips)
-        return np.concatenate(rows)
+        return rows[0] if len(rows) == 1 else np.concatenate(rows)
 
     # -- growth --------------------------------------------------------------------------------------------------
 

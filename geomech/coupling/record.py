@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import fields, replace
+
 import numpy as np
 
-from ..conventions import outward_normal_of
 from ..model import Blocks, CrackFaces, Cracks, Motion, Problem
 
 
@@ -14,8 +16,7 @@ def leading_load(problem: Problem, blocks: Blocks, now: float) -> float:
     edges = blocks.edges_named(name) if name else []
     if not len(edges):
         return 0.0
-    along = blocks.vertices[blocks.next_vertex[edges[0]]] - blocks.vertices[edges[0]]
-    outward = outward_normal_of(along / np.hypot(*along))
+    outward = blocks.outward_normals[edges[0]]
     return sum(
         -float(load.history.at(now) @ outward) for load in problem.loads.edge_tractions if load.edge_name == name
     )
@@ -26,21 +27,17 @@ def axial_strain(gauge, motion: Motion) -> float:
     if gauge is None:
         return float("nan")
     (a, p), (b, q) = gauge
-    before = np.hypot(*(np.asarray(q) - np.asarray(p)))
-    return float(1 - np.hypot(*(motion.current(b, q) - motion.current(a, p))) / before)
+    return 1 - math.dist(motion.current(b, q), motion.current(a, p)) / math.dist(q, p)
 
 
 def joined_faces(cracks: Cracks, solutions: dict) -> CrackFaces | None:
     """The faces of all solved bodies (block → solution), segments counted in the whole network."""
     if not solutions:
         return None
-    faces = [solution.faces for solution in solutions.values()]
-    return CrackFaces(
-        segment=np.concatenate(
-            [np.flatnonzero(cracks.block == b)[f.segment] for b, f in zip(solutions, faces, strict=True)]
-        ),
-        **{
-            name: np.concatenate([getattr(f, name) for f in faces])
-            for name in ("points", "opening", "slip", "traction", "state")
-        },
-    )
+    faces = [
+        replace(solution.faces, segment=np.flatnonzero(cracks.block == b)[solution.faces.segment])
+        for b, solution in solutions.items()
+    ]
+    if len(faces) == 1:
+        return faces[0]
+    return CrackFaces(**{f.name: np.concatenate([getattr(each, f.name) for each in faces]) for f in fields(CrackFaces)})

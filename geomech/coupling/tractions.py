@@ -303,26 +303,24 @@ def _add_point_load(pieces, blocks, block: int, point: np.ndarray, force: np.nda
 
 def _balanced(block, blocks, segments, tractions, density, gravity, acceleration, spin, turn_back) -> BoundaryLoad:
     area, centroid, second = blocks.area_moments(block)
-    gradient = np.zeros((2, 2))
-    if density and acceleration is not None:
-        strain_rate = np.array([[acceleration[3], acceleration[5] / 2], [acceleration[5] / 2, acceleration[4]]])
-        gradient -= density * (turn_back @ strain_rate @ turn_back.T)
-    if density and spin:
-        gradient += density * spin**2 * np.eye(2)
+    (xx, xy), (_, yy) = second.tolist()
+    (c, s), _ = turn_back.tolist()
+    bxx = bxy = byy = 0.0  # the body force's gradient, still symmetric
+    carried, angular = np.zeros(2), 0.0
+    if density:
+        g = np.zeros(2) if gravity is None else np.asarray(gravity, dtype=float)
+        ax, ay, angular, exx, eyy, shear = (0.0,) * 6 if acceleration is None else acceleration.tolist()
+        bxx = density * (spin**2 - c * c * exx - s * s * eyy - s * c * shear)
+        byy = density * (spin**2 - s * s * exx - c * c * eyy + s * c * shear)
+        bxy = -density * (s * c * (eyy - exx) + 0.5 * (c * c - s * s) * shear)
+        carried, angular = turn_back @ (density * (g - (ax, ay))), density * angular
     force, moment, size = resultants(segments, tractions, centroid)
-    # ∫ (x b_y − y b_x) dA of b = B x, second = [[∫x², ∫xy], [∫xy, ∫y²]]
-    moment += (gradient @ second)[1, 0] - (gradient @ second)[0, 1]
-    polar = second[0, 0] + second[1, 1]
-    body_force, torque = -force / area, moment / polar
-    gradient = gradient + torque * np.array([[0.0, 1.0], [-1.0, 0.0]])
+    # ∫ (x b_y − y b_x) dA of b = B x
+    moment += bxy * xx + byy * xy - bxx * xy - bxy * yy
+    body_force, torque = -force / area, moment / (xx + yy)
+    gradient = np.array([[bxx, bxy + torque], [bxy - torque, byy]])
     imbalance = 0.0
     if size > 0:
-        carried = np.zeros(2)
-        angular = 0.0
-        if density:
-            g = np.zeros(2) if gravity is None else np.asarray(gravity, dtype=float)
-            a = np.zeros(6) if acceleration is None else acceleration
-            carried, angular = turn_back @ (density * (g - a[:2])), density * a[2]
-        missed = np.hypot(*(body_force - carried)) * area + abs(torque - angular) * polar / np.sqrt(area)
-        imbalance = float(missed / size)
+        missed = math.hypot(*(body_force - carried)) * area + abs(torque - angular) * (xx + yy) / math.sqrt(area)
+        imbalance = missed / size
     return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance)

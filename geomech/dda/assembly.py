@@ -12,21 +12,19 @@ import numpy as np
 from numba import njit
 
 from ..model import OPEN, SLIP, STICK
+from .multifrontal import BlockSolver
 
 #: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60
 #: Spring, relative to E', that holds the rigid motion of a block without mass; its force is as small beside the load.
 GROUND_RATIO = 1e-11
-#: A solution without pivoting is kept when it leaves less than this of the right side.
-_RESIDUAL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
     """Where each 6×6 block stands in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
 
-    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. For a sparse matrix ``indptr`` and
-    ``indices`` are its scalar CSR structure; they are None for a dense one.
+    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. ``solver`` is None for a dense matrix.
     """
 
     n: int
@@ -36,8 +34,7 @@ class Pattern:
     upper: np.ndarray
     lower: np.ndarray
     size: int
-    indptr: np.ndarray | None = None
-    indices: np.ndarray | None = None
+    solver: BlockSolver | None = None
 
 
 def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pattern:
@@ -56,50 +53,32 @@ def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pa
     )
 
 
-def sparse_pattern(free: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pattern:
-    """Pattern of a block-sparse matrix numbered in a fill-reducing order (minimum degree on the graph of blocks)."""
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
+def sparse_pattern(
+    order: np.ndarray, block: np.ndarray, other: np.ndarray, points: np.ndarray, kept: BlockSolver | None = None
+) -> Pattern:
+    """Pattern of a block-sparse matrix, its 6×6 blocks stored one after the other. ``points`` (n_blocks, 2) m: centroids.
 
-    n = int(free.max()) + 1
-    i, j = free[block], free[other]
-    both = (i >= 0) & (j >= 0)
-    rows = np.concatenate([np.arange(n), i[both], j[both]])
-    columns = np.concatenate([np.arange(n), j[both], i[both]])
-    graph = csc_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
-    graph.data[:] = -1.0
-    graph.setdiag(n + 1.0)
-    rank = splu(
-        graph, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    ).perm_c.astype(np.int64)
-    order = np.where(free >= 0, rank[free], -1)
-    keys = np.unique(rank[rows] * n + rank[columns])
-    block_row, block_column = keys // n, keys % n
-    block_ptr = np.searchsorted(block_row, np.arange(n + 1))
-    per_row = np.diff(block_ptr)
-    stride = 6 * per_row
-    base = 36 * block_ptr[block_row] + 6 * (np.arange(len(keys)) - block_ptr[block_row])
-
-    def base_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return base[np.searchsorted(keys, np.maximum(a, 0) * n + np.maximum(b, 0)) % len(keys)]
-
-    indptr = np.concatenate([[0], np.cumsum(np.repeat(stride, 6))])
-    indices = np.empty(36 * len(keys), np.int32)
-    within = np.arange(6)
-    for a in range(6):
-        indices[(base[:, None] + a * stride[block_row][:, None] + within)] = 6 * block_column[:, None] + within
+    The ``kept`` solver serves on as long as no two blocks meet that did not when it was made.
+    """
+    n = int(order.max()) + 1
     i, j = order[block], order[other]
+    both = (i >= 0) & (j >= 0)
     number = np.arange(n)
+    pairs = np.concatenate([i[both] * n + j[both], j[both] * n + i[both]])
+    if kept is None or not kept.holds(pairs):
+        keys = np.unique(np.concatenate([number * n + number, pairs]))
+        free = np.empty(n, np.int64)
+        free[order[order >= 0]] = np.flatnonzero(order >= 0)
+        kept = BlockSolver(points[free], keys // n, keys % n)
     return Pattern(
         n=n,
         order=order,
-        stride=stride,
-        diagonal=base_of(number, number),
-        upper=base_of(i, j),
-        lower=base_of(j, i),
-        size=36 * len(keys),
-        indptr=indptr.astype(np.int32),
-        indices=indices,
+        stride=np.full(n, 6),
+        diagonal=36 * kept.entry(number * n + number),
+        upper=36 * kept.entry(np.where(both, i * n + j, 0)),
+        lower=36 * kept.entry(np.where(both, j * n + i, 0)),
+        size=36 * len(kept.keys),
+        solver=kept,
     )
 
 
@@ -309,7 +288,7 @@ def assemble_contacts(
 
 def solve(pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool) -> np.ndarray:
     """Unknowns (6 n,) in the pattern's order. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
-    if pattern.indptr is None:
+    if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
 
         # The flat matrix is C-ordered: its Fortran view is the transpose.
@@ -321,27 +300,4 @@ def solve(pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool
         if info != 0:
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
-    from scipy.sparse import csc_array
-    from scipy.sparse.linalg import splu
-
-    # The CSR arrays read as CSC are the transpose; blocks stand in elimination order already.
-    transpose = csc_array((data, pattern.indices, pattern.indptr), shape=(6 * pattern.n, 6 * pattern.n))
-    for pivoting in (0.0, 1.0):
-        # Friction spoils the symmetry but seldom the diagonal: pivots, which ruin the ordering, only if they are needed.
-        try:
-            factor = splu(
-                transpose, permc_spec="NATURAL", diag_pivot_thresh=pivoting, options={"SymmetricMode": pivoting == 0.0}
-            )
-        except RuntimeError as error:
-            if symmetric or pivoting:
-                raise np.linalg.LinAlgError(f"the step's matrix is singular ({error})") from error
-            continue
-        x = factor.solve(right, "T")
-        if symmetric:
-            return x
-        residual = right - transpose.T @ x
-        x += factor.solve(residual, "T")
-        residual = right - transpose.T @ x
-        if np.abs(residual).max() <= _RESIDUAL * np.abs(right).max():
-            break
-    return x
+    return pattern.solver.solve(data, right)

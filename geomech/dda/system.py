@@ -67,7 +67,7 @@ class BlockSystem:
         of = np.asarray(blocks.material, dtype=int)
         self.density = np.array([m.density for m in self.materials])[of]
         self._stiffness = np.ascontiguousarray(np.array([m.stiffness() for m in self.materials])[of])
-        self._compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
+        self.compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
         self._modulus = np.array([m.plane_modulus for m in self.materials])[of]
         self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
@@ -77,7 +77,7 @@ class BlockSystem:
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
         self._no_compliance = np.zeros((blocks.n_blocks, 3, 3))
         self._no_offset = np.zeros((blocks.n_blocks, 3))
-        self._sparse: tuple[bytes, assembly.Pattern] | None = None
+        self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
 
         vertices = blocks.vertices
         areas = blocks.areas()
@@ -232,12 +232,12 @@ class BlockSystem:
             law = self._law_of[a, b]
         return law
 
-    def _pattern(self, block: np.ndarray, other: np.ndarray) -> assembly.Pattern:
+    def _pattern(self, block: np.ndarray, other: np.ndarray, moments: np.ndarray) -> assembly.Pattern:
         if int(self._free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self._free, block, other)
-        key = block.tobytes() + other.tobytes()
-        if self._sparse is None or self._sparse[0] != key:
-            self._sparse = key, assembly.sparse_pattern(self._free, block, other)
+        if self._sparse is None or self._sparse[0] is not block:
+            kept = None if self._sparse is None else self._sparse[1].solver
+            self._sparse = block, assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
         return self._sparse[1]
 
     def _attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> tuple[StepResult, float]:
@@ -262,10 +262,10 @@ class BlockSystem:
             damping, dt,
         )  # fmt: skip
         n_free = int((~self._fixed).sum())
-        pattern = self._pattern(found["block"], found["other"]) if n_free else None
+        pattern = self._pattern(found["block"], found["other"], moments) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assembly.assemble_blocks(
-            order, moments, density, self._stiffness, self._compliance, carried, stress, crack_strain, given,
+            order, moments, density, self._stiffness, self.compliance, carried, stress, crack_strain, given,
             compliance, offset, gravity, load, dt, damping, n_free,
         )  # fmt: skip
         vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
@@ -324,7 +324,7 @@ class BlockSystem:
             "step_cuts": cuts,
             "kinetic_energy": self._kinetic_energy(density, velocity, moments),
             "elastic_energy": 0.5
-            * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self._compliance, new_stress))),
+            * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self.compliance, new_stress))),
             "contact_energy": 0.5
             * float(
                 np.sum(new_gap[closed] ** 2 * found["springs"].normal[closed])

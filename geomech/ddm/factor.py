@@ -1,4 +1,4 @@
-"""LU factors of the dense matrices, without the copies that a row-major matrix would cost."""
+"""LU factors of the dense matrices, row- or column-major without a copy more."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 class Factor:
-    """LU of a square row-major ``matrix`` (left as it is), its rows brought to one size. Raises LinAlgError, with
+    """LU of a square ``matrix`` (left as it is), its rows brought to one size. Raises LinAlgError, with
     ``what``, when it is singular.
 
     Tractions on an element go with one over its length: unscaled, elements of very different lengths would look singular.
@@ -25,11 +25,13 @@ class Factor:
         if not np.isfinite(size).all():
             raise np.linalg.LinAlgError(f"{what} (not finite)")
         self._scale = np.ldexp(1.0, -np.frexp(size)[1])
-        # LAPACK is column-major: factor the transpose, which is the same memory, and solve the transposed system.
-        transposed = (matrix * self._scale[:, None]).T
-        self._lu, self._pivots, info = lapack.dgetrf(transposed, overwrite_a=True)
+        # LAPACK is column-major: of a row-major matrix factor the transpose, which is the same memory, and solve the
+        # transposed system.
+        scaled = matrix * self._scale[:, None]
+        self._transposed = 0 if scaled.flags.f_contiguous else 1
+        self._lu, self._pivots, info = lapack.dgetrf(scaled.T if self._transposed else scaled, overwrite_a=True)
         norm = (size * self._scale).max()
-        self.rcond = lapack.dgecon(self._lu, norm, norm="1")[0] if info == 0 else 0.0
+        self.rcond = lapack.dgecon(self._lu, norm, norm="1" if self._transposed else "I")[0] if info == 0 else 0.0
         if not self.rcond > 1e-15:
             raise np.linalg.LinAlgError(f"{what} (reciprocal condition {self.rcond:.1e})")
 
@@ -38,4 +40,4 @@ class Factor:
         if self.n == 0 or right.size == 0:
             return np.zeros_like(right)
         scaled = right * (self._scale if right.ndim == 1 else self._scale[:, None])
-        return self._solve(self._lu, self._pivots, scaled, trans=1, overwrite_b=True)[0]
+        return self._solve(self._lu, self._pivots, scaled, trans=self._transposed, overwrite_b=True)[0]

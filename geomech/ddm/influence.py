@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from . import kernels, shapes
 
-#: Element–point pairs below which a second thread does not pay for itself.
-PAIRS_PER_THREAD = 6000
-_THREADS = 2
+#: Element–point pairs (some 30 ns each) below which another thread does not pay for itself.
+PAIRS_PER_THREAD = 8000
+#: The processors this process may use, where the system tells.
+_THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 _pool: ThreadPoolExecutor | None = None
 
 
@@ -104,6 +106,14 @@ class ElementSet:
             return np.arange(self.n)
         return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
 
+    @cached_property
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, p+3, 2) the ends and between them the collocation points of every element, and (n, p+1, p+3) what nodal values
+        have to be multiplied by (from the left) for the values there."""
+        t = np.concatenate([[-1.0], shapes.nodes(self.family, self.order), [1.0]])
+        table = np.array([shapes.at(self.family, self.order, kind, t).T for kind in range(4)])
+        return self.at(t), table[self.kind]
+
     def take(self, which: np.ndarray) -> ElementSet:
         return ElementSet(
             self.start[which], self.end[which], self.kind[which], self.source[which], self.order, self.family
@@ -113,10 +123,6 @@ class ElementSet:
         """Indices of the unknowns (and rows) of ``elements``."""
         width = 2 * self.per
         return (np.asarray(elements)[:, None] * width + np.arange(width)).ravel()
-
-    @cached_property
-    def _by_kind(self) -> list[tuple[int, np.ndarray]]:
-        return [(int(kind), np.flatnonzero(self.kind == kind)) for kind in np.unique(self.kind)]
 
     @cached_property
     def _inverse_weight(self) -> np.ndarray:
@@ -130,50 +136,35 @@ class ElementSet:
         scaled = values.reshape(self.n, 2, self.per) * self._inverse_weight[:, None, :]
         return np.ascontiguousarray(scaled @ shapes.to_monomials(self.family, self.order, shapes.ORDINARY).T)
 
-    def evaluate(self, values: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """(n, 2, len(t)) local components at ``t`` of nodal ``values`` (n_unknowns,)."""
-        rows = values.reshape(self.n, 2, self.per)
-        out = np.empty((self.n, 2, len(t)))
-        for kind, which in self._by_kind:
-            out[which] = rows[which] @ shapes.at(self.family, self.order, kind, t).T
-        return out
-
     @cached_property
     def quadrature(self) -> np.ndarray:
         """(n, p+1) integrals of the nodal shape functions, m."""
         table = np.array([shapes.integrals(self.family, self.order, kind) for kind in range(4)])
         return 0.5 * self.length[:, None] * table[self.kind]
 
-    def nodal_matrix(self, monomial: np.ndarray) -> np.ndarray:
-        """Columns in monomials turned into columns in nodal values."""
-        rows = len(monomial)
-        full = monomial.reshape(-1, self.per) @ shapes.to_monomials(self.family, self.order, shapes.ORDINARY)
-        if (self.kind != shapes.ORDINARY).any():
-            full = full.reshape(rows, self.n, 2, self.per)
-            full *= self._inverse_weight[:, None, :]
-        return full.reshape(rows, self.n_unknowns)
+
+@lru_cache
+def _to_nodal(family: str, order: int) -> np.ndarray:
+    """(4, p+1, p+1) from nodal values to monomials, for every kind of element."""
+    return np.stack([shapes.to_monomials(family, order, kind) for kind in range(4)])
 
 
 def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
-    """(targets.n_unknowns, sources.n_unknowns): traction (along, normal, left of the target) at the collocation points
-    from unit nodal jumps times 2μ."""
-    out = np.empty((targets.n_unknowns, sources.n_unknowns))
-    if out.size:
-        _tractions(
-            targets.nodes,
-            targets.tangent,
-            sources.start,
-            sources.end,
-            sources.kind,
-            sources.order,
-            nu,
-            tol,
-            1.0,
-            False,
-            out,
-        )
-        out = sources.nodal_matrix(out)
-    return out
+    """(targets.n_unknowns, sources.n_unknowns), column-major: traction (along, normal, left of the target) at the
+    collocation points from unit nodal jumps times 2μ. An entry depends on its two elements alone, to the bit."""
+    return _between(targets, sources, nu, tol, 1.0, False)
+
+
+def line_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float, side: float) -> np.ndarray:
+    """As `influence`, from unit nodal line forces (per length) on ordinary ``sources``; points on one are seen from
+    ``side`` of it."""
+    return _between(targets, sources, nu, tol, side, True)
+
+
+def _between(targets, sources, nu, tol, side, force):
+    nodal = _to_nodal(sources.family, sources.order)
+    start, end, kind, order = sources.start, sources.end, sources.kind, sources.order
+    return _tractions(targets.nodes, targets.tangent, start, end, kind, order, nu, tol, side, force, nodal)
 
 
 def line_forces(
@@ -186,9 +177,8 @@ def line_forces(
 
 def _line_forces(points, tangents, start, end, degree, nu, tol, side):
     n, per = points.shape[:2]
-    out = np.empty((2 * n * per, len(start) * 2 * (degree + 1)))
-    if out.size:
-        _tractions(points, tangents, start, end, np.zeros(len(start), np.int64), degree, nu, tol, side, True, out)
+    kind, unit = np.zeros(len(start), np.int64), np.broadcast_to(np.eye(degree + 1), (4, degree + 1, degree + 1))
+    out = _tractions(points, tangents, start, end, kind, degree, nu, tol, side, True, np.ascontiguousarray(unit))
     return out.reshape(2 * n * per, len(start), 2, degree + 1)
 
 
@@ -261,36 +251,43 @@ def project_total(
         values[e] = total @ legendre @ at_nodes.T
 
 
-def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, out):
-    """``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
-    per = points.shape[1]
-    tangents = np.repeat(tangents, per, axis=0)
-    points = np.ascontiguousarray(points.reshape(-1, 2))
+def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, nodal):
+    """(2 n per, 2 (p+1) m), column-major, at ``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
+    n, per = points.shape[:2]
+    out = np.empty((2 * (order + 1) * len(start), 2 * n * per))
+    if not out.size:
+        return out.T
+    tangents = kernels.lanes_of(np.repeat(tangents, per, axis=0))
+    points = kernels.lanes_of(points.reshape(-1, 2))
     start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
     kind = np.ascontiguousarray(kind, dtype=np.int64)
-    table = shapes.moments()
+    table, flat = shapes.moments(), out.reshape(-1)
 
     def work(first, last):
-        kernels.tractions(points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, out)
+        kernels.tractions(
+            points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, nodal, flat
+        )
 
-    _spread(len(points), len(points) * len(start), work)
+    _spread(n * per, n * per * len(start), work)
+    return out.T
 
 
 def add_fields(points, start, end, kind, density, nu, tol, side, force, stress, shift) -> None:
     """Add the stress (n, 3) and 2μ times the displacement (n, 2) of elements with monomial ``density`` (m, 2, p+1)."""
     if not len(points) or not len(start):
         return
+    flat = kernels.lanes_of(points)
     start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
     kind = np.ascontiguousarray(kind, dtype=np.int64)
     density = np.ascontiguousarray(density)
-    table = shapes.moments()
+    order, table, out = density.shape[2] - 1, shapes.moments(), np.zeros((5, len(points)))
 
     def work(first, last):
-        kernels.fields(
-            points, first, last, start, end, kind, density.shape[2] - 1, density, nu, tol, side, force, table, stress, shift
-        )  # fmt: skip
+        kernels.fields(flat, first, last, start, end, kind, order, density, nu, tol, side, force, table, out)
 
     _spread(len(points), len(points) * len(start), work)
+    stress += out[:3].T
+    shift += out[3:].T
 
 
 def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set, column_set, compute) -> np.ndarray:
@@ -303,7 +300,7 @@ def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set
         return old
     kept_r, new_r = np.flatnonzero(rows >= 0), np.flatnonzero(rows < 0)
     new_c = np.flatnonzero(columns < 0)
-    out = np.empty((row_set.n_unknowns, column_set.n_unknowns))
+    out = np.empty((row_set.n_unknowns, column_set.n_unknowns), order="F")
     # Elements mostly keep their order: copying a few slices is several times faster than gathering.
     wr, wc = 2 * row_set.per, 2 * column_set.per
     column_runs = list(_runs(columns))

@@ -267,19 +267,13 @@ def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -
     """(force (2,), moment about ``about``, sum of the sizes of all forces) of linear tractions on ``segments``."""
     if not len(segments):
         return np.zeros(2), 0.0, 0.0
-    a, b = segments[:, 0] - about, segments[:, 1] - about
-    t_a, t_b = tractions[:, 0], tractions[:, 1]
-    length = np.hypot(*(b - a).T)
-    forces = length[:, None] * (t_a + t_b) / 2
-    # ∫ x × t of two linear functions: Simpson's rule is exact.
-    middle, t_middle = (a + b) / 2, (t_a + t_b) / 2
-
-    def cross(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-        return p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-
-    moments = length / 6 * (cross(a, t_a) + 4 * cross(middle, t_middle) + cross(b, t_b))
-    size = float(np.sum(length * (np.hypot(*t_a.T) + np.hypot(*t_b.T)) / 2))
-    return forces.sum(axis=0), float(moments.sum()), size
+    ends = segments - about
+    along = ends[:, 1] - ends[:, 0]
+    forces = (np.hypot(along[:, 0], along[:, 1]) / 6)[:, None, None] * tractions
+    # ∫ x × t of two functions linear along a length L is L/6 Σ x_i × t_j, those of the same end counted twice.
+    arms = ends + ends.sum(axis=1, keepdims=True)
+    moment = float((arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]).sum())
+    return 3 * forces.sum(axis=(0, 1)), moment, 3 * float(np.hypot(forces[..., 0], forces[..., 1]).sum())
 
 
 @dataclass(frozen=True, eq=False)

@@ -305,9 +305,11 @@ def _touching(edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
     # Nodes by coordinates, so that corners, junctions and drawn end points that coincide count alike.
     flat = np.ascontiguousarray(ends.reshape(-1, 2)) + 0.0
     _, number = np.unique(flat.view([("x", float), ("y", float)]).ravel(), return_inverse=True)
-    incident = np.zeros((n, number.max() + 1 if n else 0), np.float32)
-    incident[np.repeat(np.arange(n), 2), number] = 1
-    out |= (incident @ incident.T) > 0
+    at_node = np.argsort(number, kind="stable")
+    for step in range(1, int(np.bincount(number).max()) if n else 0):
+        one, other = at_node[:-step], at_node[step:]
+        meet = number[one] == number[other]
+        out[one[meet] // 2, other[meet] // 2] = out[other[meet] // 2, one[meet] // 2] = True
     if n_edges and cracks.n_segments:
         a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
         length = np.hypot(*d.T)

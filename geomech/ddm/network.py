@@ -201,6 +201,11 @@ class Network:
         row = Row(*ends, last.crack, last.block, self.cycle, 0.0, last.law)
         self._insert(self.rows.index(last) + onward, row)
 
+    def begin(self, name: str, block: int, start: int, end: int) -> None:
+        """A new crack, last in the list, of one segment between two nodes; its faces obey the first law."""
+        self.names = (*self.names, name)
+        self._insert(len(self.rows), Row(start, end, len(self.names) - 1, block, self.cycle, 0.0, 0))
+
     def split(self, row: Row, node: int) -> None:
         """Divide ``row`` at ``node``; both halves keep what it was."""
         at = self.rows.index(row)

@@ -10,7 +10,6 @@ whether the factor rises (stable) or falls (it would run away under a dead load)
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from ..model import TIP, Cracks, DdmSettings, Event, GrowthSettings, Material
 from .body import Body
 from .criteria import CRITERIA
 from .growth import Growth, advance
+from .initiation import Birth, bear, births
 from .loads import BodyLoad
 from .path import corrected
 from .solution import Solution
@@ -48,8 +48,8 @@ class Step:
     cracks       the network that was solved
     solution     its solution; None where cracks cut a part off and nothing holds it (the last step then)
     tips         TIP rows with the criterion's ``k_eq`` and the ``angle`` that was followed; ``grown`` m
-    growth       the network after this step and what tips met on the way; None when none grew (the last step)
-    events       initiation, coalescence, self, daylighting; arrest or split in the last step
+    growth       the network after this step and what tips met on the way; None when nothing grew (the last step)
+    events       initiation, birth, coalescence, self, daylighting; arrest or split in the last step
     """
 
     number: int
@@ -100,7 +100,10 @@ class _Run:
         self.loops, self.material, self.load, self.growth = loops, material, load, growth
         self.settings, self.options = settings, options
         self.controlled, self.max_factor = controlled, max_factor
-        self.factor = 1.0
+        #: A drive is enough to grow.
+        self.enough = 1 - SETTLED if controlled else 1.0
+        self.factor, self.drive, self.tip_drive = 1.0, 0.0, 0.0
+        self.births: list[Birth] = []
         self.body: Body | None = None
         self.solution: Solution | None = None
         self.number = 0
@@ -109,7 +112,7 @@ class _Run:
         for self.number in range(max_steps):
             try:
                 self.body = self._body(cracks, self.body)
-                self.solution, tips, drive = self._settled()
+                self.solution, tips = self._settled()
             except np.linalg.LinAlgError as failure:
                 if not self.number:
                     raise
@@ -117,8 +120,10 @@ class _Run:
                 lost = self._event("split", at, str(failure))
                 yield Step(self.number, self.factor, cracks, None, np.empty(0, TIP), None, (lost,))
                 return
-            growth = self._grow(tips, drive)
-            events = self._events(cracks, tips, growth)
+            growth, born = self._grow(tips), ()
+            if growth is None:
+                growth, born = self._bear(tips)
+            events = self._events(cracks, tips, growth, born)
             yield Step(self.number, self.factor, cracks, self.solution, tips, growth, events)
             if growth is None:
                 return
@@ -132,7 +137,7 @@ class _Run:
     def _load_at(self, factor: float, cracks: Cracks) -> BodyLoad:
         if callable(self.load):
             return self.load(factor, cracks)
-        return self.load if factor == 1.0 else times(self.load, factor)
+        return self.load if factor == 1.0 else self.load.scaled(factor)
 
     def _solve(self, body: Body, factor: float) -> tuple[Solution, np.ndarray]:
         solution = body.solve(self._load_at(factor, body.cracks), warm=self.solution)
@@ -140,34 +145,35 @@ class _Run:
         tips["angle"], tips["k_eq"] = CRITERIA[self.growth.criterion](tips["k_i"], tips["k_ii"], self.material)
         return solution, tips
 
-    def _drive(self, factor: float) -> tuple[Solution, np.ndarray, float]:
-        """Solution, tips and the largest K_eq/K_Ic at a load factor."""
+    def _drives(self, factor: float) -> tuple[Solution, np.ndarray]:
+        """Solution and tips at a load factor; finds out how hard tips and whole rock are driven there."""
         solution, tips = self._solve(self.body, factor)
-        return solution, tips, float(np.max(tips["k_eq"], initial=0.0)) / self.material.k_ic
+        self.factor = factor
+        self.tip_drive = float(np.max(tips["k_eq"], initial=0.0)) / self.material.k_ic
+        self.births = births(solution, self.material, self.growth)
+        self.drive = max([self.tip_drive, *(birth.overstress for birth in self.births[:1])])
+        return solution, tips
 
-    def _settled(self) -> tuple[Solution, np.ndarray, float]:
-        """Solution, tips and drive at the load of this step, which sets the factor."""
+    def _settled(self) -> tuple[Solution, np.ndarray]:
+        """Solution and tips at the load of this step, which sets the factor."""
         if not self.controlled:
-            return self._drive(1.0)
+            return self._drives(1.0)
         found = None
 
         def excess(factor: float) -> float:
             nonlocal found
-            found, self.factor = self._drive(factor), factor
-            return found[2] - 1
-
-        def settled() -> bool:
-            return abs(found[2] - 1) <= PRECISION
+            found = self._drives(factor)
+            return self.drive - 1
 
         low = high = None
         factor = min(self.factor or 1.0, self.max_factor)
         for _ in range(2):
             rest = excess(factor)
             low, high = (factor, high) if rest < 0 else (low, factor)
-            if settled():
+            if abs(rest) <= PRECISION:
                 return found
             # Exact where everything scales with the factor.
-            factor = min(factor / found[2] if found[2] > 0 else WIDER * factor, self.max_factor)
+            factor = min(factor / self.drive if self.drive > 0 else WIDER * factor, self.max_factor)
         if low is None:
             if excess(0.0) >= 0:
                 return found  # what stands without the factor drives them already
@@ -187,14 +193,15 @@ class _Run:
 
     # -- growth --------------------------------------------------------------------------------------------------
 
-    def _grow(self, tips: np.ndarray, drive: float) -> Growth | None:
-        if drive < (1 - SETTLED if self.controlled else 1):
+    def _grow(self, tips: np.ndarray) -> Growth | None:
+        if self.tip_drive < self.enough:
             return None
+        drive = self.tip_drive
         cracks, body, cycle = self.body.cracks, self.body, self.number + 1
         threshold = self.material.k_ic * ((1 - TOGETHER) * drive if self.controlled else 1.0)
 
         def grow() -> Growth:
-            return advance(cracks, lambda block: self.loops, tips, self.growth, np.full(len(tips), threshold), cycle)
+            return advance(cracks, lambda block: body.loops, tips, self.growth, np.full(len(tips), threshold), cycle)
 
         def look_ahead(tried: Cracks) -> np.ndarray:
             self.body = self._body(tried, self.body)
@@ -207,16 +214,29 @@ class _Run:
             tips["grown"] = growth.grown
         return growth
 
+    def _bear(self, tips: np.ndarray) -> tuple[Growth | None, Sequence[Birth]]:
+        """New cracks when whole rock fails; only where no tip grows, which would relieve it."""
+        if not self.births or self.births[0].overstress < self.enough:
+            return None, ()
+        cracks = bear(self.body.cracks, lambda block: self.body.loops, self.births, self.number + 1)
+        return Growth(cracks, np.zeros(len(tips)), ()), self.births
+
     # -- events --------------------------------------------------------------------------------------------------
 
-    def _events(self, cracks: Cracks, tips: np.ndarray, growth: Growth | None) -> tuple[Event, ...]:
+    def _events(
+        self, cracks: Cracks, tips: np.ndarray, growth: Growth | None, born: Sequence[Birth]
+    ) -> tuple[Event, ...]:
         if growth is None:
             at = tips["point"][np.argmax(tips["k_eq"])] if len(tips) else np.zeros(2)
-            return (self._event("arrest", at, "no tip is driven any more"),)
-        events = []
-        born = dict(zip(cracks.segments.ravel().tolist(), np.repeat(cracks.birth_cycle, 2).tolist()))
+            return (self._event("arrest", at, "nothing is driven any more"),)
+        names = growth.cracks.names[len(cracks.names) :]
+        events = [
+            self._event("birth", birth.start, f"{name} starts in {birth.kind} ({birth.place})")
+            for name, birth in zip(names, born)
+        ]
+        since = dict(zip(cracks.segments.ravel().tolist(), np.repeat(cracks.birth_cycle, 2).tolist()))
         for tip in tips[growth.grown > 0]:
-            if born[int(tip["node"])] == 0:
+            if since[int(tip["node"])] == 0:
                 events.append(self._event("initiation", tip["point"], f"{cracks.names[tip['crack']]} starts to grow"))
         for join in growth.joins:
             other = cracks.names[join.other_crack] if join.other_crack >= 0 else "the surface"
@@ -225,18 +245,3 @@ class _Run:
 
     def _event(self, kind: str, point, detail: str) -> Event:
         return Event(kind, self.number, 0.0, self.factor, (float(point[0]), float(point[1])), detail)
-
-
-def times(load: BodyLoad, factor: float) -> BodyLoad:
-    """``load``, every part of it multiplied. Raises ValueError when a part is no number or array of numbers: such a load is
-    given as a function of the factor."""
-    where = {"segments", "about"}
-    scaled = {}
-    for field in dataclasses.fields(load):
-        value = getattr(load, field.name)
-        if value is None or field.name in where:
-            continue
-        if not np.issubdtype(np.asarray(value).dtype, np.number):
-            raise ValueError(f"{field.name} cannot be multiplied: give the load as a function of the load factor")
-        scaled[field.name] = factor * np.asarray(value, dtype=float)
-    return dataclasses.replace(load, **scaled)

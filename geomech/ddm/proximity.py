@@ -17,7 +17,6 @@ def _distance(px, py, ax, ay, bx, by):
     return np.hypot(px - ax - s * dx, py - ay - s * dy)
 
 
-@_jit
 def crowding(start, end, tip, source, touching, n_edges, apart, across, chained):
     """(n,) the largest length / (allowed length) of each element over all others.
 
@@ -25,15 +24,28 @@ def crowding(start, end, tip, source, touching, n_edges, apart, across, chained)
     ones, whose grading already ties sizes to distances. Elements that share an end are not compared, but for the tip at
     the other end (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
     """
+    middle = 0.5 * (start[:, 0] + end[:, 0])
+    length = np.hypot(end[:, 0] - start[:, 0], end[:, 1] - start[:, 1])
+    # Farther apart than this along x, two elements cannot matter to one another.
+    reach = (1.0 + 1.0 / min(apart, across)) * length.max() if len(start) else 0.0
+    sweep = np.argsort(middle, kind="stable")
+    return _crowding(
+        start, end, length, tip, source, touching, n_edges, apart, across, chained, sweep, 1.000001 * reach
+    )
+
+
+@_jit
+def _crowding(start, end, length, tip, source, touching, n_edges, apart, across, chained, sweep, reach):
     n = len(start)
     out = np.zeros(n)
-    length = np.empty(n)
-    for i in range(n):
-        length[i] = np.hypot(end[i, 0] - start[i, 0], end[i, 1] - start[i, 1])
-    for i in range(n):
+    for m in range(n):
+        i = sweep[m]
         mx, my = 0.5 * (start[i, 0] + end[i, 0]), 0.5 * (start[i, 1] + end[i, 1])
-        for j in range(i):
+        for k in range(m - 1, -1, -1):
+            j = sweep[k]
             qx, qy = 0.5 * (start[j, 0] + end[j, 0]), 0.5 * (start[j, 1] + end[j, 1])
+            if mx - qx > reach:
+                break
             between = np.hypot(mx - qx, my - qy) - 0.5 * (length[i] + length[j])
             if between * min(apart, across) > max(length[i], length[j]):
                 continue

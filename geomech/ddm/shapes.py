@@ -26,8 +26,8 @@ ORDINARY, TIP_START, TIP_END, TIP_BOTH = 0, 1, 2, 3
 #: Highest polynomial order: beyond it monomials on [−1, 1] lose more digits than the order gains.
 MAX_ORDER = 10
 
-#: Terms of the moment tables: the far series of `kernels` at its inner radius, behind the highest order.
-N_MOMENTS = 112
+#: Terms of the moment tables: the far series of `kernels` at its inner radius, behind twice the highest order.
+N_MOMENTS = 136
 
 
 @lru_cache

@@ -110,16 +110,16 @@ class Solution:
         """Opening, slip, traction and state at the ends and collocation nodes of every element. Traction and state are
         those of the nodes; between and beyond them traction is interpolated linearly, state is the nearest node's."""
         body, c = self.body, self.body.faces
-        t = np.concatenate([[-1.0], shapes.nodes(c.family, c.order), [1.0]])
-        slip, opening = np.moveaxis(c.evaluate(self._w, t), 1, 0) / (2 * body.material.shear_modulus)
-        pad = np.r_[0, np.arange(c.per), c.per - 1]
+        points, values = c.samples
+        jumps = self._w.reshape(c.n, 2, c.per) @ values / (2 * body.material.shear_modulus)
+        pad = [0, *range(c.per), c.per - 1]
         traction = self._traction.reshape(c.n, 2, c.per)[:, :, pad]
         return CrackFaces(
             segment=c.source,
-            points=c.at(t),
-            opening=opening,
-            slip=slip,
-            traction=np.stack([traction[:, 1], traction[:, 0]], axis=2),
+            points=points,
+            opening=jumps[:, 1],
+            slip=jumps[:, 0],
+            traction=traction[:, ::-1].transpose(0, 2, 1),
             state=self.states[:, pad],
         )
 

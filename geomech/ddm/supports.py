@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .influence import ElementSet, influence, line_forces
+from .influence import ElementSet, influence, line_influence
 from .placing import onto_boundary
 
 #: A rigid motion that supports let move by less than this part of its size is held.
@@ -190,13 +190,12 @@ class Holds:
         if not len(which) or not len(matrix):
             return matrix
         sources = self.sources.take(at[which])
-        force = line_forces(targets, sources.start, sources.end, sources.order, nu, tol, -1.0)
-        force = sources.nodal_matrix(force.reshape(len(matrix), -1))
-        columns = matrix.reshape(len(matrix), len(elements), 2, sources.per)
-        force = force.reshape(len(matrix), len(which), 2, sources.per) / sources.length[:, None, None]
-        pair = np.stack([columns[:, which], force])
-        pair = np.einsum("hjc,frhcn->frhjn", self.directions[at[which]], pair)
-        columns[:, which] = np.where(self.held[at[which]][None, :, :, None], pair[1], pair[0])
+        # By columns, as they stand in memory.
+        columns = matrix.T.reshape(len(elements), 2, sources.per, len(matrix))
+        force = line_influence(targets, sources, nu, tol, -1.0).T.reshape(len(which), *columns.shape[1:])
+        pair = np.stack([columns[which], force / sources.length[:, None, None, None]])
+        pair = np.einsum("hjc,fhcnr->fhjnr", self.directions[at[which]], pair)
+        columns[which] = np.where(self.held[at[which]][:, :, None, None], pair[1], pair[0])
         return matrix
 
     def known(self, targets: ElementSet, nu: float, tol: float) -> np.ndarray:

@@ -11,6 +11,8 @@ from ..model.polygon import signed_area
 
 #: Lengths below this part of the extent are zero.
 _SMALL = 1e-9
+#: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two thousand.
+_PAIRS_AT_ONCE = 4_000_000
 
 
 def outlined(loops: list[np.ndarray]) -> bool:
@@ -144,36 +146,58 @@ def _near(segment) -> str:
 
 def _side_of(p, segments):
     d = segments[:, 1] - segments[:, 0]
-    rel = p[..., None, :] - segments[:, 0]
-    return d[:, 0] * rel[..., 1] - d[:, 1] * rel[..., 0]
+    rel = p - segments[:, 0]
+    return d[:, 0] * rel[:, 1] - d[:, 1] * rel[:, 0]
+
+
+def _boxes_meet(first: np.ndarray, second: np.ndarray, slack: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (i, j) of segments whose boxes, wider by ``slack``, have a point in common, in the order of i, then j."""
+    low, high = first.min(axis=1) - slack, first.max(axis=1) + slack
+    other_low, other_high = second.min(axis=1), second.max(axis=1)
+    rows, columns = [], []
+    step = max(1, _PAIRS_AT_ONCE // max(len(second), 1))
+    for k in range(0, len(first), step):
+        part = slice(k, k + step)
+        meet = low[part, None, 0] <= other_high[:, 0]
+        meet &= high[part, None, 0] >= other_low[:, 0]
+        meet &= low[part, None, 1] <= other_high[:, 1]
+        meet &= high[part, None, 1] >= other_low[:, 1]
+        i, j = np.nonzero(meet)
+        rows.append(i + k)
+        columns.append(j)
+    if not rows:
+        return np.empty(0, int), np.empty(0, int)
+    return np.concatenate(rows), np.concatenate(columns)
 
 
 def _crossings(first: np.ndarray, second: np.ndarray, upper: bool = False) -> np.ndarray:
     """(k, 2) pairs of segments that cross properly: each has the other's ends on both sides, beyond round-off."""
     scale = np.abs(np.concatenate([first.reshape(-1, 2), second.reshape(-1, 2)])).max()
-    l1 = np.hypot(*(first[:, 1] - first[:, 0]).T)
-    l2 = np.hypot(*(second[:, 1] - second[:, 0]).T)
-    tol1, tol2 = 1e-10 * scale * l2[None, :], 1e-10 * scale * l1[None, :]
-    a, b = _side_of(first[:, 0], second), _side_of(first[:, 1], second)
-    c, d = _side_of(second[:, 0], first), _side_of(second[:, 1], first)
-    across = ((a > tol1) & (b < -tol1)) | ((a < -tol1) & (b > tol1))
-    astride = (((c > tol2) & (d < -tol2)) | ((c < -tol2) & (d > tol2))).T
-    pairs = across & astride
+    i, j = _boxes_meet(first, second)
     if upper:
-        pairs = np.triu(pairs, 1)
-    return np.argwhere(pairs)
+        i, j = i[i < j], j[i < j]
+    one, other = first[i], second[j]
+    tol1 = 1e-10 * scale * np.hypot(*(other[:, 1] - other[:, 0]).T)
+    tol2 = 1e-10 * scale * np.hypot(*(one[:, 1] - one[:, 0]).T)
+    a, b = _side_of(one[:, 0], other), _side_of(one[:, 1], other)
+    c, d = _side_of(other[:, 0], one), _side_of(other[:, 1], one)
+    across = ((a > tol1) & (b < -tol1)) | ((a < -tol1) & (b > tol1))
+    astride = ((c > tol2) & (d < -tol2)) | ((c < -tol2) & (d > tol2))
+    return np.column_stack([i, j])[across & astride]
 
 
 def _overlaps(first: np.ndarray, second: np.ndarray, span: float) -> np.ndarray:
     """(k, 2) pairs of segments that lie on one line and share more than a point."""
-    d = first[:, 1] - first[:, 0]
+    i, j = _boxes_meet(first, second, _SMALL * span)
+    one, other = first[i], second[j]
+    d = one[:, 1] - one[:, 0]
     length = np.hypot(*d.T)
     t = d / length[:, None]
-    rel = second[None] - first[:, None, :1]
-    along = np.einsum("ijkl,il->ijk", rel, t)
-    off = np.abs(rel[..., 1] * t[:, None, None, 0] - rel[..., 0] * t[:, None, None, 1])
-    common = np.minimum(along.max(axis=2), length[:, None]) - np.maximum(along.min(axis=2), 0.0)
-    return np.argwhere((off.max(axis=2) <= _SMALL * span) & (common > 1e-7 * span))
+    rel = other - one[:, :1]
+    along = np.einsum("nkl,nl->nk", rel, t)
+    off = np.abs(rel[..., 1] * t[:, None, 0] - rel[..., 0] * t[:, None, 1])
+    common = np.minimum(along.max(axis=1), length) - np.maximum(along.min(axis=1), 0.0)
+    return np.column_stack([i, j])[(off.max(axis=1) <= _SMALL * span) & (common > 1e-7 * span)]
 
 
 def _to_segments(points: np.ndarray, segments: np.ndarray) -> np.ndarray:

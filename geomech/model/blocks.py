@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..conventions import outward_normal_of
 from .polygon import area_moments, signed_area
 
 #: Edges lie in one line when the tangent of their angle is below this.
@@ -126,9 +127,17 @@ class Blocks:
 
     def edges_named(self, name: str) -> np.ndarray:
         """Indices of the edges called ``name``; empty when there are none."""
-        if name not in self.edge_names:
-            return np.empty(0, int)
-        return np.flatnonzero(self.edge_name == self.edge_names.index(name))
+        return self._edges_by_name.get(name, np.empty(0, int))
+
+    @cached_property
+    def _edges_by_name(self) -> dict[str, np.ndarray]:
+        return {name: np.flatnonzero(self.edge_name == k) for k, name in enumerate(self.edge_names)}
+
+    @cached_property
+    def outward_normals(self) -> np.ndarray:
+        """(n_vertices, 2) unit normals of the edges, out of the rock."""
+        along = self.vertices[self.next_vertex] - self.vertices
+        return outward_normal_of(along / np.hypot(along[:, 0], along[:, 1])[:, None])
 
     def mean_vertices(self, vertices: np.ndarray) -> np.ndarray:
         """(n_blocks, 2) the mean of each block's ``vertices``."""

@@ -30,7 +30,10 @@ class History:
 
     def at(self, time: float) -> np.ndarray:
         """(k,) the value at ``time``."""
-        value = np.array([np.interp(time, self.times, column) for column in self.values.T])
+        if len(self.times) == 1:
+            value = np.array(self.values[0], dtype=float)
+        else:
+            value = np.array([np.interp(time, self.times, column) for column in self.values.T])
         if self.rate is not None and time > self.times[-1]:
             value = value + self.rate * (time - self.times[-1])
         return value

@@ -57,7 +57,12 @@ class DdmSettings:
 
 @dataclass(frozen=True)
 class GrowthSettings:
-    """When and how far tips go. ``increment`` m, longest advance in a cycle; ``min_increment`` m, shortest."""
+    """When and how far tips go. ``increment`` m, longest advance in a cycle; ``min_increment`` m, shortest.
+
+    ``initiation`` says where cracks may be born besides: "" nowhere, "surface" on outlines, holes and crack faces,
+    "everywhere" inside the rock too. ``initiation_distance`` m averages the stress there over a distance into the rock (0:
+    the stress at the point), ``initiation_spacing`` m is the least distance between births (0: five increments).
+    """
 
     criterion: str = "mts"
     increment: float = 1e-3
@@ -65,6 +70,9 @@ class GrowthSettings:
     join_distance: float = 0.5  # in units of the increment: nearer than that to a crack or surface, a tip joins it
     max_passes: int = 200  # growth passes at one load
     correct: bool = True  # predict a step, look how it would go on, and bend it (second order in the increment)
+    initiation: str = ""
+    initiation_distance: float = 0.0
+    initiation_spacing: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,12 @@ from geomech.model.motion import Motion
 def displacement(motion: Motion, block: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(n, 2) m: displacement of reference ``points`` (n, 2), point i moving with ``block[i]``."""
     # F − 1 is formed before it meets coordinates, so a displacement of a millionth of the block keeps its digits.
-    stretch = motion.gradient[block] - np.eye(2)
-    offset = np.einsum("nij,nj->ni", stretch, points - motion.reference_centre[block])
-    return (motion.centre - motion.reference_centre)[block] + offset
+    stretch = motion.gradient - np.eye(2)
+    x, y = (points - motion.reference_centre[block]).T
+    out = (motion.centre - motion.reference_centre)[block]
+    for k in (0, 1):
+        out[:, k] += stretch[:, k, 0][block] * x + stretch[:, k, 1][block] * y
+    return out
 
 
 def carried(motion: Motion, block: np.ndarray, directions: np.ndarray) -> np.ndarray:

@@ -15,9 +15,9 @@ WEIGHTS = {
 
 
 def cauchy(kind, order, zp, zm, y):
-    a, b, d = (np.empty(order + 1, complex) for _ in range(3))
-    kernels._moments(kind, zp, zm, y, order, shapes.moments(), a, b, d)
-    return a, b, d
+    a, b, d = (np.empty((1, order + 1), complex) for _ in range(3))
+    kernels.moments(kind, *(np.array([v]) for v in (zp, zm, y)), order, shapes.moments(), a, b, d)
+    return a[0], b[0], d[0]
 
 
 def exact(kind, k, z, side):

@@ -1,0 +1,100 @@
+"""The direct solver of block systems, held against SuperLU."""
+
+import numpy as np
+import pytest
+from scipy.sparse import bsr_array
+from scipy.sparse.linalg import splu
+from scipy.spatial import Delaunay
+
+from geomech.dda import multifrontal
+from geomech.dda.multifrontal import BlockSolver
+
+
+def springs_between(n, seed, islands=False):
+    """Points, pattern and data of n blocks on springs to their neighbours, unsymmetric by friction-like terms."""
+    rng = np.random.default_rng(seed)
+    points = rng.random((n, 2)) * [3.0, 1.0]
+    if islands:
+        points[: n // 2] += 10.0
+        hulls = [Delaunay(points[: n // 2]).simplices, Delaunay(points[n // 2 :]).simplices + n // 2]
+        triangles = np.concatenate(hulls)
+    else:
+        triangles = Delaunay(points).simplices
+    pairs = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    number = np.arange(n)
+    keys = np.unique(np.concatenate([number * n + number, pairs @ [n, 1], pairs @ [1, n]]))
+    rows, columns = keys // n, keys % n
+    data = np.zeros((len(keys), 6, 6))
+    data[rows == columns] = np.eye(6)
+    for i, j in pairs:
+        push, pull = rng.normal(size=(2, 12))
+        spring = 1e4 * np.outer(push + 0.3 * pull, push)
+        for a, k in enumerate((i, j)):
+            for b, m in enumerate((i, j)):
+                data[np.searchsorted(keys, k * n + m)] += spring[6 * a : 6 * a + 6, 6 * b : 6 * b + 6]
+    return points, rows, columns, data
+
+
+def full(rows, columns, data, n):
+    return bsr_array((data, columns, np.searchsorted(rows, np.arange(n + 1))), shape=(6 * n, 6 * n))
+
+
+@pytest.mark.parametrize(("n", "islands"), [(1, False), (7, False), (200, False), (200, True), (1700, False)])
+def test_solution_is_that_of_superlu(n, islands):
+    if n == 1:
+        points, rows, columns, data = np.zeros((1, 2)), np.zeros(1, int), np.zeros(1, int), 2.0 * np.eye(6)[None]
+    else:
+        points, rows, columns, data = springs_between(n, seed=n, islands=islands)
+    right = np.random.default_rng(1).normal(size=6 * n)
+    x = BlockSolver(points, rows, columns).solve(data.ravel(), right)
+    matrix = full(rows, columns, data, n)
+    expected = splu(matrix.tocsc()).solve(right)
+    # Condition 1e6 or so: both solvers have some ten digits.
+    assert np.abs(x - expected).max() <= 1e-8 * np.abs(expected).max()
+    assert np.abs(matrix @ x - right).max() <= 1e-11 * (abs(matrix) @ np.abs(x)).max()
+
+
+def test_kept_factorisation_serves_while_few_springs_change():
+    points, rows, columns, data = springs_between(300, seed=3)
+    solver, rng = BlockSolver(points, rows, columns), np.random.default_rng(4)
+    right = rng.normal(size=1800)
+    solver.solve(data.ravel(), right)
+    changed = data.copy()
+    for at in rng.choice(np.flatnonzero(rows == columns), 3, replace=False):
+        push = rng.normal(size=6)
+        changed[at] += 1e4 * np.outer(push, push)
+    x = solver.solve(changed.ravel(), right)
+    assert solver.counts["factorisations"] == 1
+    fresh = BlockSolver(points, rows, columns).solve(changed.ravel(), right)
+    assert np.abs(x - fresh).max() <= 1e-8 * np.abs(fresh).max()
+    other = springs_between(300, seed=3)[3] * np.where(rows == columns, 3.0, 1.0)[:, None, None]
+    solver.solve(other.ravel(), right)
+    assert solver.counts["factorisations"] == 2
+
+
+def test_result_does_not_depend_on_threads(monkeypatch):
+    points, rows, columns, data = springs_between(400, seed=5)
+    right = np.ones(2400)
+    alone = BlockSolver(points, rows, columns).solve(data.ravel(), right)
+    monkeypatch.setattr(multifrontal, "THREADED", 0)
+    assert np.array_equal(BlockSolver(points, rows, columns).solve(data.ravel(), right), alone)
+
+
+def test_singular_matrix_is_refused():
+    points, rows, columns, data = springs_between(50, seed=6)
+    data[rows == 7] = 0.0
+    with pytest.raises(np.linalg.LinAlgError):
+        BlockSolver(points, rows, columns).solve(data.ravel(), np.ones(300))
+
+
+def test_every_block_is_eliminated_once_and_reaches_upwards_only():
+    points, rows, columns, _ = springs_between(500, seed=7)
+    tree = multifrontal.plan(points, rows, columns)
+    assert np.array_equal(np.sort(tree.rank), np.arange(500))
+    for f, parent in enumerate(tree.parent):
+        reached = tree.boundary[tree.reach[f] : tree.reach[f + 1]]
+        assert (reached >= tree.pivots[f + 1]).all()
+        assert parent == -1 or parent > f
+        assert len(reached) == 0 or parent >= 0
+    # A plane graph of n blocks falls apart at separators of √n blocks or so; the fill stays within a few n log n.
+    assert tree.x[-1] / 36 < 2.5 * 500 * np.log2(500)
