@@ -17,14 +17,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..model import TIP, Cracks, DdmSettings, Material
+from ..model import TIP, Cracks, DdmSettings, JointLaw, Material
 from ..model.polygon import area_moments
 from . import shapes
 from .applied import Applied, apply, check_equilibrium
 from .automatic import for_target
 from .boundary import BoundarySystem
+from .contact import settle_faces
 from .crack_system import CrackSystem
-from .faces import settle_faces
+from .face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
+from .friction import FaceEquations
 from .influence import ElementSet, influence, reuse
 from .iterative import compressed, is_compressed
 from .loads import BodyLoad
@@ -40,9 +42,11 @@ class Body:
     """An elastic body with cracks.
 
     ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``holes``:
-    more of them, which may run either way, in the infinite plane too. ``cracks``: those of this body. ``previous``: an earlier body of which whatever is unchanged, element by element, is reused:
-    growth costs the rows and columns of the new elements. ``counts`` tells what was done. Raises ValueError naming the
-    item on geometry that is no body, numpy.linalg.LinAlgError when cracks cut a part off.
+    more of them, which may run either way, in the infinite plane too. ``cracks``: those of this body. ``previous``: an
+    earlier body of which whatever is unchanged, element by element, is reused: growth costs the rows and columns of the
+    new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of a crack segment counts in
+    them. ``counts`` tells what was done. Raises ValueError naming the item on geometry that is no body,
+    numpy.linalg.LinAlgError when cracks cut a part off.
     """
 
     def __init__(
@@ -54,10 +58,13 @@ class Body:
         previous: Body | None = None,
         holes: Sequence[np.ndarray] = (),
         supports: Sequence[Support] = (),
+        face_laws: Sequence[JointLaw] = SMOOTH,
     ):
         self.material, self.cracks = material, cracks
         self.settings = settings = for_target(DdmSettings() if settings is None else settings)
-        self.supports = tuple(supports)
+        self.supports, self.face_laws = tuple(supports), tuple(face_laws)
+        check_laws(self.face_laws, cracks)
+        self.rough = not all_smooth(self.face_laws)
         if previous is not None and (
             previous.settings != settings
             or previous.nu != material.effective_poissons_ratio
@@ -91,7 +98,10 @@ class Body:
             self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
-        self.compressed = is_compressed(settings.solver, self.faces.n_unknowns)
+        if self.rough and settings.solver == "compressed":
+            raise ValueError("solver: crack faces with friction, cement or a filling need the dense one")
+        # States of rough faces are found on S itself.
+        self.compressed = not self.rough and is_compressed(settings.solver, self.faces.n_unknowns)
         self._assemble(previous)
 
     @property
@@ -108,6 +118,7 @@ class Body:
             settings,
             holes=self.loops[n_outlines:],
             supports=self.supports,
+            face_laws=self.face_laws,
         )
 
     def _assemble(self, previous: Body | None) -> None:
@@ -154,9 +165,7 @@ class Body:
         def schur(r, k):
             return cc(r, k) - self._cg[c.unknowns(r)] @ self._w[:, c.unknowns(k)]
 
-        self.crack_system = CrackSystem(
-            reuse(old.crack_system.matrix if kept else None, c_old, c_old, c, c, schur)
-        )
+        self.crack_system = CrackSystem(reuse(old.crack_system.matrix if kept else None, c_old, c_old, c, c, schur))
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times what the supports hold of displacement, less that of particular fields."""
@@ -179,8 +188,19 @@ class Body:
 
     # Solution --------------------------------------------------------------------------------------------------------
 
-    def solve(self, load: BodyLoad, warm: Solution | None = None, equilibrium_tolerance: float = 1e-6) -> Solution:
-        """The body under ``load``. ``warm``: a solution of this or an earlier body whose face states are the first guess.
+    def solve(
+        self,
+        load: BodyLoad,
+        warm: Solution | None = None,
+        equilibrium_tolerance: float = 1e-6,
+        history: Solution | FaceMemory | None = None,
+    ) -> Solution:
+        """The body under ``load``.
+
+        ``history``: the solution, of this or an earlier body, from which the load went on to this one, or its ``memory``. Faces with
+        friction begin with its slip and its broken cement, so that the answer is a step of a process; without it they
+        begin as if never loaded. ``warm``: a solution whose face states are no more than the first guess of the
+        contact, by default ``history``; smooth faces have no memory and need nothing else.
 
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
         `faces.NotConverged` when the contact of crack faces does not settle.
@@ -203,10 +223,21 @@ class Body:
         units = self._loads.of(applied)
         g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
-        w, closed, traction, solves = settle_faces(self, reduced, opened, pressure, warm)
+        answer = settle_faces(self, reduced, opened, pressure, warm, history)
         on_edges = [np.tensordot(unit.densities, size, 1) for unit, size in units if unit.densities is not None]
         edge_density = sum(on_edges) if on_edges else None
-        return Solution(self, applied, y, w, closed, traction, g, r, solves, imposed, edge_density)
+        return Solution(self, applied, y, answer, g, r, imposed, edge_density)
+
+    @cached_property
+    def laws(self) -> FaceLaws:
+        """The faces' laws, node by node."""
+        cracks = self.cracks
+        return FaceLaws(self.face_laws, self.faces, cracks.aperture, cracks.law, 2 * self.material.shear_modulus)
+
+    @cached_property
+    def face_equations(self) -> FaceEquations:
+        """The equations of crack faces in any state of contact."""
+        return FaceEquations(self.crack_system, self.laws)
 
     @cached_property
     def tip_elements(self) -> tuple[np.ndarray, ...]:
@@ -263,9 +294,13 @@ class Body:
             raise ValueError("the mean strain of cracks needs a body with an outline")
         if not self.faces.n:
             return np.zeros((3, 3))
-        closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
         right = np.column_stack([-on_elements(self.faces, unit) for unit in np.eye(3)])
-        response = self.strain_weights @ self.crack_system.constrained(right, closed, np.zeros_like(right))[0]
+        if sol is not None and self.rough:
+            jumps = self.face_equations.tangent(right, sol.face_states)
+        else:
+            closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
+            jumps = self.crack_system.constrained(right, closed, np.zeros_like(right))[0]
+        response = self.strain_weights @ jumps
         return 0.5 * (response + response.T)
 
 

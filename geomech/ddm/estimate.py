@@ -36,7 +36,9 @@ def tip_errors(solution: Solution) -> np.ndarray:
     k = factors(solution)
     if not len(k):
         return k
-    other = body.remeshed(automatic.finer(body.settings)).solve(solution.load, equilibrium_tolerance=np.inf)
+    other = body.remeshed(automatic.finer(body.settings)).solve(
+        solution.load, equilibrium_tolerance=np.inf, history=solution.began
+    )
     errors = SAFETY * np.abs(factors(other) - k) + floor(body) * largest(k)
     warn(errors, k)
     return errors

@@ -13,13 +13,8 @@ P-matrix.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from .body import Body
-    from .solution import Solution
 
 #: Block exchanges allowed without progress before the single ones.
 _PATIENCE = 8
@@ -58,40 +53,3 @@ def settle(
             wrong[: int(np.flatnonzero(wrong)[-1])] = False
         closed = closed ^ wrong
     raise NotConverged(f"crack faces did not settle in {limit} solves; {best} nodes at best were in violation")
-
-
-def settle_faces(
-    body: Body, load_traction: np.ndarray, opened: np.ndarray, pressure: np.ndarray, warm: Solution | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Slip and opening (times 2μ), closed unknowns (bool), traction on the faces and the number of solves; ``opened`` is
-    S⁻¹ ``load_traction``, ``pressure`` (n_elements, p+1) that of a fluid at the nodes."""
-    c = body.faces
-    n = c.n_unknowns
-    if n == 0:
-        return np.zeros(0), np.zeros(0, bool), np.zeros(0), 0
-    applied = np.zeros((c.n, 2, c.per))
-    applied[:, 1] = -pressure
-    applied = applied.ravel()
-    right = applied - load_traction
-    opened = body.crack_system.opened(applied) - opened if applied.any() else -opened
-    aperture, can_close, fixed = body.closing
-    stress_scale = max(float(np.abs(right).max()), np.finfo(float).tiny)
-    gap_scale = stress_scale * float(c.length.max())
-    state: dict[str, np.ndarray] = {}
-
-    def respond(closed):
-        w, reaction = body.crack_system.constrained(right, closed, fixed, opened)
-        state["w"], state["traction"] = w, applied - reaction
-        return (w + aperture) / gap_scale, reaction / stress_scale
-
-    closed = np.zeros(n, bool)
-    if not can_close.any():
-        respond(closed)
-        return state["w"], closed, state["traction"], 1
-    if warm is not None:
-        at = c.found_in(warm.body.faces)
-        rows = np.zeros((c.n, 2 * c.per), bool)
-        rows[at >= 0] = warm.closed.reshape(-1, 2 * c.per)[at[at >= 0]]
-        closed = rows.ravel()
-    closed, solves = settle(respond, can_close, closed)
-    return state["w"], closed, state["traction"], solves

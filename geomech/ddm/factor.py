@@ -35,9 +35,11 @@ class Factor:
         if not self.rcond > 1e-15:
             raise np.linalg.LinAlgError(f"{what} (reciprocal condition {self.rcond:.1e})")
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solution for ``right`` (n,) or (n, k)."""
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
         if self.n == 0 or right.size == 0:
             return np.zeros_like(right)
-        scaled = right * (self._scale if right.ndim == 1 else self._scale[:, None])
-        return self._solve(self._lu, self._pivots, scaled, trans=self._transposed, overwrite_b=True)[0]
+        scale = self._scale if right.ndim == 1 else self._scale[:, None]
+        if transposed:
+            return scale * self._solve(self._lu, self._pivots, right, trans=1 - self._transposed)[0]
+        return self._solve(self._lu, self._pivots, right * scale, trans=self._transposed, overwrite_b=True)[0]

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..conventions import normal_of
-from ..model import OPEN, SLIP, CrackFaces
+from ..model import OPEN, SLIP, STICK, CrackFaces
 from . import shapes
 from .applied import Applied
 from .boundary import middle_of
+from .face_laws import FaceStates
 from .influence import add_fields
 from .placing import OFF, onto_boundary
 from .reactions import Reactions, reactions
 
 if TYPE_CHECKING:
     from .body import Body
+    from .contact import FaceAnswer
 
 #: Where a field is asked for at the very end of an element it is taken this part of the element's length away: the
 #: stress of the discrete solution has no value there.
@@ -30,8 +32,9 @@ _AT_END = 1e-6
 class Solution:
     """A body under a load; everything is computed when it is asked for.
 
-    ``states`` (n_elements, p+1) OPEN or SLIP (closed, frictionless) at the collocation nodes of the crack elements;
-    ``solves`` counts the contact's passes.
+    ``jumps`` (n_unknowns,) are slip and opening at the collocation nodes of the crack elements, times 2μ, ``closed``
+    which openings are used up; ``solves`` counts the contact's passes. ``memory`` is what rough faces keep for the next
+    load and ``began`` what they had from the last (None: all faces are smooth).
     """
 
     def __init__(
@@ -39,26 +42,23 @@ class Solution:
         body: Body,
         applied: Applied,
         eliminated: np.ndarray,
-        jumps: np.ndarray,
-        closed: np.ndarray,
-        traction: np.ndarray,
+        answer: FaceAnswer,
         boundary_load: np.ndarray,
         face_load: np.ndarray,
-        solves: int,
         imposed: np.ndarray,
         edge_density: np.ndarray | None,
     ):
-        self.body, self.load, self.solves = body, applied.load, solves
-        self.closed = closed
+        self.body, self.load, self.solves = body, applied.load, answer.solves
+        self.closed, self.memory, self.began = answer.closed, answer.memory, answer.began
         self._applied, self._eliminated = applied, eliminated
-        self._w, self._traction = jumps, traction
+        self.jumps, self._traction = answer.jumps, answer.traction
         self._boundary_load, self._face_load, self._imposed = boundary_load, face_load, imposed
         self._edge_density = edge_density
 
     @cached_property
     def _x(self) -> np.ndarray:
         """(n_unknowns,) the boundary's unknowns: 2μ times its displacement, reactions where it is held."""
-        return -self._eliminated - self.body._w @ self._w
+        return -self._eliminated - self.body._w @ self.jumps
 
     @cached_property
     def _u(self) -> np.ndarray:
@@ -77,8 +77,28 @@ class Solution:
 
     @cached_property
     def states(self) -> np.ndarray:
+        """(n_elements, p+1) OPEN, STICK or SLIP at the collocation nodes of the crack elements; smooth faces that are closed
+        SLIP."""
         c = self.body.faces
-        return np.where(self.closed.reshape(c.n, 2, c.per)[:, 1], SLIP, OPEN)
+        closed = self.closed.reshape(c.n, 2, c.per)[:, 1]
+        if self.memory is None:
+            return np.where(closed, SLIP, OPEN)
+        sticks = self.body.laws.rough & (self.face_states.way == 0)
+        return np.where(closed, np.where(sticks.reshape(closed.shape), STICK, SLIP), OPEN)
+
+    @cached_property
+    def face_states(self) -> FaceStates:
+        """The states of contact, as the equations of the faces have them."""
+        if self.memory is not None:
+            return self.memory.states
+        c = self.body.faces
+        closed = self.closed.reshape(c.n, 2, c.per)[:, 1].ravel()
+        return FaceStates(closed, np.zeros(closed.size, np.int8), np.zeros(closed.size, bool))
+
+    @property
+    def frictional_work(self) -> float:
+        """J/m turned into heat by friction between crack faces, from the first solution of the history to this one."""
+        return 0.0 if self.memory is None else self.memory.work
 
     @cached_property
     def tips(self) -> np.ndarray:
@@ -93,10 +113,17 @@ class Solution:
         if not len(rows):
             return rows
         factor = np.sqrt(2 * np.pi) / (8 * (1 - body.nu))
-        slip, opening = factor * np.einsum("tcn,tn->ct", self._w.reshape(c.n, 2, c.per)[element], lead)
-        shut = touching & ((opening < 0) | (self.states[element, last] != OPEN))
+        slip, opening = factor * np.einsum("tcn,tn->ct", self.jumps.reshape(c.n, 2, c.per)[element], lead)
+        shut = touching & ((opening < 0) | self._shut[element, last])
         rows["k_i"], rows["k_ii"] = np.where(shut, 0.0, opening), slip
         return rows
+
+    @property
+    def _shut(self) -> np.ndarray:
+        """(n_elements, p+1) which nodes are closed without a filling that gives."""
+        body, c = self.body, self.body.faces
+        closed = self.closed.reshape(c.n, 2, c.per)[:, 1]
+        return closed & np.isinf(body.laws.normal).reshape(closed.shape) if body.rough else closed
 
     @cached_property
     def tip_errors(self) -> np.ndarray:
@@ -111,7 +138,7 @@ class Solution:
         those of the nodes; between and beyond them traction is interpolated linearly, state is the nearest node's."""
         body, c = self.body, self.body.faces
         points, values = c.samples
-        jumps = self._w.reshape(c.n, 2, c.per) @ values / (2 * body.material.shear_modulus)
+        jumps = self.jumps.reshape(c.n, 2, c.per) @ values / (2 * body.material.shear_modulus)
         pad = [0, *range(c.per), c.per - 1]
         traction = self._traction.reshape(c.n, 2, c.per)[:, :, pad]
         return CrackFaces(
@@ -128,17 +155,17 @@ class Solution:
         """(3,) mean strain of the cracks, (1/A) Σ ∫ sym(n ⊗ [u]) ds, engineering shear. ValueError without outline."""
         if not self.body.outlined:
             raise ValueError("the mean strain of cracks needs a body with an outline")
-        return self.body.strain_weights @ self._w
+        return self.body.strain_weights @ self.jumps
 
     @cached_property
     def residual(self) -> float:
         """Largest traction left over at the collocation nodes, relative to the largest applied there."""
         body = self.body
         # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
-        follows = body._w @ self._w if self._w.size else np.zeros_like(self._u)
+        follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
         on_boundary = body._outside.times(self._x + follows, lifted=follows) + self._boundary_load
         on_faces = (
-            body.crack_system.matrix @ self._w + body._cg @ (self._x + follows) + self._face_load - self._traction
+            body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self._face_load - self._traction
         )
         scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
@@ -148,7 +175,8 @@ class Solution:
     def condition(self) -> float:
         """Estimated condition number of the matrices solved with, the worse one."""
         body = self.body
-        return 1.0 / min(body.crack_system.rcond(self.closed), body._outside.factor.rcond)
+        cracks = body.crack_system.rcond(self.closed) if not body.rough else body.face_equations.rcond(self.face_states)
+        return 1.0 / min(cracks, body._outside.factor.rcond)
 
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
@@ -181,7 +209,7 @@ class Solution:
             if force:
                 shift[:] += _kelvin_constant(start, end, density, nu)
 
-        for elements, values in ((body.boundary, self._u), (body.faces, self._w)):
+        for elements, values in ((body.boundary, self._u), (body.faces, self.jumps)):
             if elements.n:
                 add(elements.start, elements.end, elements.kind, elements.densities(values), body._tol, False)
         if body.supports:

@@ -1,0 +1,297 @@
+"""Crack faces with friction, cement or a filling: which nodes are open, stick or slip, and the jumps that go with it.
+
+With λ = right − S w the pressure and shear that the faces exert (`crack_system`; the traction on them is −λ), every node
+obeys one linear equation in each direction, chosen by its state:
+
+    open         λ_n = 0,  λ_t = 0
+    closed       w_n = −a                     or, filled,  λ_n = −κ_n (w_n + a)
+    stick        w_t = rest                   or, filled,  λ_t = −κ_s (w_t − rest)
+    slip (±)     λ_t = ∓(c + λ_n tan φ)
+
+and inequalities: gap ≥ 0, λ_n ≥ 0 (cemented: ≥ −strength), |λ_t| ≤ c + λ_n tan φ, slip against the shear that resists it.
+All nodes that break one change state at once, which is Newton's method for the semismooth equations (Alart & Curnier
+1991) and needs a handful of solves however many cracks interact. Should it run in a circle, the shear limits are frozen
+(Tresca's friction, which nodes solve one at a time if need be) and brought up to date in turn (Panagiotopoulos 1975), and
+Newton's method begins again from there. What is returned obeys all inequalities to the tolerance, or NotConverged says
+by how much not.
+
+`rest` is where the last load left the faces: the answer is one step, implicit in time, of a process with memory.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .crack_system import CrackSystem
+from .face_laws import FaceLaws, FaceMemory, FaceStates
+from .faces import NotConverged
+from .factor import Factor
+
+#: Violations allowed, in units of the largest stress (and the opening that it makes).
+TOLERANCE = 1e-10
+#: Newton passes without a new least number of violations before limits are frozen, and passes in all.
+_PATIENCE, _PASSES = 12, 2000
+#: Limits are frozen at most so often; they are up to date within this part of the largest stress.
+_FREEZES, _FROZEN_TOLERANCE = 60, 1e-6
+#: Factors for so many states are kept.
+_KEPT = 8
+
+
+class FaceEquations:
+    """The linear equations of nodes in given states: ``system`` with rows and columns changed as ``laws`` ask."""
+
+    def __init__(self, system: CrackSystem, laws: FaceLaws):
+        self.system, self.laws = system, laws
+        self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
+        self.factorisations = 0
+
+    def solve(
+        self, right: np.ndarray, states: FaceStates, memory: FaceMemory, limit: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Jumps and λ (n,) under ``right`` (n,); ``limit`` (n_nodes,) replaces the shear limit of slipping nodes."""
+        laws, s = self.laws, self.system.matrix
+        held, slides, spring = self._rows(states, limit is not None)
+        a, t = laws.across, laws.along
+        w, extra = np.zeros_like(right), np.zeros_like(right)
+        w[a[states.closed]] = -laws.aperture[states.closed]
+        w[t] = np.where(held[t], memory.rest, 0.0)
+        w[~held] = 0.0
+        bound = laws.held_by_cohesion(memory.broken) if limit is None else limit
+        extra[t] = states.way * bound + slides * right[a]
+        extra[a] += spring[a] * laws.aperture
+        extra[t] -= spring[t] * memory.rest
+        free, factor = self._factor(states, limit is not None)
+        pull = s @ w if w.any() else np.zeros_like(w)
+        known = right + extra - pull
+        known[t] -= slides * pull[a]
+        w[free] = factor.solve(known[free])
+        reaction = np.zeros_like(right)
+        missing = right - s @ w
+        closed = states.closed
+        reaction[a[closed]] = missing[a[closed]]
+        filled = spring[a] > 0
+        reaction[a[filled]] = -(spring[a] * (w[a] + laws.aperture))[filled]
+        stuck = held[t]
+        reaction[t[stuck]] = missing[t[stuck]]
+        springy = spring[t] > 0
+        reaction[t[springy]] = -(spring[t] * (w[t] - memory.rest))[springy]
+        slipping = states.way != 0
+        reaction[t[slipping]] = -(states.way * bound + slides * reaction[a])[slipping]
+        return w, reaction
+
+    def tangent(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
+        """(n, k) change of the jumps per change of ``right`` (n, k) while no node changes state."""
+        w = np.zeros_like(right)
+        free, factor = self._factor(states, False)
+        w[free] = factor.solve(np.asfortranarray(self._mixed(right, states)[free]))
+        return w
+
+    def adjoint(self, weights: np.ndarray, states: FaceStates) -> np.ndarray:
+        """(n, k) what multiplies ``right`` in ``weights``ᵀ w, (n, k), while no node changes state."""
+        laws = self.laws
+        free, factor = self._factor(states, False)
+        out = np.zeros_like(weights)
+        out[free] = factor.solve(weights[free], transposed=True)
+        out[laws.across] += self._rows(states, False)[1][:, None] * out[laws.along]
+        return out
+
+    def rcond(self, states: FaceStates) -> float:
+        return self._factor(states, False)[1].rcond
+
+    def _mixed(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
+        out = right.copy()
+        out[self.laws.along] += self._rows(states, False)[1][:, None] * right[self.laws.across]
+        return out
+
+    def _rows(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Unknowns that are held (n,) bool, ± tan φ of sliding nodes (n_nodes,), stiffness of springs (n,)."""
+        laws = self.laws
+        held, spring = np.zeros(self.system.n, bool), np.zeros(self.system.n)
+        filled = np.isfinite(laws.normal)
+        held[laws.across] = states.closed & ~filled
+        spring[laws.across] = np.where(states.closed & filled, laws.normal, 0.0)
+        sticks, soft = states.closed & laws.rough & (states.way == 0), np.isfinite(laws.shear)
+        held[laws.along] = sticks & ~soft
+        spring[laws.along] = np.where(sticks & soft, laws.shear, 0.0)
+        slides = states.way * np.where(states.pulled | frozen, 0.0, laws.friction)
+        return held, slides, spring
+
+    def _factor(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, Factor]:
+        key = states.key + bytes([frozen])
+        if key not in self._factors:
+            if len(self._factors) >= _KEPT:
+                self._factors.pop(next(iter(self._factors)))
+            laws, s = self.laws, self.system.matrix
+            held, slides, spring = self._rows(states, frozen)
+            free = np.flatnonzero(~held)
+            matrix = s[np.ix_(free, free)]
+            at = np.full(len(held), -1)
+            at[free] = np.arange(len(free))
+            moving = np.flatnonzero(slides)
+            if len(moving):
+                matrix[at[laws.along[moving]]] += slides[moving, None] * s[np.ix_(laws.across[moving], free)]
+            diagonal = np.arange(len(free))
+            matrix[diagonal, diagonal] -= spring[free]
+            self._factors[key] = free, Factor(matrix, "cracks cut a part of the body off")
+            self.factorisations += 1
+        return self._factors[key]
+
+
+class _Contact:
+    """One load: the search for the states."""
+
+    def __init__(self, equations: FaceEquations, right: np.ndarray, memory: FaceMemory):
+        self.equations, self.laws, self.right, self.memory = equations, equations.laws, right, memory
+        self.broken = memory.broken.copy()
+        self.stress = max(float(np.abs(right).max()), np.finfo(float).tiny)
+        self.length = float(self.laws.elements.length.max())
+        self.solves = 0
+
+    @property
+    def _now(self) -> FaceMemory:
+        return FaceMemory(self.memory.elements, self.memory.rest, self.broken, self.memory.work, self.memory.states)
+
+    def first_guess(self) -> FaceStates:
+        """What the faces would do were there no others: exact for a straight crack under uniform stress."""
+        laws = self.laws
+        pressure, shear = self.right[laws.across], -self.right[laws.along]
+        cemented = laws.cemented(self.broken)
+        closed = laws.closes & ((laws.aperture == 0) & (pressure > 0) | cemented)
+        way = np.where(closed & laws.rough & (np.abs(shear) > laws.limit(pressure, self.broken)), np.sign(shear), 0)
+        return FaceStates(closed, way.astype(np.int8), cemented & (pressure < 0))
+
+    def admissible(self, states: FaceStates) -> FaceStates:
+        """``states`` without what the laws do not know."""
+        closed = states.closed & self.laws.closes | self.laws.cemented(self.broken)
+        way = np.where(closed & self.laws.rough, states.way, 0).astype(np.int8)
+        return FaceStates(closed, way, states.pulled & self.laws.cemented(self.broken))
+
+    def _respond(self, states: FaceStates, limit: np.ndarray | None):
+        self.solves += 1
+        if self.solves > _PASSES:
+            raise NotConverged(f"crack faces did not settle in {_PASSES} solves{self.report}")
+        return self.equations.solve(self.right, states, self._now, limit)
+
+    report = ""
+
+    def _next(self, states: FaceStates, w: np.ndarray, reaction: np.ndarray, limit: np.ndarray | None) -> tuple:
+        """The states that ``w`` and ``reaction`` ask for, the nodes that change, and the worst violation."""
+        laws, tol = self.laws, TOLERANCE
+        gap = (w[laws.across] + laws.aperture) / (self.stress * self.length)
+        pressure, shear = reaction[laws.across] / self.stress, -reaction[laws.along] / self.stress
+        cemented = laws.cemented(self.broken)
+        lifts = states.closed & ~cemented & (pressure < -tol)
+        meets = ~states.closed & laws.closes & (gap < -tol)
+        closed = states.closed & ~lifts | meets
+        pulled = closed & cemented & np.where(states.pulled, pressure < tol, pressure < -tol)
+        bound = laws.limit(pressure * self.stress, self.broken) if limit is None else limit
+        bound = bound / self.stress
+        over = np.abs(shear) - bound
+        slip = (w[laws.along] - self._offset(states, reaction) - self.memory.rest) / (self.stress * self.length)
+        way = states.way.copy()
+        stuck = states.closed & laws.rough & (way == 0)
+        starts = stuck & (over > tol)
+        way[starts] = np.sign(shear[starts])
+        back = (states.way != 0) & (states.way * slip < -tol)
+        way[back] = 0
+        # Faces that meet were free to slip and are taken to go on.
+        way[meets & laws.rough] = np.sign(slip[meets & laws.rough])
+        way[~closed] = 0
+        if limit is None:
+            # A limit cannot be negative: cement lets go of friction in tension, other faces part.
+            changed = (closed != states.closed) | (way != states.way) | (pulled != states.pulled)
+        else:
+            pulled = states.pulled
+            changed = (closed != states.closed) | (way != states.way)
+        worst = max(
+            np.max(-pressure, where=lifts, initial=0.0),
+            np.max(-gap, where=meets, initial=0.0),
+            np.max(over, where=starts, initial=0.0),
+            np.max(np.abs(slip), where=back, initial=0.0),
+        )
+        return FaceStates(closed, way, pulled), changed, worst
+
+    def _offset(self, states: FaceStates, reaction: np.ndarray) -> np.ndarray:
+        """Slip that shear springs carry where they slip."""
+        soft = np.isfinite(self.laws.shear) & (states.way != 0)
+        stiffness = np.where(soft, self.laws.shear, 1.0)
+        return np.where(soft, -reaction[self.laws.along] / stiffness, 0.0)
+
+    def newton(self, states: FaceStates, limit: np.ndarray | None = None, single: bool = False):
+        """(states, w, λ) when all inequalities hold; None when it turns in a circle. ``single``: from then on one node
+        at a time, which ends for frozen limits (Murty 1974)."""
+        best, patience, one = len(states.closed) + 1, _PATIENCE, False
+        while True:
+            w, reaction = self._respond(states, limit)
+            new, changed, worst = self._next(states, w, reaction, limit)
+            n = int(changed.sum())
+            self.report = f"; {n} nodes are in violation, by {worst:.1e} of the largest stress"
+            if n == 0:
+                return states, w, reaction
+            if n < best:
+                best, patience = n, _PATIENCE
+            else:
+                patience -= 1
+            if patience <= 0:
+                if not single:
+                    return None
+                one = True
+            if one:
+                keep = np.zeros(len(changed), bool)
+                keep[np.flatnonzero(changed)[-1]] = True
+                new = FaceStates(
+                    np.where(keep, new.closed, states.closed),
+                    np.where(keep, new.way, states.way),
+                    np.where(keep, new.pulled, states.pulled),
+                )
+            states = new
+
+    def settle(self, states: FaceStates):
+        """(states, w, λ) with cement intact as it now is."""
+        found = self.newton(states)
+        if found is not None:
+            return found
+        limit = np.zeros(len(states.closed))
+        for freeze in range(1, _FREEZES + 1):
+            states, _, reaction = self.newton(states, limit, single=True)
+            now = self.laws.limit(reaction[self.laws.across], self.broken)
+            # Near enough, Newton's method finishes what would take many more rounds.
+            if freeze % 4 == 0 or np.abs(now - limit).max() < _FROZEN_TOLERANCE * self.stress:
+                found = self.newton(states)
+                if found is not None:
+                    return found
+            limit = now
+        raise NotConverged(f"crack faces did not settle under friction{self.report}")
+
+
+def settle_rough(
+    equations: FaceEquations, right: np.ndarray, memory: FaceMemory, guess: FaceStates | None = None
+) -> tuple[np.ndarray, np.ndarray, FaceMemory, int]:
+    """Slip and opening (times 2μ), λ = right − S w, what the faces remember afterwards and the number of solves.
+
+    ``right`` (n,) traction that fluid in the cracks exerts less that of the loads on closed faces; ``memory`` of the load
+    before; ``guess`` the states to begin with, rather than those of one crack by itself. Raises NotConverged.
+    """
+    laws = equations.laws
+    contact = _Contact(equations, right, memory)
+    states = contact.first_guess() if guess is None else contact.admissible(guess)
+    while True:
+        states, w, reaction = contact.settle(states)
+        cemented = laws.cemented(contact.broken)
+        if not cemented.any():
+            break
+        drive = -reaction[laws.across] / np.where(cemented, laws.strength, np.inf)
+        if not drive.max() > 1 + TOLERANCE:
+            break
+        # The most strained nodes let go first; the others feel it before they are judged.
+        contact.broken |= cemented & (drive > max(1.0, 0.9 * drive.max()))
+        states = contact.admissible(FaceStates(states.closed & ~contact.broken, states.way, states.pulled))
+    slip = w[laws.along]
+    holds = states.closed & laws.rough
+    rest = np.where(holds, slip - contact._offset(states, reaction), slip)
+    sticks = holds & (states.way == 0)
+    rest[sticks] = memory.rest[sticks]
+    # Shear at the end of the step: what the implicit step dissipates, and exact while the limit stays what it is.
+    lost = np.where(states.way != 0, -reaction[laws.along] * (rest - memory.rest), 0.0)
+    work = memory.work + float(laws.elements.quadrature.ravel() @ lost) / laws.twice_mu
+    return w, reaction, FaceMemory(laws.elements, rest, contact.broken, work, states), contact.solves
