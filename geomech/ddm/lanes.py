@@ -1,18 +1,26 @@
-"""Eight numbers at a time: a numba type whose every operation is one vector instruction, and what is built of it.
+"""Eight numbers at a time: numba types whose every operation is a vector instruction or a few.
 
-Compilers find such instructions by themselves only in loops that they can see through. `Lanes` asks for them: + − × ÷
-of lanes with lanes or with a number, and the functions below. What comes out of a lane depends on what went into it and
-on nothing else, neither on its place nor on its neighbours. Products may be fused with sums where the processor can.
+Compilers find such instructions by themselves only in loops that they can see through. These types ask for them: + − × ÷
+of real or complex lanes with lanes or with a number, and the functions below. What comes out of a lane depends on what
+went into it and on nothing else, neither on its place nor on its neighbours. Products may be fused with sums where the
+processor can.
 
-    load(array, at)             lanes at …, at + 7 of a flat array
-    store(array, at, x)
+    load(array, at)             real lanes at …, at + 7 of a flat array
+    load_complex(array, at)     real parts first, imaginary parts behind them
+    store(array, at, x)         either
     gather(array, at, places, first)        lane k from place at + places[first + k] of a flat array
     scatter(array, at, places, first, x)    lane k into that place
+    pile(array, at, places, first, x)       lane k added to what is in that place
     splat(number)               the same in every lane
-    less(a, b, x, y)            x where a < b, else y
-    root(x), size(x)            √x, |x|
+    both(x, y), re(z), im(z)    x + iy and its parts
+    times_i(z)                  iz
+    norm(z)                     |z|²
+    less(a, b, x, y)            x where a < b, else y; real
+    root(x), size(x)            √x, |x|; real
     signed(x, s)                |x| with the sign of s (that of a zero too)
-    log(x), angle(y, x)         within 2 ulp for x > 0 normal; atan2 with signed zeros
+    log(x), log1p(x)            of x > 0 normal, of x ≥ 0, within 2 ulp
+    angle(y, x)                 atan2 within 2 ulp, with signed zeros, not of two zeros
+    term(b, u, v, c), value(b, q)           a polynomial with real coefficients c at a complex point q
 
 numba's cache asks for the date of the file a kernel stands in: after a change here, touch those of its users.
 """
@@ -35,18 +43,21 @@ _I8 = ir.VectorType(ir.IntType(64), WIDTH)
 _FUSE = ("contract",)
 
 
+#: Real and imaginary parts.
+_C8 = ir.ArrayType(_F8, 2)
+
+
 class LanesType(types.Type):
-    def __init__(self):
-        super().__init__("Lanes")
+    pass
 
 
-lanes = LanesType()
+lanes, complex_lanes = LanesType("Lanes"), LanesType("ComplexLanes")
 
 
 @register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager, kind):
-        super().__init__(manager, kind, _F8)
+        super().__init__(manager, kind, _F8 if kind is lanes else _C8)
 
 
 def _wide(builder, kind, value):
@@ -60,44 +71,174 @@ def _wide(builder, kind, value):
     return builder.shuffle_vector(one, ir.Constant(_F8, ir.Undefined), every)
 
 
-def _register(function, instruction):
+def _split(builder, kind, value):
+    """Real and imaginary part, None where there is none."""
+    if kind is complex_lanes:
+        return builder.extract_value(value, 0), builder.extract_value(value, 1)
+    return _wide(builder, kind, value), None
+
+
+def _joined(builder, x, y):
+    if y is None:
+        return x
+    out = builder.insert_value(ir.Constant(_C8, ir.Undefined), x, 0)
+    return builder.insert_value(out, y, 1)
+
+
+class _Arithmetic:
+    """(real, imaginary) with (real, imaginary)."""
+
+    def __init__(self, builder):
+        self._builder = builder
+
+    def plus(self, x, y):
+        return self._builder.fadd(x, y, flags=_FUSE)
+
+    def minus(self, x, y):
+        return self._builder.fsub(x, y, flags=_FUSE)
+
+    def times(self, x, y):
+        return self._builder.fmul(x, y, flags=_FUSE)
+
+    def add(self, a, b):
+        (ar, ai), (br, bi) = a, b
+        return self.plus(ar, br), (ai or bi) if None in (ai, bi) else self.plus(ai, bi)
+
+    def sub(self, a, b):
+        (ar, ai), (br, bi) = a, b
+        if bi is None:
+            return self.minus(ar, br), ai
+        return self.minus(ar, br), self._builder.fneg(bi) if ai is None else self.minus(ai, bi)
+
+    def mul(self, a, b):
+        (ar, ai), (br, bi) = a, b
+        if ai is None:
+            return self.times(ar, br), bi if bi is None else self.times(ar, bi)
+        if bi is None:
+            return self.times(ar, br), self.times(ai, br)
+        return (
+            self.minus(self.times(ar, br), self.times(ai, bi)),
+            self.plus(self.times(ar, bi), self.times(ai, br)),
+        )
+
+    def norm(self, a):
+        return self.plus(self.times(a[0], a[0]), self.times(a[1], a[1]))
+
+    def truediv(self, a, b):
+        (ar, ai), (br, bi) = a, b
+        if bi is None:
+            by = self._builder.fdiv
+            return by(ar, br), ai if ai is None else by(ai, br)
+        one = ir.Constant(_F8, [1.0] * WIDTH)
+        scale = self._builder.fdiv(one, self.norm(b))
+        return self.mul(a, (self.times(br, scale), self._builder.fneg(self.times(bi, scale))))
+
+
+_NUMBERS = (types.Float, types.Integer)
+
+
+def _register(function):
+    name = function.__name__
+
     @type_callable(function)
     def typer(context):
         def typed(a, b):
-            if lanes in (a, b) and all(k is lanes or isinstance(k, (types.Float, types.Integer)) for k in (a, b)):
-                return lanes
+            if all(isinstance(k, (LanesType, *_NUMBERS)) for k in (a, b)) and any(
+                isinstance(k, LanesType) for k in (a, b)
+            ):
+                return complex_lanes if complex_lanes in (a, b) else lanes
             return None
 
         return typed
 
     def lower(context, builder, sig, args):
-        a, b = (_wide(builder, kind, value) for kind, value in zip(sig.args, args))
-        return getattr(builder, instruction)(a, b, flags=_FUSE)
+        a, b = (_split(builder, kind, value) for kind, value in zip(sig.args, args))
+        return _joined(builder, *getattr(_Arithmetic(builder), name)(a, b))
 
-    for pair in (
-        (lanes, lanes),
-        (lanes, types.Float),
-        (types.Float, lanes),
-        (lanes, types.Integer),
-        (types.Integer, lanes),
-    ):
+    both_kinds = (lanes, complex_lanes)
+    pairs = [(a, b) for a in both_kinds for b in (*both_kinds, *_NUMBERS)]
+    for pair in pairs + [(b, a) for a, b in pairs if b in _NUMBERS]:
         lower_builtin(function, *pair)(lower)
 
 
-_register(operator.add, "fadd")
-_register(operator.sub, "fsub")
-_register(operator.mul, "fmul")
-_register(operator.truediv, "fdiv")
+for _operator in (operator.add, operator.sub, operator.mul, operator.truediv):
+    _register(_operator)
 
 
 @type_callable(operator.neg)
 def _negated(context):
-    return lambda a: lanes if a is lanes else None
+    return lambda a: a if isinstance(a, LanesType) else None
 
 
 @lower_builtin(operator.neg, lanes)
+@lower_builtin(operator.neg, complex_lanes)
 def _negate(context, builder, sig, args):
-    return builder.fneg(args[0])
+    x, y = _split(builder, sig.args[0], args[0])
+    return _joined(builder, builder.fneg(x), y if y is None else builder.fneg(y))
+
+
+@intrinsic
+def both(typing, x, y):
+    return complex_lanes(lanes, lanes), lambda context, builder, sig, args: _joined(builder, *args)
+
+
+def _part(number: int):
+    return lambda context, builder, sig, args: builder.extract_value(args[0], number)
+
+
+@intrinsic
+def re(typing, z):
+    return lanes(complex_lanes), _part(0)
+
+
+@intrinsic
+def im(typing, z):
+    return lanes(complex_lanes), _part(1)
+
+
+@intrinsic
+def times_i(typing, z):
+    def code(context, builder, sig, args):
+        x, y = _split(builder, complex_lanes, args[0])
+        return _joined(builder, builder.fneg(y), x)
+
+    return complex_lanes(complex_lanes), code
+
+
+@intrinsic
+def norm(typing, z):
+    def code(context, builder, sig, args):
+        return _Arithmetic(builder).norm(_split(builder, complex_lanes, args[0]))
+
+    return lanes(complex_lanes), code
+
+
+@intrinsic
+def term(typing, b, u, v, c):
+    """From (b_{j+1}, b_{j+2}) the next (b_j, b_{j+1}), b_j = c_j + u b_{j+1} − v b_{j+2}, u = 2 Re q, v = |q|² (Knuth 1981,
+    §4.6.4): half the work of a complex Horner scheme, and as stable for |q| < 1."""
+
+    def code(context, builder, sig, args):
+        one, two = _split(builder, complex_lanes, args[0])
+        _, u, v, c = (_wide(builder, kind, value) for kind, value in zip((lanes, *sig.args[1:]), args))
+        do = _Arithmetic(builder)
+        new = do.minus(do.plus(do.times(u, one), c), do.times(v, two))
+        return _joined(builder, new, one)
+
+    return complex_lanes(complex_lanes, lanes, lanes, types.float64), code
+
+
+@intrinsic
+def value(typing, b, q):
+    """Σ c_j q^j from (b_0, b_1)."""
+
+    def code(context, builder, sig, args):
+        one, two = _split(builder, complex_lanes, args[0])
+        x, y = _split(builder, complex_lanes, args[1])
+        do = _Arithmetic(builder)
+        return _joined(builder, do.minus(one, do.times(x, two)), do.times(y, two))
+
+    return complex_lanes(complex_lanes, complex_lanes), code
 
 
 def _address(context, builder, kind, array, at):
@@ -105,23 +246,41 @@ def _address(context, builder, kind, array, at):
     return builder.bitcast(builder.gep(data, [at]), _F8.as_pointer())
 
 
+def _at(builder, at, parts: int):
+    """Where the ``parts`` of lanes begin."""
+    return [builder.add(at, ir.Constant(at.type, WIDTH * k)) for k in range(parts)]
+
+
+def _loading(kind, parts: int):
+    def code(context, builder, sig, args):
+        found = []
+        for at in _at(builder, args[1], parts):
+            found.append(builder.load(_address(context, builder, sig.args[0], args[0], at)))
+            found[-1].align = 8
+        return _joined(builder, *found, *[None] * (2 - parts))
+
+    return lambda typing, array, at: (kind(array, types.intp), code)
+
+
 @intrinsic
 def load(typing, array, at):
-    def code(context, builder, sig, args):
-        found = builder.load(_address(context, builder, sig.args[0], *args))
-        found.align = 8
-        return found
+    return _loading(lanes, 1)(typing, array, at)
 
-    return lanes(array, types.intp), code
+
+@intrinsic
+def load_complex(typing, array, at):
+    return _loading(complex_lanes, 2)(typing, array, at)
 
 
 @intrinsic
 def store(typing, array, at, x):
     def code(context, builder, sig, args):
-        builder.store(args[2], _address(context, builder, sig.args[0], *args[:2]), align=8)
+        found = [part for part in _split(builder, sig.args[2], args[2]) if part is not None]
+        for place, part in zip(_at(builder, args[1], len(found)), found):
+            builder.store(part, _address(context, builder, sig.args[0], args[0], place), align=8)
         return context.get_dummy_value()
 
-    return types.none(array, types.intp, lanes), code
+    return types.none(array, types.intp, x), code
 
 
 def _addresses(context, builder, sig, array, at, places, first):
@@ -149,6 +308,18 @@ def scatter(typing, array, at, places, first, x):
     def code(context, builder, sig, args):
         for k, address in _addresses(context, builder, sig, *args[:4]):
             builder.store(builder.extract_element(args[4], k), address)
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, places, types.intp, lanes), code
+
+
+@intrinsic
+def pile(typing, array, at, places, first, x):
+    def code(context, builder, sig, args):
+        # Read first: lanes that stand for one place must all write the same.
+        found = [(k, address, builder.load(address)) for k, address in _addresses(context, builder, sig, *args[:4])]
+        for k, address, old in found:
+            builder.store(builder.fadd(old, builder.extract_element(args[4], k)), address)
         return context.get_dummy_value()
 
     return types.none(array, types.intp, places, types.intp, lanes), code
@@ -215,7 +386,7 @@ _LN2_HIGH = 0.693147180369123816490
 _LN2_LOW = 1.90821492927058770002e-10
 
 
-@njit(inline="never", error_model="numpy")
+@njit(error_model="numpy")
 def log(x):
     m, n = _parts(x)
     f = (m - 1.0) / (m + 1.0)
@@ -230,10 +401,16 @@ def log(x):
     return n * _LN2_HIGH + ((2.0 * f) * (s * u) + n * _LN2_LOW + 2.0 * f)
 
 
+@njit(error_model="numpy")
+def log1p(x):
+    whole = 1.0 + x
+    return log(whole) + (x - (whole - 1.0)) / whole
+
+
 _EIGHTH = math.tan(math.pi / 8)
 
 
-@njit(inline="never", error_model="numpy")
+@njit(error_model="numpy")
 def angle(y, x):
     ay, ax = size(y), size(x)
     low, high = less(ay, ax, ay, ax), less(ay, ax, ax, ay)
