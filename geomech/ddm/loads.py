@@ -147,8 +147,9 @@ class BodyLoad:
             raise ValueError(f"{n_holes} holes but {len(given)} pressures")
         return [p if isinstance(p, Pressure) else Pressure(float(p)) for p in given]
 
-    def face_pressure(self, points: np.ndarray, segment: np.ndarray, n_segments: int) -> np.ndarray:
-        """(n, m) Pa at ``points`` (n, m, 2) on crack elements of ``segment`` (n,). Raises ValueError."""
+    def face_pressure(self, points: np.ndarray, segment: np.ndarray, n_segments: int) -> np.ndarray | float:
+        """(n, m) Pa at ``points`` (n, m, 2) on crack elements of ``segment`` (n,), or what broadcasts to it. Raises
+        ValueError."""
         p = self.crack_pressure
         if isinstance(p, Pressure):
             return p.at(points)
@@ -157,10 +158,11 @@ class BodyLoad:
             if out.size != points[..., 0].size or not np.isfinite(out).all():
                 raise ValueError("crack_pressure: the function must give a finite number for every point")
             return out.reshape(points.shape[:-1])
-        if np.ndim(p) and np.shape(p) != (n_segments,):
+        if np.ndim(p) == 0:
+            return float(p)
+        if np.shape(p) != (n_segments,):
             raise ValueError(f"crack_pressure: {n_segments} crack segments but shape {np.shape(p)}")
-        out = np.broadcast_to(np.asarray(p, dtype=float), (n_segments,))[segment]
-        return np.broadcast_to(out[:, None], points.shape[:-1])
+        return np.asarray(p, dtype=float)[segment][:, None]
 
     def __post_init__(self) -> None:
         shapes = {
