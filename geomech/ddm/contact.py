@@ -34,7 +34,7 @@ def settle_faces(
     body: Body,
     load_traction: np.ndarray,
     opened: np.ndarray,
-    pressure: np.ndarray,
+    pressure: np.ndarray | float,
     warm: Solution | None,
     history: Solution | FaceMemory | None = None,
 ) -> FaceAnswer:
