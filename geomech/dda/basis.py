@@ -106,3 +106,22 @@ def advance(
         new_crack[b, 1] = s * s * a + c * c * d + 2 * s * c * e
         new_crack[b, 2] = 2.0 * (s * c * (a - d) + (c * c - s * s) * e)
     return new_vertices, velocity, new_stress, new_crack, np.sqrt(largest)
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def energies(velocity, stress, compliance, density, moments, fixed):
+    """(kinetic, elastic) energy of all blocks, J/m: ½ ∫ρ|u̇|² of the linear velocity field, ½ A σ·C⁻¹σ."""
+    kinetic = elastic = 0.0
+    for b in range(velocity.shape[0]):
+        area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
+        for k in range(3):
+            for m in range(3):
+                elastic += 0.5 * area * stress[b, k] * compliance[b, k, m] * stress[b, m]
+        if fixed[b]:
+            continue
+        u, v, ex, ey = velocity[b, 0], velocity[b, 1], velocity[b, 3], velocity[b, 4]
+        # u̇ = (u + ex x + p y, v + q x + ey y)
+        p, q = 0.5 * velocity[b, 5] - velocity[b, 2], 0.5 * velocity[b, 5] + velocity[b, 2]
+        square = area * (u * u + v * v) + (ex * ex + q * q) * xx + (p * p + ey * ey) * yy + 2 * (ex * p + q * ey) * xy
+        kinetic += 0.5 * density[b] * square
+    return kinetic, elastic

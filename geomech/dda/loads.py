@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,6 +27,30 @@ EDGE_FORCE = np.dtype(
 
 
 @dataclass(frozen=True, eq=False)
+class Inertia:
+    """What makes weight and inertia a body force: ``density`` (n_blocks,), ``gravity`` (2,), ``acceleration`` (n_blocks, 6)
+    of the unknowns, ``spin`` (n_blocks,) the angular velocity ω of the centrifugal ρω²x, ``fixed`` (n_blocks,)."""
+
+    density: np.ndarray
+    gravity: np.ndarray
+    acceleration: np.ndarray
+    spin: np.ndarray
+    fixed: np.ndarray
+
+    def body_forces(self) -> tuple[np.ndarray, np.ndarray]:
+        """Weight minus inertia as a linear field: (n_blocks, 2) at the centroid and its gradient (n_blocks, 2, 2), N/m³,
+        N/m⁴."""
+        rho, a = self.density, np.where(self.fixed[:, None], 0.0, self.acceleration)
+        gradient = np.empty((len(rho), 2, 2))
+        centrifugal = np.where(self.fixed, 0.0, self.spin) ** 2
+        gradient[:, 0, 0] = rho * (centrifugal - a[:, 3])
+        gradient[:, 1, 1] = rho * (centrifugal - a[:, 4])
+        gradient[:, 0, 1] = rho * (a[:, 2] - 0.5 * a[:, 5])
+        gradient[:, 1, 0] = -rho * (a[:, 2] + 0.5 * a[:, 5])
+        return rho[:, None] * (self.gravity - a[:, :2]), gradient
+
+
+@dataclass(frozen=True, eq=False)
 class AppliedForces:
     """All that acts on the blocks of one step besides contacts, on the geometry on which equilibrium was assembled.
 
@@ -42,8 +67,19 @@ class AppliedForces:
     edges: np.ndarray
     centroid: np.ndarray
     area: np.ndarray
-    body_force: np.ndarray
-    body_force_gradient: np.ndarray
+    inertia: Inertia
+
+    @cached_property
+    def _body_forces(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.inertia.body_forces()
+
+    @property
+    def body_force(self) -> np.ndarray:
+        return self._body_forces[0]
+
+    @property
+    def body_force_gradient(self) -> np.ndarray:
+        return self._body_forces[1]
 
 
 class LoadMap:
@@ -51,18 +87,21 @@ class LoadMap:
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self._edges: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._edges: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._points: dict[tuple[int, tuple[float, float]], np.ndarray] = {}
 
-    def edges(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Edges called ``name`` and their reference lengths. Raises ValueError when there are none."""
+    def edges(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Edges called ``name``, their reference lengths, and EDGE_FORCE rows for them that know no more than block and
+        edge. Raises ValueError when there are none."""
         if name not in self._edges:
             edges = self.blocks.edges_named(name)
             if len(edges) == 0:
                 known = ", ".join(repr(n) for n in self.blocks.edge_names if n) or "none"
                 raise ValueError(f"a traction acts on edges named {name!r}, but no edge has that name (names: {known})")
             along = self.blocks.vertices[self.blocks.next_vertex[edges]] - self.blocks.vertices[edges]
-            self._edges[name] = edges, np.hypot(along[:, 0], along[:, 1])
+            rows = np.zeros(len(edges), EDGE_FORCE)
+            rows["block"], rows["edge"] = self.blocks.vertex_block[edges], edges
+            self._edges[name] = edges, np.hypot(along[:, 0], along[:, 1]), rows
         return self._edges[name]
 
     def point(self, block: int, at: tuple[float, float], vertices: np.ndarray) -> np.ndarray:
@@ -81,9 +120,8 @@ class LoadMap:
             row["point"] = self.point(load.block, load.at, vertices)
         pieces = []
         for load in loads.edge_tractions:
-            edges, length = self.edges(load.edge_name)
-            piece = np.zeros(len(edges), EDGE_FORCE)
-            piece["block"], piece["edge"] = self.blocks.vertex_block[edges], edges
+            edges, length, rows = self.edges(load.edge_name)
+            piece = rows.copy()
             piece["start"], piece["end"] = vertices[edges], vertices[self.blocks.next_vertex[edges]]
             piece["force"] = length[:, None] * load.history.at(time)
             along = piece["end"] - piece["start"]
@@ -104,21 +142,3 @@ def generalised(points: np.ndarray, edges: np.ndarray, centroid: np.ndarray) -> 
             fx, fy = force.T
             np.add.at(out, block, np.stack([fx, fy, x * fy - y * fx, x * fx, y * fy, 0.5 * (y * fx + x * fy)], axis=1))
     return out
-
-
-def body_forces(
-    density: np.ndarray, gravity: np.ndarray, acceleration: np.ndarray, spin: np.ndarray, fixed: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Weight minus inertia as a linear field: (n_blocks, 2) at the centroid and its gradient (n_blocks, 2, 2), N/m³, N/m⁴.
-
-    ``acceleration`` (n_blocks, 6) of the unknowns, ``spin`` (n_blocks,) the angular velocity ω of the centrifugal ρω²x.
-    """
-    a = np.where(fixed[:, None], 0.0, acceleration)
-    rho = density
-    gradient = np.empty((len(rho), 2, 2))
-    centrifugal = np.where(fixed, 0.0, spin) ** 2
-    gradient[:, 0, 0] = rho * (centrifugal - a[:, 3])
-    gradient[:, 1, 1] = rho * (centrifugal - a[:, 4])
-    gradient[:, 0, 1] = rho * (a[:, 2] - 0.5 * a[:, 5])
-    gradient[:, 1, 0] = -rho * (a[:, 2] + 0.5 * a[:, 5])
-    return rho[:, None] * (gravity - a[:, :2]), gradient

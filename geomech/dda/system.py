@@ -9,10 +9,10 @@ import numpy as np
 
 from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
-from .basis import advance
+from .basis import advance, energies
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import PENALTY_RATIO, JointTable, contact_springs, with_dashpots
-from .loads import AppliedForces, LoadMap, body_forces, generalised
+from .loads import AppliedForces, Inertia, LoadMap, generalised
 from .moments import block_moments
 from .open_close import Settled, Unsettled, settle
 from .step import CrackResponse, NotConverged, StepResult
@@ -71,6 +71,7 @@ class BlockSystem:
         self._modulus = np.array([m.plane_modulus for m in self.materials])[of]
         self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
+        self._moving = np.flatnonzero(~self._fixed)
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
         self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
@@ -146,7 +147,7 @@ class BlockSystem:
             dt = shorter
 
     def _refuse_crushed(self, state: State) -> None:
-        area = self.blocks.areas(state.vertices)
+        area = block_moments(state.vertices, self._next, self._start)[:, 0]
         if not (area > 0).all():
             crushed = int(np.argmin(area > 0))
             name = self.blocks.names[crushed] if self.blocks.names else f"block {crushed}"
@@ -201,12 +202,13 @@ class BlockSystem:
             rows = old[parent[known]]
             contact_state[known], shear[known], slip[known] = rows["state"], rows["shear_force"], rows["slip"]
             bonded[known] = rows["bonded"]
-        # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
-        fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
-        if len(old) == 0 and state.time == 0.0:
-            bonded[fresh & (geometry[:, 4] > 0)] = 1
+        if not known.all():
+            # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
+            fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
+            if len(old) == 0 and state.time == 0.0:
+                bonded[fresh & (geometry[:, 4] > 0)] = 1
+            contact_state[fresh & (partner < 0).all(axis=1)] = STICK
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
-        contact_state[fresh & (partner < 0).all(axis=1)] = STICK
         direction = np.where(contact_state == SLIP, np.sign(shear), 0.0)
         rough = (springs.friction > 0) | (bonded > 0)
         contact_state[(contact_state == SLIP) & rough & (direction == 0)] = STICK
@@ -256,12 +258,11 @@ class BlockSystem:
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
         geometry = found["geometry"]
         damping = 0.0 if static else self.settings.damping
-        mass = np.where(self._fixed, np.inf, self._mass)
-        springs, gap = with_dashpots(
-            found["springs"], np.ascontiguousarray(geometry[:, 3]), np.minimum(mass[found["block"]], mass[found["other"]]),
-            damping, dt,
-        )  # fmt: skip
-        n_free = int((~self._fixed).sum())
+        springs, gap = found["springs"], np.ascontiguousarray(geometry[:, 3])
+        if damping:
+            mass = np.where(self._fixed, np.inf, self._mass)
+            springs, gap = with_dashpots(springs, gap, np.minimum(mass[found["block"]], mass[found["other"]]), damping, dt)
+        n_free = len(self._moving)
         pattern = self._pattern(found["block"], found["other"], moments) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assembly.assemble_blocks(
@@ -285,13 +286,13 @@ class BlockSystem:
             settled = Settled(np.zeros((0, 6)), found["state"], zero, found["bonded"], zero, zero, zero, zero, 0)
 
         increment = np.zeros((self.blocks.n_blocks, 6))
-        free = np.flatnonzero(~self._fixed)
-        increment[free] = settled.unknowns[order[free]]
+        increment[self._moving] = settled.unknowns[order[self._moving]]
         increment[:, 2:] /= np.sqrt(moments[:, :1])
         new_vertices, velocity, new_stress, new_crack, largest = advance(
             increment, carried, dt, static, vertices, self._start, moments, tangent, stress0, compliance, offset, given,
             crack_strain,
         )  # fmt: skip
+        kinetic, elastic = energies(velocity, new_stress, self.compliance, density, moments, self._fixed)
         new_gap = settled.gap - (gap - geometry[:, 3])
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
 
@@ -303,11 +304,11 @@ class BlockSystem:
         rows["gap"], rows["length"] = new_gap, geometry[:, 4]
         rows["normal_force"], rows["shear_force"] = settled.normal_force, settled.shear_force
         # Sliding is what the spring did not take up elastically.
-        elastic = (found["shear"] - settled.shear_force) / springs.shear
-        rows["slip"] = found["slip"] + np.where(settled.state == SLIP, settled.sliding - elastic, 0.0)
+        stretch = (found["shear"] - settled.shear_force) / springs.shear
+        rows["slip"] = found["slip"] + np.where(settled.state == SLIP, settled.sliding - stretch, 0.0)
 
-        body, gradient = body_forces(density, gravity, acceleration, carried[:, 2], self._fixed)
-        forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), body, gradient)
+        inertia = Inertia(density, gravity, acceleration, carried[:, 2], self._fixed)
+        forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), inertia)
         new_state = State(
             time=time,
             vertices=new_vertices,
@@ -322,14 +323,10 @@ class BlockSystem:
             "open_close_iterations": settled.iterations,
             "dt": dt,
             "step_cuts": cuts,
-            "kinetic_energy": self._kinetic_energy(density, velocity, moments),
-            "elastic_energy": 0.5
-            * float(np.sum(moments[:, 0] * np.einsum("bi,bij,bj->b", new_stress, self.compliance, new_stress))),
+            "kinetic_energy": kinetic,
+            "elastic_energy": elastic,
             "contact_energy": 0.5
-            * float(
-                np.sum(new_gap[closed] ** 2 * found["springs"].normal[closed])
-                + np.sum(settled.shear_force[closed] ** 2 / springs.shear[closed])
-            ),
+            * float((closed * (new_gap**2 * found["springs"].normal + settled.shear_force**2 / springs.shear)).sum()),
             "worst_penetration": float(max(0.0, -new_gap.min())) if n_contacts else 0.0,
             "max_displacement_ratio": largest / self.half_height,
             "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),
@@ -363,14 +360,6 @@ class BlockSystem:
         rows["normal"] = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
         return rows
 
-    def _kinetic_energy(self, density, velocity, moments) -> float:
-        area, xx, yy, xy = moments[:, 0], moments[:, 3], moments[:, 4], moments[:, 5]
-        u, v, r, ex, ey, g = velocity.T
-        # ∫ |u̇|² of the linear field: ẋ = ex x + (g/2 − r) y, ẏ = (g/2 + r) x + ey y.
-        p, q = 0.5 * g - r, 0.5 * g + r
-        field = area * (u * u + v * v) + (ex * ex + q * q) * xx + (p * p + ey * ey) * yy + 2 * (ex * p + q * ey) * xy
-        return 0.5 * float(np.sum(np.where(self._fixed, 0.0, density * field)))
-
     def _where(self, found: dict[str, np.ndarray], contact: int) -> str:
         if contact < 0:
             return ""
@@ -382,15 +371,15 @@ class BlockSystem:
 
 def _hold(held, matrix, right, vectors, found, order) -> None:
     """Take the unknowns ``held`` (n_blocks, 6) out of the equations, in place: their rows say that they are zero."""
-    free = order >= 0
-    mask = np.zeros((len(matrix), 6), bool)
-    mask[order[free]] = held[free]
+    block, unknown = np.nonzero(held & (order >= 0)[:, None])
+    row = order[block]
     size = np.abs(matrix).max()
-    matrix[mask[:, :, None] | mask[:, None, :]] = 0.0
-    matrix[:, range(6), range(6)] += np.where(mask, size, 0.0)
-    right[mask] = 0.0
-    if len(vectors):
-        vectors *= ~np.concatenate([held[found["block"]], held[found["other"]]], axis=1)[:, None, :]
+    matrix[row, unknown, :] = 0.0
+    matrix[row, :, unknown] = 0.0
+    matrix[row, unknown, unknown] = size
+    right[row, unknown] = 0.0
+    vectors[:, :, :6] *= ~held[found["block"], None]
+    vectors[:, :, 6:] *= ~held[found["other"], None]
 
 
 def _unbalanced(matrix, right, vectors, found, order, settled: Settled) -> float:
