@@ -224,7 +224,7 @@ class Body:
         g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
         answer = settle_faces(self, reduced, opened, pressure, warm, history)
-        on_edges = [np.tensordot(unit.densities, size, 1) for unit, size in units if unit.densities is not None]
+        on_edges = [unit.densities @ size for unit, size in units if unit.densities is not None]
         edge_density = sum(on_edges) if on_edges else None
         return Solution(self, applied, y, answer, g, r, imposed, edge_density)
 

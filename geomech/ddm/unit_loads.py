@@ -128,7 +128,7 @@ class UnitLoads:
             y = boundary.solve(rest[:n_g])
             reduced = rest[n_g:] - cg @ y
             total += np.concatenate([rest, y, reduced, opened(reduced)])
-        return tuple(np.split(total, [n_g, n, n + n_g, 2 * n]))
+        return total[:n_g], total[n_g:n], total[n : n + n_g], total[n + n_g : 2 * n], total[2 * n :]
 
     def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray, opened) -> None:
         """Work out what the ``units`` come to."""

@@ -46,46 +46,69 @@ def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str,
     )
 
 
-def cracks_grid(cycle: Cycle, motion: Motion, configuration: str) -> Grid:
-    """Every element's sampling points joined by lines. Elements do not share points, since opening and slip jump
-    between them; segments that nobody solved for are drawn with nan, but at the start with the zeros of rock at rest."""
-    faces, cracks = cycle.faces, cycle.cracks
-    pieces = [] if faces is None else [_element_columns(faces)]
-    solved = np.zeros(cracks.n_segments, bool)
-    if faces is not None:
-        solved[faces.segment] = True
-    if not solved.all():
-        value = 0.0 if cycle.number == 0 else np.nan
-        pieces.append(_unsolved_columns(cracks, np.flatnonzero(~solved), value))
-    lines, at = [], 0
-    for piece in pieces:
-        n_elements, n = piece["opening"].shape
-        start = at + np.arange(n_elements)[:, None] * n + np.arange(n - 1)
-        lines.append(np.stack([start, start + 1], axis=-1).reshape(-1, 2))
-        at += n_elements * n
+class CrackLines:
+    """Elements of a crack network as lines between their sampling points, kept while the network stands; then segments
+    that nobody solved for (``unsolved``), from end to end. Elements do not share points, since opening and slip jump
+    between them."""
 
-    def joined(name: str, tail: tuple[int, ...] = ()) -> np.ndarray:
-        parts = [piece[name].reshape(-1, *tail) for piece in pieces]
-        return np.concatenate(parts) if parts else np.empty((0, *tail))
+    def __init__(self) -> None:
+        self._cracks: Cracks | None = None
+        self._segment: np.ndarray | None = None
 
-    points, segment = joined("points", (2,)), joined("segment").astype(int)
-    lines = np.concatenate(lines) if lines else np.empty((0, 2), int)
-    of_line = segment[lines[:, 0]]
-    moved = displacement(motion, cracks.block[segment], points)
-    return Grid(
-        points=points if configuration == "reference" else points + moved,
-        connectivity=lines.ravel(),
-        offsets=np.arange(2, 2 * len(lines) + 1, 2),
-        types=np.full(len(lines), LINE),
-        point_data={
-            "displacement": moved,
-            **{name: joined(name) for name in ("opening", "slip", "normal_traction", "shear_traction", "state")},
-        },
-        cell_data={
+    def update(self, cracks: Cracks, faces: CrackFaces | None) -> None:
+        """Make the lines those of ``cracks`` as far as they are sampled in ``faces``."""
+        segment = np.empty(0, int) if faces is None else faces.segment
+        if cracks is self._cracks and np.array_equal(segment, self._segment):
+            return
+        self._cracks, self._segment = cracks, segment
+        solved = np.zeros(cracks.n_segments, bool)
+        solved[segment] = True
+        self.unsolved = np.flatnonzero(~solved)
+        per = 0 if faces is None else faces.opening.shape[1]
+        sizes = np.concatenate([np.full(len(segment), per), np.full(len(self.unsolved), 2)]).astype(int)
+        of_point = np.repeat(np.concatenate([segment, self.unsolved]), sizes)
+        start = np.delete(np.arange(len(of_point)), np.cumsum(sizes) - 1)
+        of_line = of_point[start]
+        ends = cracks.nodes[cracks.segments[self.unsolved]].reshape(-1, 2)
+        self.points = ends if faces is None else np.concatenate([faces.points.reshape(-1, 2), ends])
+        self.block = cracks.block[of_point]
+        self.connectivity = np.stack([start, start + 1], axis=1).ravel()
+        self.offsets = np.arange(2, 2 * len(start) + 1, 2)
+        self.types = np.full(len(start), LINE)
+        self.cell_data = {
             "crack_id": cracks.crack[of_line],
             "block_id": cracks.block[of_line],
             "birth_cycle": cracks.birth_cycle[of_line],
+        }
+
+
+def cracks_grid(cycle: Cycle, motion: Motion, configuration: str, lines: CrackLines) -> Grid:
+    """The crack network. Segments that nobody solved for are drawn with nan, but at the start with the zeros of rock at
+    rest."""
+    faces = cycle.faces
+    lines.update(cycle.cracks, faces)
+    rest = np.full(2 * len(lines.unsolved), 0.0 if cycle.number == 0 else np.nan)
+
+    def along(solved: np.ndarray | None, rest: np.ndarray = rest) -> np.ndarray:
+        if solved is None:
+            return rest
+        return np.concatenate([solved.ravel(), rest]) if len(rest) else solved.ravel()
+
+    moved = displacement(motion, lines.block, lines.points)
+    return Grid(
+        points=lines.points if configuration == "reference" else lines.points + moved,
+        connectivity=lines.connectivity,
+        offsets=lines.offsets,
+        types=lines.types,
+        point_data={
+            "displacement": moved,
+            "opening": along(faces and faces.opening),
+            "slip": along(faces and faces.slip),
+            "normal_traction": along(faces and faces.traction[..., 0]),
+            "shear_traction": along(faces and faces.traction[..., 1]),
+            "state": along(faces and faces.state, np.zeros(len(rest), int)),
         },
+        cell_data=lines.cell_data,
     )
 
 
@@ -175,28 +198,3 @@ def _tips_at_rest(cracks: Cracks) -> np.ndarray:
     out = tips["point"] - cracks.nodes[cracks.segments[segment, 1 - end]]
     tips["direction"] = out / np.hypot(*out.T)[:, None]
     return tips
-
-
-def _element_columns(faces: CrackFaces) -> dict[str, np.ndarray]:
-    return {
-        "points": faces.points,
-        "segment": np.repeat(faces.segment[:, None], faces.opening.shape[1], axis=1),
-        "opening": faces.opening,
-        "slip": faces.slip,
-        "normal_traction": faces.traction[..., 0],
-        "shear_traction": faces.traction[..., 1],
-        "state": faces.state,
-    }
-
-
-def _unsolved_columns(cracks: Cracks, rows: np.ndarray, value: float) -> dict[str, np.ndarray]:
-    nothing = np.full((len(rows), 2), value)
-    return {
-        "points": cracks.nodes[cracks.segments[rows]],
-        "segment": np.repeat(rows[:, None], 2, axis=1),
-        "opening": nothing,
-        "slip": nothing,
-        "normal_traction": nothing,
-        "shear_traction": nothing,
-        "state": np.zeros((len(rows), 2), int),
-    }

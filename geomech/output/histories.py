@@ -114,24 +114,22 @@ def history_row(cycle: Cycle) -> dict[str, Any]:
 
 def tip_rows(cycle: Cycle) -> list[dict[str, Any]]:
     """The rows of ``tips.csv`` for ``cycle``."""
-    return [
-        {
-            "cycle": cycle.number,
-            "time": cycle.state.time,
-            "load": cycle.load,
-            "crack": tip["crack"],
-            "end": tip["end"],
-            "tip": tip["node"],
-            "x": tip["point"][0],
-            "y": tip["point"][1],
-            "K_I": tip["k_i"],
-            "K_II": tip["k_ii"],
-            "K_eq": tip["k_eq"],
-            "angle_deg": math.degrees(tip["angle"]),
-            "grown_m": tip["grown"],
-        }
-        for tip in cycle.tips
-    ]
+    tips = cycle.tips
+    same = {"cycle": cycle.number, "time": cycle.state.time, "load": cycle.load}
+    columns = {
+        "crack": tips["crack"],
+        "end": tips["end"],
+        "tip": tips["node"],
+        "x": tips["point"][:, 0],
+        "y": tips["point"][:, 1],
+        "K_I": tips["k_i"],
+        "K_II": tips["k_ii"],
+        "K_eq": tips["k_eq"],
+        "angle_deg": np.degrees(tips["angle"]),
+        "grown_m": tips["grown"],
+    }
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [same | dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def _written(value: Any) -> Any:
