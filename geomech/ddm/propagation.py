@@ -109,12 +109,16 @@ class _Run:
         self.number = 0
 
     def steps(self, cracks: Cracks, max_steps: int) -> Iterator[Step]:
+        from . import NotConverged
+
+        joined = False
         for self.number in range(max_steps):
             try:
                 self.body = self._body(cracks, self.body)
                 self.solution, tips = self._settled()
-            except np.linalg.LinAlgError as failure:
-                if not self.number:
+            except (np.linalg.LinAlgError, NotConverged) as failure:
+                # A piece that has come off rattles between closed faces: it has no equilibrium to converge to.
+                if not self.number or (isinstance(failure, NotConverged) and not joined):
                     raise
                 at = cracks.nodes.mean(axis=0)
                 lost = self._event("split", at, str(failure))
@@ -127,7 +131,7 @@ class _Run:
             yield Step(self.number, self.factor, cracks, self.solution, tips, growth, events)
             if growth is None:
                 return
-            cracks = growth.cracks
+            cracks, joined = growth.cracks, bool(growth.joins)
 
     def _body(self, cracks: Cracks, previous: Body | None) -> Body:
         return Body(self.loops, cracks, self.material, self.settings, previous=previous, **self.options)

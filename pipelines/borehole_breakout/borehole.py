@@ -1,0 +1,69 @@
+"""A borehole in unequal stress: what the crack solver alone makes of its wall, without blocks.
+
+Breakout: both remote stresses rise in proportion, the wall fails in shear. Mud pressure: the stresses stand, the pressure in
+the hole and in what it opens rises until the wall tears, and then only as far as the fracture lets it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from geomech import ddm
+from geomech.model import Cracks, GrowthSettings, Material
+
+RADIUS = 0.1
+#: Remote compression: σ_H along x, σ_h along y, Pa.
+GREATER, LESSER = 30e6, 20e6
+ROCK = Material(
+    "granite",
+    youngs_modulus=40e9,
+    poissons_ratio=0.25,
+    k_ic=1.5e6,
+    k_iic=3e6,
+    tensile_strength=8e6,
+    cohesion=20e6,
+    friction_angle=math.radians(35),
+)
+#: Sides of the polygon for the hole; the middles of four of them lie on the axes.
+SIDES = 72
+VARIANTS = ("breakout", "mud_pressure")
+
+
+def wall(sides: int = SIDES) -> np.ndarray:
+    """(sides, 2) a polygon with the mean radius of the hole."""
+    angle = 2 * math.pi * (np.arange(sides) + 0.5) / sides
+    return RADIUS / math.sqrt(math.cos(math.pi / sides)) * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def steps(variant: str, sides: int = SIDES, most: int | None = None) -> list:
+    """All steps of a ``variant``, or the first ``most``. Load factors are multiples of the remote stresses in "breakout", MPa in "mud_pressure"."""
+    remote = -np.array([GREATER, LESSER, 0.0])
+    if variant == "breakout":
+        increment, most = 0.02 * RADIUS, most or 20
+        # Chips come off by shear at first: tension and shear each have their own toughness.
+        criterion, load = "f", ddm.BodyLoad(remote_stress=remote)
+    elif variant == "mud_pressure":
+        increment, most = 0.05 * RADIUS, most or 33
+        criterion = "mts"
+
+        def load(pressure, cracks):
+            return ddm.BodyLoad(remote_stress=remote, hole_pressure=pressure * 1e6, crack_pressure=pressure * 1e6)
+    else:
+        raise ValueError(f"no variant {variant!r} of the borehole; there are {', '.join(VARIANTS)}")
+    # The spacing leaves room for one crack on either side of the hole.
+    growth = GrowthSettings(criterion=criterion, increment=increment, initiation="surface", initiation_spacing=RADIUS)
+    none = Cracks.from_polylines([])
+    return list(ddm.propagate([], none, ROCK, load, growth, control="toughness", max_steps=most, holes=[wall(sides)]))
+
+
+def last_network(run: list) -> Cracks:
+    """The cracks in the end, with what the last step added."""
+    return run[-1].growth.cracks if run[-1].growth is not None else run[-1].cracks
+
+
+def azimuths(run: list) -> np.ndarray:
+    """Where cracks were born, degrees from σ_H, 0 to 90."""
+    points = np.array([event.point for step in run for event in step.events if event.kind == "birth"])
+    return np.degrees(np.arctan2(np.abs(points[:, 1]), np.abs(points[:, 0])))

@@ -1,0 +1,80 @@
+"""What the borehole came to, beside closed forms and an independent solution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from borehole import GREATER, LESSER, RADIUS, ROCK, azimuths, last_network
+
+from geomech.reference.borehole import breakdown_pressure, breakout_ratio
+from geomech.reference.cracked_hole import factor
+
+#: The hoop stress of a polygon of 72 sides is right to 0.4 %; azimuths to half a side.
+STRESS_TOLERANCE, AZIMUTH_TOLERANCE_DEG = 0.005, 2.5
+#: Pressure in the fracture beyond σ_h: grown paths have K right to 1e-3, the polygon's wall counts a little besides.
+PRESSURE_TOLERANCE = 0.005
+
+
+def onset(run: list) -> float:
+    """Load factor of the first birth."""
+    return next(step.load_factor for step in run if any(event.kind == "birth" for event in step.events))
+
+
+def fracture_pressure(length: float) -> float:
+    """Pressure, MPa, that holds two fractures of ``length`` m along σ_H at K_Ic, fluid inside, by dislocations."""
+    ratio, root = length / RADIUS, math.sqrt(math.pi * length)
+    shut = factor(ratio, 2, -np.array([GREATER, LESSER, 0.0])) * root
+    per_mpa = factor(ratio, 2, np.zeros(3), 1e6) * root
+    return (ROCK.k_ic - shut) / per_mpa
+
+
+def chips(run: list) -> tuple[float, float]:
+    """Width, degrees of the wall's turn, and depth, parts of the radius, of the chip that came off first; nan while none has."""
+    cracks = last_network(run)
+    own = cracks.crack == 0
+    nodes = np.unique(cracks.segments[own])
+    mouths = cracks.nodes[nodes[cracks.surface[nodes]]]
+    if len(mouths) < 2:
+        return math.nan, math.nan
+    turn = np.degrees(np.arctan2(mouths[:, 1], mouths[:, 0]))
+    deepest = np.hypot(*cracks.nodes[nodes].T).max()
+    return float(np.ptp(turn)), float(deepest / RADIUS - 1)
+
+
+def report(runs: Mapping[str, list]) -> str:
+    """The comparison as text; AssertionError when a closed form is missed by more than its tolerance."""
+    lines = []
+    if "breakout" in runs:
+        run = runs["breakout"]
+        found = onset(run)
+        expected = breakout_ratio(GREATER, LESSER, ROCK.cohesion, ROCK.friction_angle)
+        width, depth = chips(run)
+        lines += [
+            "Breakout, remote stresses rising in proportion",
+            f"  onset at {found:.4f} of them; 2c cos φ/(1 − sin φ) over 3σ_H − σ_h: {expected:.4f}",
+            f"  at {', '.join(f'{a:.1f}°' for a in azimuths(run))} from σ_H (Bell & Gough 1979: 90°, the wall that faces σ_h)",
+            f"  first chip: {width:.1f}° of the wall, {depth:.3f} radii deep; held at K_Ic down to "
+            f"{min(step.load_factor for step in run):.3f} of the stresses",
+        ]
+        assert abs(found / expected - 1) < STRESS_TOLERANCE, "onset of the breakout is off Kirsch's hoop stress"
+        assert np.abs(azimuths(run) - 90).max() < AZIMUTH_TOLERANCE_DEG, "the breakout is off the lesser stress"
+    if "mud_pressure" in runs:
+        run = runs["mud_pressure"]
+        found = onset(run)
+        expected = breakdown_pressure(GREATER, LESSER, ROCK.tensile_strength) / 1e6
+        lines += [
+            "Mud pressure rising, remote stresses standing",
+            f"  breakdown at {found:.2f} MPa; 3σ_h − σ_H + T (Hubbert & Willis 1957): {expected:.2f} MPa",
+            f"  at {', '.join(f'{a:.1f}°' for a in azimuths(run))} from σ_H (published: 0°)",
+            "  fracture length over radius   pressure, MPa   the same by dislocations",
+        ]
+        assert abs(found / expected - 1) < STRESS_TOLERANCE, "breakdown is off Hubbert & Willis"
+        assert np.abs(azimuths(run)).max() < AZIMUTH_TOLERANCE_DEG, "the fracture is not along the greater stress"
+        for step in run[4::7]:
+            length = float(step.cracks.lengths.sum()) / 2
+            other = fracture_pressure(length)
+            lines.append(f"  {length / RADIUS:10.2f} {step.load_factor:23.3f} {other:20.3f}")
+            assert abs(step.load_factor - other) < PRESSURE_TOLERANCE * ROCK.k_ic / math.sqrt(math.pi * length) / 1e6
+    return "\n".join(lines)
