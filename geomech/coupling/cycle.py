@@ -100,6 +100,9 @@ class Coupling:
             may_grow = growth_pass < self.problem.growth.max_passes
             events, stops = pending, stops or self._stops(pending)
             growth = self._growth(tips) if may_grow and not stops else None
+            if growth is None and may_grow and not stops and self.problem.growth.initiation:
+                growth, born = self._births(solutions, result.state)
+                events += born
             if growth is None and static and not stops:
                 # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
                 lost = self._lost(result.state)
@@ -289,6 +292,20 @@ class Coupling:
             self.bodies = trial  # most of it is what the corrected step needs
         return growth
 
+    def _births(self, solutions: dict, state: State):
+        """New cracks, and their events, where no tip grows and whole rock is strained to its strength."""
+        from .births import bear_in_blocks
+
+        with self._timed("growth"):
+            growth, births = bear_in_blocks(
+                self.cracks, self.blocks, self.problem.materials, solutions, self.problem.growth, self.number
+            )
+        names = growth.cracks.names[self.cracks.n_cracks :] if growth is not None else ()
+        return growth, tuple(
+            self._event("birth", state, birth.start, f"{name} starts in {birth.kind} ({birth.place})")
+            for name, birth in zip(names, births)
+        )
+
     def _initiations(self, tips: np.ndarray, state: State) -> tuple[Event, ...]:
         """An event for every tip that grows for the first time; wings inherit their crack and end by position."""
         events = []
@@ -376,9 +393,9 @@ class Coupling:
         self.bodies, self.nodes_of = self._bodies_of(self.cracks, self.bodies)
 
     def _bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
-        """block → body of every moving block that holds ``cracks``, and block → its nodes in the whole network. What
+        """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole network. What
         keeps a fixed block in place, and so what strains it, is not known."""
-        cracked = np.unique(cracks.block)
+        cracked = np.arange(self.blocks.n_blocks) if self.problem.growth.initiation else np.unique(cracks.block)
         cracked = cracked[~self.blocks.fixed[cracked]]
         if not len(cracked):
             return {}, {}

@@ -82,12 +82,12 @@ def overstress(stress: np.ndarray, material: Material) -> tuple[np.ndarray, np.n
     return tension, shear, 0.5 * np.arctan2(2 * xy, xx - yy)
 
 
-def births(solution: Solution, material: Material, settings: GrowthSettings) -> list[Birth]:
+def births(solution: Solution, material: Material, settings: GrowthSettings, block: int = 0) -> list[Birth]:
     """The cracks that would come first under this load, most overstressed first, whether or not that is above one.
 
     ``settings.initiation`` says where to look ("surface" counts crack faces in). Each is settings.increment long and has room: it
     keeps settings.initiation_spacing from tips, mouths, junctions and its sisters and crosses nothing. Those within 0.1 % of
-    the first come with it; [] when the rock has no strength to exceed, or no room. Raises ValueError on an unknown place.
+    the first come with it. ``block`` is the one that the body's cracks say they lie in; [] when the rock has no strength to exceed, or no room. Raises ValueError on an unknown place.
     """
     if settings.initiation not in PLACES:
         raise ValueError(f"no place for cracks to be born {settings.initiation!r}; there are {PLACES[1:]}")
@@ -100,7 +100,7 @@ def births(solution: Solution, material: Material, settings: GrowthSettings) -> 
         if birth.overstress <= 0 or (chosen and birth.overstress < (1 - TOGETHER) * chosen[0].overstress):
             break
         apart = all(math.dist(birth.start, other.start) >= spacing for other in chosen)
-        if apart and _has_room(network, birth, settings):
+        if apart and _has_room(network, birth, settings, block):
             chosen.append(birth)
     return chosen
 
@@ -315,12 +315,12 @@ def _in_rock(solution, material, settings) -> Iterator[Birth]:
         yield Birth(kind, "rock", value, tuple((points[k] - half[k]).tolist()), tuple((points[k] + half[k]).tolist()))
 
 
-def _has_room(network: Network, birth: Birth, settings: GrowthSettings) -> bool:
+def _has_room(network: Network, birth: Birth, settings: GrowthSettings, block: int) -> bool:
     """Whether the crack to be meets nothing but what it starts from."""
     clearance = CLEARANCE * settings.increment
     start = network.add_node(birth.start, surface=birth.place == "surface")
     own = network.rows[birth.segment] if birth.place == "face" else None
-    for obstacle in network.near(0, start, settings.increment + 2 * clearance):
+    for obstacle in network.near(block, start, settings.increment + 2 * clearance):
         if obstacle.row is not None and obstacle.row is own:
             continue
         if network.first_contact(start, birth.start, birth.end, obstacle, clearance) is not None:

@@ -25,7 +25,7 @@ from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
 from .edges import contact_names, joint_names
 from .errors import Check
-from .tables import ForceTable, SceneTables, TractionTable
+from .tables import ForceTable, MaterialTable, SceneTables, TractionTable
 
 
 def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Problem:
@@ -52,7 +52,10 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
                 density=m.density_kg_m3,
                 k_ic=m.k_ic_pa_sqrt_m if m.k_ic_pa_sqrt_m is not None and tables.growth.enabled else math.inf,
                 plane=m.plane,
-                k_iic=m.k_iic_pa_sqrt_m if m.k_iic_pa_sqrt_m is not None and tables.growth.enabled else math.inf,
+                tensile_strength=math.inf if m.tensile_strength_pa is None else m.tensile_strength_pa,
+                cohesion=math.inf if m.cohesion_pa is None else m.cohesion_pa,
+                friction_angle=math.radians(m.internal_friction_angle_deg),
+                k_iic=_shear_toughness(m, tables),
             )
             for name, m in tables.materials.items()
         ),
@@ -164,6 +167,12 @@ def _dda(tables: SceneTables) -> DdaSettings:
     )
 
 
+def _shear_toughness(m: MaterialTable, tables: SceneTables) -> float:
+    """Infinite where cracks do not grow, also for want of a toughness in tension."""
+    grows = tables.growth.enabled and m.k_ic_pa_sqrt_m is not None
+    return m.k_iic_pa_sqrt_m if grows and m.k_iic_pa_sqrt_m is not None else math.inf
+
+
 def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
     g = tables.growth
     increment = g.increment_m
@@ -180,6 +189,9 @@ def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
         join_distance=g.join_distance,
         max_passes=g.max_passes,
         correct=g.correct,
+        initiation=g.initiation if g.enabled else "",
+        initiation_distance=g.initiation_distance_m,
+        initiation_spacing=g.initiation_spacing_m,
     )
 
 

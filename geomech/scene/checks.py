@@ -27,6 +27,7 @@ def check(c: Check) -> None:
         check_edges(c)
         _points(c)
         _toughness(c)
+        _strength(c)
 
 
 def _times(c: Check) -> None:
@@ -199,6 +200,19 @@ def material_of(tables: SceneTables, zone: str) -> str:
     """The name of the material that ``zone`` is made of."""
     entry = tables.zones.get(zone)
     return entry.material if entry is not None and entry.material is not None else next(iter(tables.materials))
+
+
+def _strength(c: Check) -> None:
+    t = c.tables
+    if t.growth is None or t.materials is None:
+        return
+    strong = [m for m in t.materials.values() if m.tensile_strength_pa is not None or m.cohesion_pa is not None]
+    if t.growth.enabled and t.growth.initiation and not strong:
+        c.refuse(
+            ("growth", "initiation"),
+            "cracks are to be born, but no material has a strength that could be reached",
+            "add tensile_strength_pa or cohesion_pa to a material",
+        )
 
 
 def _toughness(c: Check) -> None:

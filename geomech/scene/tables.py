@@ -98,6 +98,15 @@ class MaterialTable(Table):
     k_iic_pa_sqrt_m: Positive | None = Field(
         None, description='toughness against growth in shear, Pa √m, for growth.criterion = "f" (unset: no such growth)'
     )
+    tensile_strength_pa: Positive | None = Field(
+        None, description="tensile strength of intact rock, Pa, for growth.initiation (unset: it does not tear)"
+    )
+    cohesion_pa: Positive | None = Field(
+        None, description="cohesion of intact rock, Pa, for growth.initiation (unset: it does not shear)"
+    )
+    internal_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
+        0.0, description="angle of internal friction of intact rock, beside its cohesion, degrees"
+    )
     plane: Literal["strain", "stress"] = Field("strain", description='"strain" or "stress" in the plane')
 
 
@@ -261,12 +270,23 @@ class GrowthTable(Table):
     correct: bool = Field(
         True, description="predict each step, then bend it towards where it would go on: paths of second order"
     )
+    initiation: Literal["", "surface", "everywhere"] = Field(
+        "",
+        description='where cracks are born when intact rock reaches its strength: "" nowhere, "surface" on outlines, '
+        'holes and crack faces, "everywhere" inside blocks too',
+    )
+    initiation_distance_m: NotNegative = Field(
+        0.0, description="stress is averaged over this distance into the rock, m (0: at the point)"
+    )
+    initiation_spacing_m: NotNegative = Field(
+        0.0, description="least distance between cracks at birth, m (0: five increments)"
+    )
 
 
 class RunTable(Table):
     end_time_s: Positive = Field(description="the run ends at this time, s")
     stop_at: Annotated[
-        tuple[Literal["initiation", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
+        tuple[Literal["initiation", "birth", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
     ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
     boundary_stress: Literal["contacts"] = Field(
         "contacts",

@@ -45,7 +45,7 @@ def steps(variant: str, sides: int = SIDES, most: int | None = None) -> list:
         # Chips come off by shear at first: tension and shear each have their own toughness.
         criterion, load = "f", ddm.BodyLoad(remote_stress=remote)
     elif variant == "mud_pressure":
-        increment, most = 0.05 * RADIUS, most or 33
+        increment, most = 0.1 * RADIUS, most or 17
         criterion = "mts"
 
         def load(pressure, cracks):

@@ -41,6 +41,7 @@ SPOILT = [
     ("density_kg_m3 = 2500", "density_kg_m3 = inf", "materials.rock.density_kg_m3", "not a finite number", "density"),
     ("density_kg_m3 = 2500", "density_kg_m3 = true", "materials.rock.density_kg_m3", "true stands", "density"),
     ("k_ic_pa_sqrt_m = 1e6", "", "materials.rock", "no fracture toughness", "growth.enabled = false"),
+    ("[run]", '[growth]\ninitiation = "surface"\n[run]', "growth.initiation", "no material has", "tensile_strength_pa"),
     ("end_time_s = 100.0", "", "run.end_time_s", "missing", "add `end_time_s = …`"),
     ("end_time_s = 100.0", "end_time_s = 0.5", "run.end_time_s", "longer than the whole run", "run.end_time_s"),
     ("end_time_s = 100.0", 'end_time_s = 9\nstop_at = ["spilt"]', "run.stop_at[0]", '"spilt" is not one of', "event"),

@@ -159,3 +159,37 @@ def test_a_crack_across_a_plate_in_tension_splits_it():
     assert (last.state.contacts["normal_force"] == 0).all()
     # Straight on: nothing in this plate turns the crack.
     assert np.abs(last.blocks.vertices[np.abs(last.blocks.vertices[:, 1]) < 0.9 * h, 1]).max() < 1e-6
+
+
+def test_a_plate_with_a_hole_cracks_where_its_wall_reaches_the_strength():
+    """No crack is drawn: under rising tension two are born at the ends of the hole's diameter, within a load step of where the
+    crack solver alone has them born, and their growth parts the plate."""
+    w, h, step = 0.05, 0.1, 0.05e6
+    rock = Material("rock", 17e9, 0.21, 2200.0, 0.3e6, tensile_strength=3e6)
+    angle = 2 * np.pi * (np.arange(32) + 0.5) / 32
+    hole = 0.01 * np.column_stack([np.cos(angle), -np.sin(angle)])
+    plate = rectangle(-w, -h, w, h)
+    growth = GrowthSettings(increment=4e-3, initiation="surface", initiation_spacing=10e-3)
+    pull = (("load:top", step), ("load:bottom", -step))
+    problem = Problem(
+        title="plate with a hole",
+        blocks=Blocks.from_polygons([[plate, hole]], edge_names=[[["load:bottom", "", "load:top", ""], [""] * 32]]),
+        cracks=Cracks.from_polylines([]),
+        materials=(rock,),
+        joints=(JointLaw("joint"),),
+        loads=Loads(edge_tractions=tuple(EdgeTraction(name, History.ramp([0.0, rate])) for name, rate in pull)),
+        growth=growth,
+        run=RunSettings(end_time=60.0, stop_at=("split",)),
+        load_edge="load:top",
+    )
+    events = [event for cycle in cycles(problem) for event in cycle.events]
+    assert [event.kind for event in events[:2]] == ["birth", "birth"] and events[-1].kind == "split"
+    ends = np.array([[[w, h], [-w, h]], [[-w, -h], [w, -h]]])
+    load = ddm.BodyLoad(segments=ends, tractions=np.tile([[[0.0, 1.0]], [[0.0, -1.0]]], (1, 2, 1)))
+    alone = next(
+        ddm.propagate([plate, hole], problem.cracks, rock, load, growth, control="toughness")
+    )
+    assert alone.load_factor <= -events[0].load < alone.load_factor + step
+    np.testing.assert_allclose(
+        sorted(event.point for event in events[:2]), sorted(event.point for event in alone.events), atol=1e-9
+    )
