@@ -98,10 +98,7 @@ class Body:
             self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
-        if self.rough and settings.solver == "compressed":
-            raise ValueError("solver: crack faces with friction, cement or a filling need the dense one")
-        # States of rough faces are found on S itself.
-        self.compressed = not self.rough and is_compressed(settings.solver, self.faces.n_unknowns)
+        self.compressed = is_compressed(settings.solver, self.faces.n_unknowns)
         self._assemble(previous)
 
     @property

@@ -7,6 +7,7 @@ the equations of the free unknowns are factored instead.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +18,18 @@ from .factor import Factor
 _SAFE = 1e-11
 #: Factors for so many sets of free unknowns are kept.
 _KEPT = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """How contact changes the equations S w = right. Unknowns that are ``held`` (n,) bool are zero and have no equation;
+    ``mixed`` (n,) times the equation across a node is added to that along it, ``per`` places before; ``spring`` (n,) is
+    taken off the diagonal."""
+
+    held: np.ndarray
+    mixed: np.ndarray
+    spring: np.ndarray
+    per: int
 
 
 class CrackSystem:
@@ -58,6 +71,18 @@ class CrackSystem:
         w[free] = factor.solve((right - self.matrix @ w)[free])
         reaction[at] = (right - self.matrix @ w)[at]
         return w, reaction
+
+    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor]:
+        """The unknowns that are not held (indices) and factors of their equations."""
+        free, moving = np.flatnonzero(~rows.held), np.flatnonzero(rows.mixed)
+        matrix = self.matrix[np.ix_(free, free)]
+        if len(moving):
+            at = np.full(self.n, -1)
+            at[free] = np.arange(len(free))
+            matrix[at[moving]] += rows.mixed[moving, None] * self.matrix[np.ix_(moving + rows.per, free)]
+        diagonal = np.arange(len(free))
+        matrix[diagonal, diagonal] -= rows.spring[free]
+        return free, Factor(matrix, "cracks cut a part of the body off")
 
     def rcond(self, closed: np.ndarray) -> float:
         """Reciprocal condition of the matrix solved with when ``closed`` (n,) bool are held."""

@@ -22,10 +22,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .crack_system import CrackSystem
+from .crack_system import CrackSystem, Rows
 from .face_laws import FaceLaws, FaceMemory, FaceStates
 from .faces import NotConverged
 from .factor import Factor
+from .iterative import Iterated, IterativeCrackSystem
 
 #: Violations allowed, in units of the largest stress (and the opening that it makes).
 TOLERANCE = 1e-10
@@ -40,9 +41,9 @@ _KEPT = 8
 class FaceEquations:
     """The linear equations of nodes in given states: ``system`` with rows and columns changed as ``laws`` ask."""
 
-    def __init__(self, system: CrackSystem, laws: FaceLaws):
+    def __init__(self, system: CrackSystem | IterativeCrackSystem, laws: FaceLaws):
         self.system, self.laws = system, laws
-        self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
+        self._factors: dict[bytes, tuple[np.ndarray, Factor | Iterated]] = {}
         self.factorisations = 0
 
     def solve(
@@ -116,23 +117,15 @@ class FaceEquations:
         slides = states.way * np.where(states.pulled | frozen, 0.0, laws.friction)
         return held, slides, spring
 
-    def _factor(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, Factor]:
+    def _factor(self, states: FaceStates, frozen: bool) -> tuple[np.ndarray, Factor | Iterated]:
         key = states.key + bytes([frozen])
         if key not in self._factors:
             if len(self._factors) >= _KEPT:
                 self._factors.pop(next(iter(self._factors)))
-            laws, s = self.laws, self.system.matrix
             held, slides, spring = self._rows(states, frozen)
-            free = np.flatnonzero(~held)
-            matrix = s[np.ix_(free, free)]
-            at = np.full(len(held), -1)
-            at[free] = np.arange(len(free))
-            moving = np.flatnonzero(slides)
-            if len(moving):
-                matrix[at[laws.along[moving]]] += slides[moving, None] * s[np.ix_(laws.across[moving], free)]
-            diagonal = np.arange(len(free))
-            matrix[diagonal, diagonal] -= spring[free]
-            self._factors[key] = free, Factor(matrix, "cracks cut a part of the body off")
+            mixed = np.zeros(self.system.n)
+            mixed[self.laws.along] = slides
+            self._factors[key] = self.system.changed(Rows(held, mixed, spring, self.laws.elements.per))
             self.factorisations += 1
         return self._factors[key]
 

@@ -8,10 +8,10 @@ Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 20 to 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from .crack_system import Rows
 from .factor import Factor
 from .hierarchical import Compressed, Tree
 from .influence import ElementSet, influence
@@ -135,19 +135,17 @@ class Patches:
 
     def change(self, rows: Rows) -> None:
         """From now on the equations are those of ``rows``; only patches to which that is news are factored."""
-        per = self._elements.per
         for k, (elements, own) in enumerate(self._patches):
             unknowns = self._elements.unknowns(elements)
-            held, spring = rows.held[unknowns], rows.spring[unknowns]
-            slides = rows.slides.reshape(-1, per)[elements]
-            key = held.tobytes() + spring.tobytes() + slides.tobytes()
+            held, mixed, spring = rows.held[unknowns], rows.mixed[unknowns], rows.spring[unknowns]
+            key = held.tobytes() + mixed.tobytes() + spring.tobytes()
             known = self._factors[k]
             if known is not None and known[0] == key:
                 continue
             part = self._elements.take(elements)
             matrix = influence(part, part, self._nu, self._tol)
-            by_node = matrix.reshape(len(elements), 2, per, -1)
-            by_node[:, 0] += slides[..., None] * by_node[:, 1]
+            moving = np.flatnonzero(mixed)
+            matrix[moving] += mixed[moving, None] * matrix[moving + rows.per]
             matrix -= np.diag(spring)
             if held.any():
                 matrix = matrix[np.ix_(~held, ~held)]
@@ -189,20 +187,6 @@ class Reduced:
         return out - self._on_cracks @ (self._following @ w) if self._on_cracks.shape[1] else out
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """How contact changes the equations S w = right: unknowns that are ``held`` (n,) bool have no row, of sliding nodes
-    ``slides`` (n_nodes,) times the row across is added to the row along, and ``spring`` (n,) is taken off the diagonal."""
-
-    held: np.ndarray
-    slides: np.ndarray
-    spring: np.ndarray
-
-    @classmethod
-    def of(cls, held: np.ndarray) -> Rows:
-        return cls(held, np.zeros(len(held) // 2), np.zeros(len(held)))
-
-
 class IterativeCrackSystem:
     """`crack_system.CrackSystem` for many unknowns: ``matrix`` is S as an operator; see there.
 
@@ -229,7 +213,7 @@ class IterativeCrackSystem:
             return tuple(np.column_stack(part) for part in zip(*columns))
         given = np.where(closed, fixed, 0.0)
         rest = right - self.matrix @ given if given.any() else right
-        w = given + self.solve(rest, Rows.of(closed))
+        w = given + self.solve(rest, self._holding(closed))
         reaction = np.zeros_like(right)
         if closed.any():
             reaction[closed] = (right - self.matrix @ w)[closed]
@@ -237,11 +221,11 @@ class IterativeCrackSystem:
 
     def solve(self, right: np.ndarray, rows: Rows) -> np.ndarray:
         """(n,) jumps that are zero where held and obey the other ``rows``. Raises NotSolved."""
+        moving = np.flatnonzero(rows.mixed)
 
         def times(v: np.ndarray) -> np.ndarray:
             out = self.matrix @ v
-            by_node = out.reshape(-1, 2, self._per)
-            by_node[:, 0] += rows.slides.reshape(-1, self._per) * by_node[:, 1]
+            out[moving] += rows.mixed[moving] * out[moving + rows.per]
             out -= rows.spring * v
             out[rows.held] = 0.0
             return out
@@ -261,14 +245,43 @@ class IterativeCrackSystem:
         size = float(before @ before)
         return np.where(held, 0.0, float(before @ right) / size * w) if size else None
 
+    def changed(self, rows: Rows) -> tuple[np.ndarray, Iterated]:
+        """As `crack_system.CrackSystem.changed`."""
+        return np.flatnonzero(~rows.held), Iterated(self, rows)
+
     def rcond(self, closed: np.ndarray) -> float:
         """Reciprocal condition of the patches solved with, the worst one: of the whole, none is known."""
-        return self.rcond_of(Rows.of(closed))
+        return self.rcond_of(self._holding(closed))
 
     def rcond_of(self, rows: Rows) -> float:
-        """As `rcond`, of changed rows."""
+        """As `rcond`, of changed ``rows``."""
         self._patches.change(rows)
         return self._patches.rcond
+
+    def _holding(self, closed: np.ndarray) -> Rows:
+        return Rows(closed, np.zeros(self.n), np.zeros(self.n), self._per)
+
+
+class Iterated:
+    """What stands for a `Factor` of the equations of ``system`` with changed ``rows``."""
+
+    def __init__(self, system: IterativeCrackSystem, rows: Rows):
+        self._system, self._rows = system, rows
+        self._free = np.flatnonzero(~rows.held)
+
+    @property
+    def rcond(self) -> float:
+        return self._system.rcond_of(self._rows)
+
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Free unknowns for ``right`` (n_free,) or (n_free, k). Raises ValueError for ``transposed`` equations."""
+        if transposed:
+            raise ValueError('functionals of the loads need factored equations: solver "dense"')
+        if right.ndim == 2:
+            return np.column_stack([self.solve(column) for column in right.T])
+        whole = np.zeros(self._system.n)
+        whole[self._free] = right
+        return self._system.solve(whole, self._rows)[self._free]
 
 
 def compressed(

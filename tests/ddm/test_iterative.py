@@ -6,7 +6,7 @@ import pytest
 from geomech import ddm
 from geomech.conventions import traction
 from geomech.ddm.iterative import CROSSOVER, NotSolved, gmres
-from geomech.model import Cracks, DdmSettings, Material
+from geomech.model import Cracks, DdmSettings, JointLaw, Material
 from geomech.reference.crack_arrays import cracks_in_cells
 
 ROCK = Material("rock", youngs_modulus=10e9, poissons_ratio=0.25)
@@ -58,6 +58,30 @@ def test_compressed_bodies_solve_as_dense_ones(loops, stress):
         np.testing.assert_allclose(two, one, rtol=0, atol=1e-10 * np.abs(one).max())
     if loops:
         np.testing.assert_allclose(other.body.compliance(other), dense.body.compliance(dense), rtol=1e-9, atol=1e-22)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        JointLaw("rough", friction_angle=np.arctan(0.6), cohesion=1e5),
+        JointLaw("filled", friction_angle=np.arctan(0.4), normal_stiffness=1e10, shear_stiffness=3e9),
+    ],
+    ids=lambda law: law.name,
+)
+def test_faces_under_a_law_do_as_with_dense_equations(law):
+    """Loading and half unloading: states, slip that is kept, work of friction."""
+    answers = []
+    for solver in ("dense", "compressed"):
+        body = ddm.Body(PLANE, network(4), ROCK, DdmSettings(solver=solver), face_laws=(law,))
+        loaded = body.solve(ddm.BodyLoad(remote_stress=[-3e6, -2e7, 6e6]))
+        answers.append((loaded, body.solve(ddm.BodyLoad(remote_stress=[-3e6, -1e7, -1e6]), history=loaded)))
+    for dense, other in zip(*answers):
+        agree(dense, other)
+        assert (other.states == dense.states).all()
+        assert other.frictional_work == pytest.approx(dense.frictional_work, rel=1e-9)
+        assert other.residual < 1e-10
+    with pytest.raises(ValueError, match="dense"):
+        body.face_equations.adjoint(np.zeros((body.faces.n_unknowns, 1)), loaded.face_states)
 
 
 def test_growth_may_cross_from_dense_to_compressed():
