@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 _STYLES = (
-    ("#1f6f8b", "o", "-"), ("#8d6a9f", "v", "-"), ("#588157", "s", "-"),
+    ("#1f6f8b", "o", "-"), ("#58a9c4", "*", ":"), ("#8d6a9f", "v", "-"), ("#588157", "s", "-"),
     ("#b9a394", "x", "--"), ("#c8553d", "^", "-"), ("#b08900", "D", "-"),
 )  # fmt: skip
 
@@ -21,7 +21,7 @@ class Measured(Protocol):
 
 
 def draw(points: Sequence[Measured], methods: Sequence[str], path: Path) -> Path:
-    """``points`` as one curve a method (at most six, in the legend's order), logarithmic axes shared by all panels."""
+    """``points`` as one curve a method (at most seven, in the legend's order), logarithmic axes shared by all panels."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
 

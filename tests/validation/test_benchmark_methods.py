@@ -65,6 +65,7 @@ def test_table_and_picture(tmp_path):
     points = []
     for name in work_precision.PROBLEMS:
         points += [Point(name, work_precision.OURS, p, 10 * p, 10.0 ** (-p), 1e-3) for p in range(2, 11)]
+        points += [Point(name, work_precision.ASKED, p, 10 * p, 10.0 ** (-p), 1e-3) for p in range(2, 9)]
         points += [Point(name, work_precision.CALIBRATED, n, 2 * n, 0.1 / n, 1e-3 * n) for n in (10, 1000, 10000)]
         points += [Point(name, work_precision.QUADRATIC, n, 2 * n, 1e-3, 1e-3 * n) for n in (10, 500)]
     goals = work_precision._goals(points)
