@@ -11,6 +11,7 @@ from ..conventions import normal_of
 from ..model import OPEN, SLIP, STICK, CrackFaces
 from . import shapes
 from .applied import Applied
+from .beside_ends import ElementEnds
 from .boundary import middle_of
 from .face_laws import FaceStates
 from .influence import add_fields
@@ -20,13 +21,6 @@ from .reactions import Reactions, reactions
 if TYPE_CHECKING:
     from .body import Body
     from .contact import FaceAnswer
-
-#: Where a field is asked for at the very end of an element it is taken this part of the element's length away: the
-#: stress of the discrete solution has no value there.
-_NUDGE = 0.02
-#: Nearer to an end than this part of that distance a point is the end itself; from farther off it is moved on the way it
-#: stands, so that of two faces that meet at a kink each is looked at from its own side.
-_AT_END = 1e-6
 
 
 class Solution:
@@ -178,40 +172,51 @@ class Solution:
         cracks = body.crack_system.rcond(self.closed) if not body.rough else body.face_equations.rcond(self.face_states)
         return 1.0 / min(cracks, body._outside.factor.rcond)
 
-    def stress(self, points: np.ndarray) -> np.ndarray:
+    def stress(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
 
-        On a boundary it is the rock's, on a crack that of the upper face; at the ends of elements (corners, crack tips,
-        crack nodes), where the discrete field has no value, that at a hundredth of the element's length beside.
+        On a boundary it is the rock's, on a crack that of the upper face (left of its segment), or the lower with ``side``
+        −1. At crack tips it is that a fiftieth of the element's length beside, and so it is nearer than that to other
+        ends of elements (corners, crack nodes): the discrete field has no value there.
         """
-        return self._total(points)[0]
+        return self._total(points, side)[0]
 
-    def displacement(self, points: np.ndarray) -> np.ndarray:
-        """(n, 2) displacement at ``points`` (n, 2), m. What no support holds of the mean displacement and mean
-        rotation of the outline is zero; in the infinite plane cracks add to the uniform strain about the origin."""
-        return self.fields(points)[1]
+    def principal_stress(self, points: np.ndarray, side: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """(n, 2) in-plane principal stresses of `stress`, Pa, the larger first, and the angle (n,) from x to the larger one's
+        direction, rad, in (−π/2, π/2]."""
+        xx, yy, xy = self.stress(points, side).T
+        mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+        return np.column_stack([mean + radius, mean - radius]), 0.5 * np.arctan2(2 * xy, xx - yy)
 
-    def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def displacement(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
+        """(n, 2) displacement at ``points`` (n, 2), m, on cracks that of the face on ``side``. What no support holds of
+        the mean displacement and mean rotation of the outline is zero; in the infinite plane cracks add to the uniform
+        strain about the origin."""
+        return self.fields(points, side)[1]
+
+    def fields(self, points: np.ndarray, side: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """`stress` and `displacement` at ``points`` (n, 2) in the time of one of them."""
         points = np.asarray(points, dtype=float).reshape(-1, 2)
-        stress, displacement = self._total(points)
+        stress, displacement = self._total(points, side)
         return stress, displacement - _rigid(self._motion, self.body.centroid, points)
 
-    def _total(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _total(self, points: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
         body = self.body
         points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
-        where = self._off_ends(points)
-        stress, shift = np.zeros((len(points), 3)), np.zeros((len(points), 2))
+        n = len(points)
+        where, double = self._ends.aside(points, side)
+        stress, shift = np.zeros((len(where), 3)), np.zeros((len(where), 2))
         nu = body.nu
 
-        def add(start, end, kind, density, tol, force):
-            add_fields(where, start, end, kind, density, nu, tol, 1.0, force, stress, shift)
+        def add(start, end, kind, density, tol, force, side=1.0):
+            add_fields(where, start, end, kind, density, nu, tol, side, force, stress, shift)
             if force:
                 shift[:] += _kelvin_constant(start, end, density, nu)
 
-        for elements, values in ((body.boundary, self._u), (body.faces, self.jumps)):
+        for elements, values, seen_from in ((body.boundary, self._u, 1.0), (body.faces, self.jumps, side)):
             if elements.n:
-                add(elements.start, elements.end, elements.kind, elements.densities(values), body._tol, False)
+                density = elements.densities(values)
+                add(elements.start, elements.end, elements.kind, density, body._tol, False, seen_from)
         if body.supports:
             held = body._outside.holds.sources
             add(held.start, held.end, held.kind, held.densities(self._on_supports[1]), body._tol, True)
@@ -225,7 +230,10 @@ class Solution:
         for part in self._applied.lines:
             add(part.start, part.end, np.zeros(len(part.start), np.int64), part.density, 2 * OFF * body._extent, True)
         shift /= 2 * body.material.shear_modulus
-        return stress + self._applied.stress(where), shift + self._applied.displacement(where)
+        stress, shift = stress + self._applied.stress(where), shift + self._applied.displacement(where)
+        for field in (stress, shift):
+            field[double] = 0.5 * (field[double] + field[n:])
+        return stress[:n], shift[:n]
 
     @cached_property
     def _line_forces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -241,36 +249,9 @@ class Solution:
             density.append(np.stack([local.mean(axis=0), 0.5 * (local[1] - local[0])], axis=1))
         return np.array(start), np.array(end), np.array(density)
 
-    def _off_ends(self, points: np.ndarray) -> np.ndarray:
-        """The points, those within a nudge of an element's end moved away from it, into the rock."""
-        body = self.body
-        sets = [s for s in (body.boundary, body.faces) if s.n]
-        if not sets or not len(points):
-            return points
-        from scipy.spatial import cKDTree
-
-        ends = np.concatenate([x for s in sets for x in (s.start, s.end)])
-        reach = _NUDGE * np.concatenate([x for s in sets for x in (s.length, s.length)])
-        inward = np.concatenate([x for s in sets for x in (s.normal, s.normal)])
-        moved = points.copy()
-        tree = cKDTree(ends)
-        distance, nearest = tree.query(points)
-        close = np.flatnonzero(distance < reach[nearest])
-        if not len(close):
-            return moved
-        at, which = np.unique(nearest[close], return_inverse=True)
-        # All ends that meet where the nearest one is.
-        meeting = tree.query_ball_point(ends[at], 1e-12 * body._extent)
-        here = np.concatenate(meeting).astype(int)
-        first = np.cumsum([0, *map(len, meeting[:-1])])
-        way = np.add.reduceat(inward[here], first)[which]
-        least = np.minimum.reduceat(reach[here], first)[which]
-        beside = distance[close] > _AT_END * reach[nearest[close]]
-        way[beside] = points[close[beside]] - ends[nearest[close[beside]]]
-        lost = ~beside & (np.hypot(*way.T) < 1e-6)
-        way[lost] = inward[nearest[close[lost]]]
-        moved[close] = ends[nearest[close]] + way / np.hypot(*way.T)[:, None] * least[:, None]
-        return moved
+    @cached_property
+    def _ends(self) -> ElementEnds:
+        return ElementEnds(self.body.boundary, self.body.faces, 1e-12 * self.body._extent)
 
     @cached_property
     def _motion(self) -> np.ndarray:
