@@ -357,6 +357,8 @@ def test_a_scene_runs_from_the_command_line_to_its_folder(tmp_path, capsys):
     assert np.allclose(last["K_I"][order] / 0.4e6, OPEN_SLOT_K_I[0], rtol=1e-4)
     assert np.allclose(last["K_II"][order] / 0.4e6, OPEN_SLOT_K_II[0], rtol=1e-4)
     assert run.summary["cycles"] == len(run.history)
+    work = run.summary["crack_solver"]
+    assert work["boundary_factorisations"] == work["crack_factorisations"] == 1 <= work["solutions"]
     # Away from the flaws the rock carries the load, in the files too.
     grid = run.grid("interior", int(run.history["cycle"][-1]))
     corner = np.hypot(*(grid.points[:, :2] - (0.02, 0.05)).T).argmin()

@@ -11,6 +11,7 @@ import time as clock
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +54,7 @@ class Coupling:
         self.gauge = problem.gauge
         self.monitors = dict(problem.monitors)
         self.seconds: dict[str, float] = {}
+        self.work: Any = None
         self.number = 0
         self.load_step = 0
         self.known_motion: tuple[State, Motion] | None = None
@@ -401,6 +403,7 @@ class Coupling:
             return {}, {}
         from .. import ddm
 
+        self.work = ddm.Work() if self.work is None else self.work
         bodies, nodes_of = {}, {}
         with self._timed("ddm assembly"):
             for b in cracked.tolist():
@@ -412,6 +415,7 @@ class Coupling:
                     self.problem.materials[self.blocks.material[b]],
                     self.problem.ddm,
                     previous=kept.get(b),
+                    work=self.work,
                 )
         return bodies, nodes_of
 
@@ -435,6 +439,7 @@ class Coupling:
             monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in self.monitors.items()},
             statistics=statistics,
             seconds=dict(self.seconds),
+            work={} if self.work is None else dict(vars(self.work)),
         )
         vars(cycle)["motion"] = motion  # known here: the property need not find it again
         return cycle

@@ -22,6 +22,7 @@ _PUBLIC = {
     "LoadHistory": ".loads",
     "NotConverged": ".faces",
     "Solution": ".solution",
+    "Work": ".work",
     "propagate": ".propagation",
     "solve_to": ".automatic",
 }
@@ -36,6 +37,7 @@ __all__ = [
     "Pressure",
     "Solution",
     "Support",
+    "Work",
     "criteria",
     "growth",
     "propagate",

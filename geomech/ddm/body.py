@@ -27,6 +27,7 @@ from .contact import settle_faces
 from .crack_system import CrackSystem
 from .face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
 from .friction import FaceEquations
+from .functionals import TipFunctionals
 from .influence import ElementSet, influence, reuse
 from .iterative import compressed, is_compressed
 from .loads import BodyLoad
@@ -34,8 +35,9 @@ from .mesh import Mesh, mesh, outline_edges
 from .placing import OFF
 from .solution import Solution
 from .supports import Holds, Support, called, marks, place, values_at
-from .unit_loads import UnitLoads, on_elements
+from .unit_loads import UnitLoad, UnitLoads, on_elements
 from .validity import check_cracks, check_outline, outlined
+from .work import Work
 
 
 class Body:
@@ -45,7 +47,7 @@ class Body:
     more of them, which may run either way, in the infinite plane too. ``cracks``: those of this body. ``previous``: an
     earlier body of which whatever is unchanged, element by element, is reused: growth costs the rows and columns of the
     new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of a crack segment counts in
-    them. ``counts`` tells what was done. Raises ValueError naming the item on geometry that is no body,
+    them. ``counts`` tells what making it took, ``work`` what was done since by all bodies that share it. Raises ValueError naming the item on geometry that is no body,
     numpy.linalg.LinAlgError when cracks cut a part off.
     """
 
@@ -59,6 +61,7 @@ class Body:
         holes: Sequence[np.ndarray] = (),
         supports: Sequence[Support] = (),
         face_laws: Sequence[JointLaw] = SMOOTH,
+        work: Work | None = None,
     ):
         self.material, self.cracks = material, cracks
         self.settings = settings = for_target(DdmSettings() if settings is None else settings)
@@ -72,6 +75,7 @@ class Body:
         ):
             previous = None
         self.counts = {"elements": 0, "elements_new": 0, "boundary_assemblies": 0, "boundary_factorisations": 0}
+        self.work = Work() if work is None else work
         given = [*loops, *holes]
         same = previous is not None and _same_loops(previous._given_loops, given)
         if not same and self.supports:
@@ -99,6 +103,7 @@ class Body:
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
         self.compressed = is_compressed(settings.solver, self.faces.n_unknowns)
+        self._functionals: tuple[tuple, TipFunctionals] | None = None
         self._assemble(previous)
 
     @property
@@ -122,7 +127,7 @@ class Body:
         nu, tol = self.nu, self._tol
         c, old = self.faces, previous
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
-        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, old._outside if old else None)
+        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, old._outside if old else None, work=self.work)
         self._outside = system
         self.boundary = g = system.elements
         g_old, same_boundary = system.at_old, system.unchanged
@@ -131,6 +136,10 @@ class Body:
         self.counts["elements_new"] = int((g_old < 0).sum() + (c_old < 0).sum())
         if not same_boundary:
             self.counts["boundary_assemblies"] = self.counts["boundary_factorisations"] = int(g.n > 0)
+        self.work.boundary_assemblies += self.counts["boundary_assemblies"]
+        self.work.boundary_factorisations += self.counts["boundary_factorisations"]
+        self.work.elements_assembled += self.counts["elements_new"]
+        self.work.bodies += 1
 
         def block(rows, columns):
             return lambda r, k: influence(rows.take(r), columns.take(k), nu, tol)
@@ -162,7 +171,8 @@ class Body:
         def schur(r, k):
             return cc(r, k) - self._cg[c.unknowns(r)] @ self._w[:, c.unknowns(k)]
 
-        self.crack_system = CrackSystem(reuse(old.crack_system.matrix if kept else None, c_old, c_old, c, c, schur))
+        known = old.crack_system.matrix if kept else None
+        self.crack_system = CrackSystem(reuse(known, c_old, c_old, c, c, schur), self.work)
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times what the supports hold of displacement, less that of particular fields."""
@@ -194,14 +204,29 @@ class Body:
     ) -> Solution:
         """The body under ``load``.
 
-        ``history``: the solution, of this or an earlier body, from which the load went on to this one, or its ``memory``. Faces with
-        friction begin with its slip and its broken cement, so that the answer is a step of a process; without it they
-        begin as if never loaded. ``warm``: a solution whose face states are no more than the first guess of the
+        ``history``: the solution, of this or an earlier body, from which the load went on to this one, or its
+        ``memory``. Faces with friction begin with its slip and its broken cement, so that the answer is a step of a
+        process; without it they begin as if never loaded. ``warm``: a solution whose face states are no more than the first guess of the
         contact, by default ``history``; smooth faces have no memory and need nothing else.
 
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
         `faces.NotConverged` when the contact of crack faces does not settle.
         """
+        applied, units, rest, imposed = self.lay_out(load, equilibrium_tolerance)
+        g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
+        pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
+        answer = settle_faces(self, reduced, opened, pressure, warm, history)
+        self.work.solutions += 1
+        self.work.contact_solves += answer.solves
+        on_edges = [unit.densities @ size for unit, size in units if unit.densities is not None]
+        edge_density = sum(on_edges) if on_edges else None
+        return Solution(self, applied, y, answer, g, r, imposed, edge_density)
+
+    def lay_out(
+        self, load: BodyLoad, equilibrium_tolerance: float = np.inf
+    ) -> tuple[Applied, list[tuple[UnitLoad, np.ndarray]], np.ndarray, np.ndarray]:
+        """What ``load`` comes to here: fields and line forces, the unit loads in it with their sizes, traction (n,) on
+        boundary and cracks besides, and the displacement that supports impose."""
         applied = apply(load, self)
         if self.outlined:
             check_equilibrium(applied, self, equilibrium_tolerance)
@@ -217,13 +242,16 @@ class Body:
         if self.supports:
             imposed = self._imposed(applied)
             rest += np.concatenate([self._outside.known @ imposed, self._c_known @ imposed])
-        units = self._loads.of(applied)
-        g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
-        pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
-        answer = settle_faces(self, reduced, opened, pressure, warm, history)
-        on_edges = [unit.densities @ size for unit, size in units if unit.densities is not None]
-        edge_density = sum(on_edges) if on_edges else None
-        return Solution(self, applied, y, answer, g, r, imposed, edge_density)
+        return applied, self._loads.of(applied), rest, imposed
+
+    def k_functionals(self, solution: Solution | None = None) -> TipFunctionals:
+        """K_I and K_II of all tips as functions of the load, for the face states of ``solution`` (all open if None); kept
+        until others are asked for."""
+        began = None if solution is None else solution.began
+        key = (b"" if solution is None else solution.face_states.key), began
+        if self._functionals is None or self._functionals[0][0] != key[0] or self._functionals[0][1] is not began:
+            self._functionals = key, TipFunctionals(self, solution)
+        return self._functionals[1]
 
     @cached_property
     def laws(self) -> FaceLaws:
@@ -232,9 +260,14 @@ class Body:
         return FaceLaws(self.face_laws, self.faces, cracks.aperture, cracks.law, 2 * self.material.shear_modulus)
 
     @cached_property
+    def never_loaded(self) -> FaceMemory:
+        """What faces remember that have no history."""
+        return FaceMemory.none(self.faces)
+
+    @cached_property
     def face_equations(self) -> FaceEquations:
         """The equations of crack faces in any state of contact."""
-        return FaceEquations(self.crack_system, self.laws)
+        return FaceEquations(self.crack_system, self.laws, self.work)
 
     @cached_property
     def tip_elements(self) -> tuple[np.ndarray, ...]:

@@ -15,6 +15,7 @@ from .factor import Factor
 from .influence import ElementSet, influence, reuse
 from .mesh import Mesh
 from .supports import Holds
+from .work import Work
 
 
 class BoundarySystem:
@@ -41,9 +42,11 @@ class BoundarySystem:
         extent: float,
         holds: Holds | None = None,
         previous: BoundarySystem | None = None,
+        *,
+        work: Work,
     ):
         g = mesh.boundary
-        self._nu, self._tol = nu, tol
+        self._nu, self._tol, self.work = nu, tol, work
         self.at_old = at_old = g.found_in(previous.elements if previous else None)
         self.unchanged = previous is not None and g.n == previous.elements.n and np.array_equal(at_old, np.arange(g.n))
         if self.unchanged:
@@ -82,6 +85,7 @@ class BoundarySystem:
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions."""
+        self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
         return self.factor.solve(np.asfortranarray(right))
 
     def times(self, u: np.ndarray, lifted: np.ndarray) -> np.ndarray:

@@ -83,7 +83,7 @@ def _rough(
     history: Solution | FaceMemory | None,
 ) -> FaceAnswer:
     laws = body.laws
-    began = FaceMemory.none(body.faces) if history is None else _memory(history, body)
+    began = body.never_loaded if history is None else _memory(history, body)
     first = history if warm is None else warm
     guess: FaceStates | None = None if first is None else _memory(first, body).states
     w, reaction, memory, solves = settle_rough(body.face_equations, right, began, guess)

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from .factor import Factor
+from .work import Work
 
 #: Reciprocal condition of S below which contact is not built on its inverse.
 _SAFE = 1e-11
@@ -35,8 +36,8 @@ class Rows:
 class CrackSystem:
     """``matrix`` (n, n) is S; factors and columns of its inverse are made when first asked for, and kept."""
 
-    def __init__(self, matrix: np.ndarray):
-        self.matrix = matrix
+    def __init__(self, matrix: np.ndarray, work: Work | None = None):
+        self.matrix, self._work = matrix, Work() if work is None else work
         self.n = len(matrix)
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(self.n, -1)
@@ -45,7 +46,10 @@ class CrackSystem:
 
     def opened(self, right: np.ndarray) -> np.ndarray:
         """S⁻¹ ``right``; zeros where it is not to be used (no `open_factor`)."""
-        return np.zeros_like(right) if self.open_factor is None else self.open_factor.solve(np.asfortranarray(right))
+        if self.open_factor is None:
+            return np.zeros_like(right)
+        self._work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
+        return self.open_factor.solve(np.asfortranarray(right))
 
     def constrained(
         self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray, opened: np.ndarray | None = None
@@ -58,7 +62,7 @@ class CrackSystem:
         at = np.flatnonzero(closed)
         reaction = np.zeros_like(right)
         if self.open_factor is not None:
-            w = self.open_factor.solve(right) if opened is None else opened.copy()
+            w = self.opened(right) if opened is None else opened.copy()
             if len(at):
                 columns, factor = self._held_columns(at)
                 reaction[at] = factor.solve(w[at] - fixed[at])
@@ -69,6 +73,7 @@ class CrackSystem:
         w = np.zeros_like(right)
         w[at] = fixed[at]
         w[free] = factor.solve((right - self.matrix @ w)[free])
+        self._work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
         reaction[at] = (right - self.matrix @ w)[at]
         return w, reaction
 
@@ -92,6 +97,7 @@ class CrackSystem:
     def open_factor(self) -> Factor | None:
         """Factors of S with all faces open; None when only closed faces hold a part of the body."""
         try:
+            self._work.crack_factorisations += 1
             factor = Factor(self.matrix, "cracks cut a part of the body off")
         except np.linalg.LinAlgError:
             return None
@@ -106,6 +112,7 @@ class CrackSystem:
             free = np.flatnonzero(~closed)
             matrix = self.matrix if len(free) == len(closed) else self.matrix[np.ix_(free, free)]
             self._factors[key] = free, Factor(matrix, "cracks cut a part of the body off")
+            self._work.crack_factorisations += 1
         return self._factors[key]
 
     def _inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
@@ -115,7 +122,7 @@ class CrackSystem:
             right = np.zeros((self.n, len(missing)), order="F")
             right[missing, np.arange(len(missing))] = 1.0
             self._column_at[missing] = self._columns.shape[1] + np.arange(len(missing))
-            self._columns = np.hstack([self._columns, self.open_factor.solve(right)])
+            self._columns = np.hstack([self._columns, self.opened(right)])
         return self._columns[:, self._column_at[unknowns]]
 
     def _held_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:

@@ -27,6 +27,7 @@ from .face_laws import FaceLaws, FaceMemory, FaceStates
 from .faces import NotConverged
 from .factor import Factor
 from .iterative import Iterated, IterativeCrackSystem
+from .work import Work
 
 #: Violations allowed, in units of the largest stress (and the opening that it makes).
 TOLERANCE = 1e-10
@@ -41,10 +42,9 @@ _KEPT = 8
 class FaceEquations:
     """The linear equations of nodes in given states: ``system`` with rows and columns changed as ``laws`` ask."""
 
-    def __init__(self, system: CrackSystem | IterativeCrackSystem, laws: FaceLaws):
-        self.system, self.laws = system, laws
+    def __init__(self, system: CrackSystem | IterativeCrackSystem, laws: FaceLaws, work: Work):
+        self.system, self.laws, self._work = system, laws, work
         self._factors: dict[bytes, tuple[np.ndarray, Factor | Iterated]] = {}
-        self.factorisations = 0
 
     def solve(
         self, right: np.ndarray, states: FaceStates, memory: FaceMemory, limit: np.ndarray | None = None
@@ -66,6 +66,7 @@ class FaceEquations:
         known = right + extra - pull
         known[t] -= slides * pull[a]
         w[free] = factor.solve(known[free])
+        self._work.back_substitutions += 1
         reaction = np.zeros_like(right)
         missing = right - s @ w
         closed = states.closed
@@ -85,6 +86,7 @@ class FaceEquations:
         w = np.zeros_like(right)
         free, factor = self._factor(states, False)
         w[free] = factor.solve(np.asfortranarray(self._mixed(right, states)[free]))
+        self._work.back_substitutions += right.shape[1]
         return w
 
     def adjoint(self, weights: np.ndarray, states: FaceStates) -> np.ndarray:
@@ -93,6 +95,7 @@ class FaceEquations:
         free, factor = self._factor(states, False)
         out = np.zeros_like(weights)
         out[free] = factor.solve(weights[free], transposed=True)
+        self._work.back_substitutions += weights.shape[1]
         out[laws.across] += self._rows(states, False)[1][:, None] * out[laws.along]
         return out
 
@@ -126,7 +129,7 @@ class FaceEquations:
             mixed = np.zeros(self.system.n)
             mixed[self.laws.along] = slides
             self._factors[key] = self.system.changed(Rows(held, mixed, spring, self.laws.elements.per))
-            self.factorisations += 1
+            self._work.crack_factorisations += 1
         return self._factors[key]
 
 

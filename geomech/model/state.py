@@ -136,6 +136,7 @@ class Cycle:
                 in reference coordinates, for interior fields
     monitors    name → displacement (2,) of the monitor point, m
     statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
+    work        what the crack solver has done so far: assemblies, factorisations, back-substitutions, contact solves
     seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
     """
 
@@ -154,6 +155,7 @@ class Cycle:
     monitors: dict[str, np.ndarray] = field(default_factory=dict)
     statistics: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+    work: dict[str, int] = field(default_factory=dict)
 
     @cached_property
     def motion(self) -> Motion:

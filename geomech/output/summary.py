@@ -53,6 +53,8 @@ class Summary:
         seconds = summary.setdefault("seconds", {})
         if last is not None:
             seconds.update({phase: round(value, 4) for phase, value in last.seconds.items()})
+        if last is not None and last.work:
+            summary["crack_solver"] = last.work
         first: dict[str, dict[str, Any]] = {}
         counts: dict[str, int] = {}
         for event in self._events:

@@ -144,3 +144,52 @@ def test_bad_laws_are_refused_by_name():
         plane([LINE], ROUGH, law=1, names=["a"])
     with pytest.raises(ValueError, match="'a'.*aperture.*'glue'"):
         plane([LINE], JointLaw("glue", tensile_strength=1e6), aperture=1e-3, names=["a"])
+
+
+BLOCK = np.array([[-2, -3], [2, -3], [2, 3], [-2, 3.0]])
+
+
+def pressed(sideways, down, tilt=0.0):
+    """Linear tractions on all sides of `BLOCK`, in equilibrium: the stress field of a bent column."""
+    sides = np.stack([BLOCK, np.roll(BLOCK, -1, axis=0)], axis=1)
+    t = np.zeros((4, 2, 2))
+    for k, normal in enumerate(([0, -1], [1, 0], [0, 1], [-1, 0])):
+        for e in range(2):
+            t[k, e] = np.array([sideways, down + tilt * sides[k, e, 0]]) * normal
+    return ddm.BodyLoad(segments=sides, tractions=t)
+
+
+@pytest.mark.parametrize("law", [JointLaw("smooth"), ROUGH, JointLaw("filled", 0.3, 2e5, 0.0, 4e10, 1e10)])
+def test_functionals_of_the_tips_are_the_solution(law):
+    """With the states of one load, factors under another come from a dot product: the solve's, where states are the
+    same, to round-off."""
+    cracks = Cracks.from_polylines([LINE, LINE * [1, -1] + [0.3, 1.9]])
+    body = ddm.Body([BLOCK], cracks, ROCK, DdmSettings(order=4), face_laws=(law,))
+    for one, other in (((-1e6, -20e6), (-1.1e6, -22e6)), ((2e6, 3e6, 1e5), (2e6, 3.1e6, 0.0))):
+        sol = body.solve(pressed(*one))
+        again = body.solve(pressed(*other))
+        np.testing.assert_array_equal(sol.face_states.key, again.face_states.key)
+        k = body.k_functionals(sol)
+        assert body.k_functionals(again) is k
+        for load, solved in ((one, sol), (other, again)):
+            expected = np.stack([solved.tips["k_i"], solved.tips["k_ii"]], axis=1)
+            np.testing.assert_allclose(k(pressed(*load)), expected, atol=1e-12 * np.abs(expected).max())
+            assert (k.bound(pressed(*load)) >= np.abs(expected) * (1 - 1e-12)).all()
+    # The bound holds for every distribution of tractions that is no larger.
+    rng = np.random.default_rng(0)
+    load = pressed(-1e6, -1e6)
+    signs = ddm.BodyLoad(segments=load.segments, tractions=rng.uniform(-1e6, 1e6, (4, 2, 2)))
+    assert (np.abs(body.k_functionals()(signs)) <= body.k_functionals().bound(load)).all()
+
+
+def test_work_is_counted_from_body_to_body():
+    body = ddm.Body([BLOCK], Cracks.from_polylines([LINE]), ROCK)
+    first = body.solve(pressed(-1e6, -20e6))
+    assert (body.work.boundary_factorisations, body.work.solutions) == (1, 1)
+    assert body.work.contact_solves == first.solves and body.work.crack_factorisations >= 1
+    before = vars(body.work).copy()
+    longer = Cracks.from_polylines([LINE, LINE + [0.2, 1.0]])
+    again = ddm.Body([BLOCK], longer, ROCK, previous=body, work=body.work)
+    again.solve(pressed(-1e6, -20e6), warm=first)
+    assert again.work.bodies == 2 and again.work.boundary_assemblies == before["boundary_assemblies"] == 1
+    assert again.work.elements_assembled - before["elements_assembled"] == again.counts["elements_new"]

@@ -1,0 +1,26 @@
+"""What solving has taken: counts that go on from body to body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(eq=False)
+class Work:
+    """Counts of work; bodies that are given the same one add to it.
+
+    bodies, elements_assembled     geometries, and elements whose influence on others was worked out
+    boundary_assemblies, boundary_factorisations     of A_ΓΓ
+    crack_factorisations           of the crack unknowns' equations, whole or with nodes held
+    back_substitutions             right-hand sides solved for with these
+    solutions, contact_solves      loads solved for, and passes of the contact of crack faces in them
+    """
+
+    bodies: int = 0
+    elements_assembled: int = 0
+    boundary_assemblies: int = 0
+    boundary_factorisations: int = 0
+    crack_factorisations: int = 0
+    back_substitutions: int = 0
+    solutions: int = 0
+    contact_solves: int = 0
