@@ -131,7 +131,7 @@ class _Run:
             yield Step(self.number, self.factor, cracks, self.solution, tips, growth, events)
             if growth is None:
                 return
-            cracks, joined = growth.cracks, bool(growth.joins)
+            cracks, joined = growth.cracks, joined or bool(growth.joins)
 
     def _body(self, cracks: Cracks, previous: Body | None) -> Body:
         return Body(self.loops, cracks, self.material, self.settings, previous=previous, **self.options)
@@ -144,7 +144,9 @@ class _Run:
         return self.load if factor == 1.0 else self.load.scaled(factor)
 
     def _solve(self, body: Body, factor: float) -> tuple[Solution, np.ndarray]:
-        solution = body.solve(self._load_at(factor, body.cracks), warm=self.solution)
+        # Rough faces go on from what they had slipped by in the last step; smooth ones forget.
+        history = self.solution if body.rough else None
+        solution = body.solve(self._load_at(factor, body.cracks), warm=self.solution, history=history)
         tips = solution.tips.copy()
         tips["angle"], tips["k_eq"] = CRITERIA[self.growth.criterion](tips["k_i"], tips["k_ii"], self.material)
         return solution, tips

@@ -1,17 +1,20 @@
 """A borehole in unequal stress: what the crack solver alone makes of its wall, without blocks.
 
-Breakout: both remote stresses rise in proportion, the wall fails in shear. Mud pressure: the stresses stand, the pressure in
+Breakout: both remote stresses rise in proportion until the wall fails in shear and a chip comes off. Shear: under stresses
+somewhat above that, in rock that shears more easily than it tears, cracks whose faces rub run into the wall and stop where
+the hole no longer drives them. Mud pressure: the stresses stand, the pressure in
 the hole and in what it opens rises until the wall tears, and then only as far as the fracture lets it.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from geomech import ddm
-from geomech.model import Cracks, GrowthSettings, Material
+from geomech.model import Cracks, GrowthSettings, JointLaw, Material
 
 RADIUS = 0.1
 #: Remote compression: σ_H along x, σ_h along y, Pa.
@@ -28,7 +31,9 @@ ROCK = Material(
 )
 #: Sides of the polygon for the hole; the middles of four of them lie on the axes.
 SIDES = 72
-VARIANTS = ("breakout", "mud_pressure")
+VARIANTS = ("breakout", "shear", "mud_pressure")
+#: In "shear": toughness in shear, Pa √m, friction of the new faces, remote stresses as multiples of the above.
+WEAK_IN_SHEAR, FRICTION, ABOVE = 1e6, 0.7, 1.15
 
 
 def wall(sides: int = SIDES) -> np.ndarray:
@@ -37,15 +42,22 @@ def wall(sides: int = SIDES) -> np.ndarray:
     return RADIUS / math.sqrt(math.cos(math.pi / sides)) * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def steps(variant: str, sides: int = SIDES, most: int | None = None) -> list:
-    """All steps of a ``variant``, or the first ``most``. Load factors are multiples of the remote stresses in "breakout", MPa in "mud_pressure"."""
+def steps(variant: str, sides: int = SIDES, most: int | None = None, increment: float | None = None) -> list:
+    """All steps of a ``variant``, or the first ``most``. Load factors are multiples of the remote stresses in "breakout", MPa in
+    "mud_pressure", one in "shear"; ``sides`` of the polygon for the hole; ``increment`` m, unset each variant's own."""
     remote = -np.array([GREATER, LESSER, 0.0])
+    rock, control, options = ROCK, "toughness", {}
     if variant == "breakout":
-        increment, most = 0.02 * RADIUS, most or 20
+        increment, most = increment or 0.02 * RADIUS, most or 20
         # Chips come off by shear at first: tension and shear each have their own toughness.
         criterion, load = "f", ddm.BodyLoad(remote_stress=remote)
+    elif variant == "shear":
+        increment, most = increment or 0.04 * RADIUS, most or 60
+        criterion, load, control = "f", ddm.BodyLoad(remote_stress=ABOVE * remote), "load"
+        rock = replace(ROCK, k_iic=WEAK_IN_SHEAR)
+        options["face_laws"] = (JointLaw("rough", friction_angle=math.atan(FRICTION)),)
     elif variant == "mud_pressure":
-        increment, most = 0.1 * RADIUS, most or 17
+        increment, most = increment or 0.1 * RADIUS, most or 17
         criterion = "mts"
 
         def load(pressure, cracks):
@@ -55,7 +67,8 @@ def steps(variant: str, sides: int = SIDES, most: int | None = None) -> list:
     # The spacing leaves room for one crack on either side of the hole.
     growth = GrowthSettings(criterion=criterion, increment=increment, initiation="surface", initiation_spacing=RADIUS)
     none = Cracks.from_polylines([])
-    return list(ddm.propagate([], none, ROCK, load, growth, control="toughness", max_steps=most, holes=[wall(sides)]))
+    run = ddm.propagate([], none, rock, load, growth, control=control, max_steps=most, holes=[wall(sides)], **options)
+    return list(run)
 
 
 def last_network(run: list) -> Cracks:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from borehole import GREATER, LESSER, RADIUS, ROCK, azimuths, last_network
+from borehole import ABOVE, FRICTION, GREATER, LESSER, RADIUS, ROCK, WEAK_IN_SHEAR, azimuths, last_network
 
 from geomech.reference.borehole import breakdown_pressure, breakout_ratio
 from geomech.reference.cracked_hole import factor
@@ -39,8 +39,14 @@ def chips(run: list) -> tuple[float, float]:
     if len(mouths) < 2:
         return math.nan, math.nan
     turn = np.degrees(np.arctan2(mouths[:, 1], mouths[:, 0]))
-    deepest = np.hypot(*cracks.nodes[nodes].T).max()
-    return float(np.ptp(turn)), float(deepest / RADIUS - 1)
+    return float(np.ptp(turn)), depth(run, 0)
+
+
+def depth(run: list, crack: int | None = None) -> float:
+    """How far cracks, or one of them, reach into the rock, parts of the radius."""
+    cracks = last_network(run)
+    own = slice(None) if crack is None else cracks.crack == crack
+    return float(np.hypot(*cracks.nodes[cracks.segments[own]].reshape(-1, 2).T).max() / RADIUS - 1)
 
 
 def report(runs: Mapping[str, list]) -> str:
@@ -50,16 +56,28 @@ def report(runs: Mapping[str, list]) -> str:
         run = runs["breakout"]
         found = onset(run)
         expected = breakout_ratio(GREATER, LESSER, ROCK.cohesion, ROCK.friction_angle)
-        width, depth = chips(run)
+        width, deep = chips(run)
         lines += [
             "Breakout, remote stresses rising in proportion",
             f"  onset at {found:.4f} of them; 2c cos φ/(1 − sin φ) over 3σ_H − σ_h: {expected:.4f}",
             f"  at {', '.join(f'{a:.1f}°' for a in azimuths(run))} from σ_H (Bell & Gough 1979: 90°, the wall that faces σ_h)",
-            f"  first chip: {width:.1f}° of the wall, {depth:.3f} radii deep",
+            f"  first chip: {width:.1f}° of the wall, {deep:.3f} radii deep",
             f"  its crack stands at K_Ic down to {min(step.load_factor for step in run):.3f} of the stresses",
         ]
         assert abs(found / expected - 1) < STRESS_TOLERANCE, "onset of the breakout is off Kirsch's hoop stress"
         assert np.abs(azimuths(run) - 90).max() < AZIMUTH_TOLERANCE_DEG, "the breakout is off the lesser stress"
+    if "shear" in runs:
+        run = runs["shear"]
+        drive = [step.tips["k_eq"].max(initial=0.0) / ROCK.k_ic for step in run]
+        lines += [
+            f"Shear cracks, friction {FRICTION}, K_IIc {WEAK_IN_SHEAR / 1e6} MPa √m, at {ABOVE} of the remote stresses",
+            f"  born at {', '.join(f'{a:.1f}°' for a in azimuths(run)[:2])} from σ_H",
+            f"  K_eq/K_Ic {drive[1]:.2f} at first, at most {max(drive):.2f}; they stop {depth(run):.3f} radii in the rock",
+        ]
+        assert run[-1].events[-1].kind == "arrest", "the shear cracks do not stop"
+        assert np.abs(azimuths(run)[:2] - 90).max() < AZIMUTH_TOLERANCE_DEG, (
+            "the shear cracks are off the lesser stress"
+        )
     if "mud_pressure" in runs:
         run = runs["mud_pressure"]
         found = onset(run)

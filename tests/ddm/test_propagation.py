@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.model import Cracks, GrowthSettings, Material
+from geomech.model import Cracks, GrowthSettings, JointLaw, Material
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=1e6)
 HALF = 10e-3
@@ -100,6 +100,22 @@ def test_a_strip_is_torn_in_two():
     assert [e.kind for e in before.events] == ["daylighting", "daylighting"]
     assert last.solution is None and [e.kind for e in last.events] == ["split"]
     assert last.cracks.surface.sum() == 2 and last.cracks.lengths.sum() == pytest.approx(0.06, rel=1e-12)
+
+
+def test_a_closed_crack_that_rubs_starts_late():
+    """K_II = (|τ| − μ|σ_n|)√(πa) and K_eq = 2/√3 K_II (Erdogan & Sih 1963) at 45° to a pressure; its wings then open, and
+    need more and more. The slip goes on from step to step."""
+    end = HALF * math.sqrt(0.5) * np.ones(2)
+    rough = (JointLaw("rough", friction_angle=math.atan(0.3)),)
+    load = ddm.BodyLoad(remote_stress=[0.0, -1e6, 0.0])
+    crack = Cracks.from_polylines([np.array([-end, end])])
+    growth = GrowthSettings(increment=1e-3, correct=False)
+    run = list(ddm.propagate([], crack, ROCK, load, growth, control="toughness", max_steps=4, face_laws=rough))
+    shear = 0.5e6 * (1 - 0.3) * math.sqrt(math.pi * HALF)
+    assert run[0].load_factor == pytest.approx(ROCK.k_ic / (2 / math.sqrt(3) * shear), rel=1e-5)
+    assert np.degrees(run[0].tips["angle"]) == pytest.approx(70.5288, abs=1e-3)
+    factors = [step.load_factor for step in run[1:]]
+    assert factors == sorted(factors)
 
 
 def test_bad_wishes_are_refused():

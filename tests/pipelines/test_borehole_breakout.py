@@ -13,7 +13,7 @@ from geomech.cli import DONE, main
 FOLDER = Path(__file__).parents[2] / "pipelines" / "borehole_breakout"
 sys.path.insert(0, str(FOLDER))
 import compare_borehole
-from borehole import GREATER, LESSER, ROCK, azimuths, steps
+from borehole import GREATER, LESSER, RADIUS, ROCK, azimuths, steps
 
 from geomech.reference.borehole import breakdown_pressure, breakout_ratio
 
@@ -40,6 +40,17 @@ def test_onset_and_breakdown_converge_to_the_closed_forms():
             assert np.abs(azimuths(run) - (90 if name == "breakout" else 0)).max() < 1e-3
         print(f"{name}: errors {errors}, observed order {np.log2(errors[0] / errors[1]):.2f}")
         assert errors[1] < 0.5 * errors[0]
+
+
+def test_shear_cracks_stop_where_they_stop_whatever_the_increment():
+    """Half the increment: the same depth, to within the longer one."""
+    depths = []
+    for increment in (8e-3, 4e-3):
+        run = steps("shear", increment=increment)
+        assert run[-1].events[-1].kind == "arrest"
+        depths.append(compare_borehole.depth(run))
+    print(f"arrested at {depths} radii")
+    assert abs(depths[0] - depths[1]) * RADIUS < 8e-3
 
 
 def test_a_variant_that_is_not_there_is_refused(tmp_path, capsys):
