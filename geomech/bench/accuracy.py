@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-PIPELINE = Path("pipelines/two_cracks")
+from . import crack_accuracy
+from .crack_accuracy import Row, pulled
 
-#: (case, computed, reference, source)
-Row = tuple[str, float, float, str]
+PIPELINE = Path("pipelines/two_cracks")
 
 
 def measure(quick: bool = False) -> str:
     """The table; ``quick`` changes nothing, it is quick. The last rows need ``pipelines/two_cracks`` (run it in the
     project's folder) and are left out elsewhere."""
-    rows = [*_cracks(), *_blocks()]
+    rows = [*crack_accuracy.rows(), *_blocks()]
     if PIPELINE.is_dir():
         rows += _coupled()
     width = max(len(row[0]) for row in rows)
@@ -27,60 +27,6 @@ def measure(quick: bool = False) -> str:
         error = abs(computed / reference - 1) if reference else abs(computed)
         lines.append(f"{case:<{width}}  {computed:>14.8g}  {reference:>14.8g}  {error:8.1e}  {source}")
     return "\n".join(lines)
-
-
-def _rectangle(half_width: float, half_height: float) -> np.ndarray:
-    w, h = half_width, half_height
-    return np.array([[-w, -h], [w, -h], [w, h], [-w, h]])
-
-
-def _pulled(half_width: float, half_height: float, stress: float = 1.0):
-    from ..ddm import BodyLoad
-
-    (a, b), pull = _rectangle(half_width, half_height)[[0, 2]], np.array([0.0, stress])
-    c, d = np.array([b[0], a[1]]), np.array([a[0], b[1]])
-    return BodyLoad(segments=np.array([[a, c], [b, d]]), tractions=np.array([[-pull, -pull], [pull, pull]]))
-
-
-def _cracks() -> Iterator[Row]:
-    from ..ddm import Body, BodyLoad
-    from ..model import Cracks, DdmSettings, Material
-    from ..reference import fracture, two_cracks
-
-    rock = Material("rock", 17e9, 0.21)
-
-    def crack(*ends, **options) -> Cracks:
-        return Cracks.from_polylines([np.array(pair, dtype=float) for pair in ends], aperture=math.inf, **options)
-
-    tension = BodyLoad(remote_stress=np.array([0.0, 1.0, 0.0]))
-    one = crack([[-1, 0], [1, 0]])
-    for order in (2, 4, 8):
-        k = Body([], one, rock, DdmSettings(order=order)).solve(tension).tips["k_i"][0]
-        yield f"Griffith crack, order {order}: K_I", k, fracture.griffith(1.0, 1.0), "closed form"
-    pair = crack([[-1, 0], [-0.2, 0]], [[0.2, 0], [1, 0]])
-    k = Body([], pair, rock, DdmSettings(order=8)).solve(tension).tips["k_i"]
-    inner, outer = fracture.collinear_pair(1.0, 0.2, 1.0)
-    yield "collinear pair, order 8: inner K_I", k[1], inner, "Willmore 1949"
-    yield "collinear pair, order 8: outer K_I", k[0], outer, "Willmore 1949"
-    closed = Cracks.from_polylines([np.array([[-1.0, -1.0], [1.0, 1.0]]) / math.sqrt(2)])
-    tips = Body([], closed, rock).solve(BodyLoad(remote_stress=np.array([0.0, -1.0, 0.0]))).tips
-    _, k_ii = fracture.closed(np.array([0.0, -1.0, 0.0]), math.pi / 4, 1.0)
-    yield "closed crack at 45° under compression: K_II", tips["k_ii"][0], k_ii, "closed form"
-    yield "the same: K_I", tips["k_i"][0], 0.0, "closed form"
-    for ratio, factor in fracture.CENTRE_CRACK_HALF.items():
-        body = Body([_rectangle(1.0, ratio)], crack([[-0.5, 0], [0.5, 0]]), rock)
-        k = body.solve(_pulled(1.0, ratio)).tips["k_i"][0] / fracture.griffith(1.0, 0.5)
-        yield f"centre crack a/W = 0.5, H/W = {ratio:g}: F", k, factor, "computed independently"
-    edge = crack([[-0.5, 0], [0, 0]], surface=[(True, False)])
-    k = Body([_rectangle(0.5, 1.5)], edge, rock).solve(_pulled(0.5, 1.5)).tips["k_i"][0] / fracture.griffith(1.0, 0.5)
-    yield "edge crack a/W = 0.5: F", k, fracture.EDGE_CRACK[0.5], "Kaya & Erdogan 1987"
-    for phi in two_cracks.OPEN_SLOT_K_I:
-        slots = crack(*two_cracks.crack_ends(phi))
-        tips = Body([_rectangle(0.03, 0.06)], slots, rock).solve(_pulled(0.03, 0.06, -1.0)).tips
-        for name, table in (("K_I", two_cracks.OPEN_SLOT_K_I), ("K_II", two_cracks.OPEN_SLOT_K_II)):
-            found = tips["k_i" if name == "K_I" else "k_ii"]
-            at = int(np.argmax(np.abs(found - table[phi])))
-            yield f"two slots, φ = {phi}: {name} of the worst tip", found[at], table[phi][at], "computed independently"
 
 
 def _blocks() -> Iterator[Row]:
@@ -121,7 +67,7 @@ def _coupled() -> Iterator[Row]:
         *_, last = cycles(problem)
         rock = problem.materials[problem.blocks.material[0]]
         body = Body(problem.blocks.loops(0), problem.cracks, rock, problem.ddm)
-        alone = body.solve(_pulled(0.03, 0.06, -last.load))
+        alone = body.solve(pulled(0.03, 0.06, -last.load))
         at = int(np.argmax(np.abs(last.tips["k_i"] - alone.tips["k_i"])))
         yield (
             f"two_cracks φ = {phi}, coupled: K_I of the worst tip",

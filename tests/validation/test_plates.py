@@ -73,7 +73,8 @@ def test_edge_crack(ratio):
 @pytest.mark.parametrize("ratio", [0.2, 0.5, 0.7])
 def test_three_point_bending(ratio):
     """Span four times the depth. Loads spread over b to either side, with elements as long as b next to where they end:
-    converged to 1e-4 in b, order and elements. Srawley (1976) states 0.5 %; we find him 1.1, 0.7 and 0.2 % high."""
+    converged to 1e-4 in b, order and elements. Srawley (1976) states 0.5 %; we find him 1.1, 0.7 and 0.2 % high, and
+    finite elements with a J-integral tend to the same (within 5e-4 on 33 000 unknowns)."""
     depth, half, b = 1.0, 2.2, 0.01
     steps = b * np.array([-13, -6, -3, -1, 0, 1, 3, 6, 13])
     below = np.concatenate([[-half], -2 + steps, 2 + steps, [half]])
