@@ -18,21 +18,15 @@ import numpy as np
 
 from ..model import Cracks, DdmSettings
 from ..model.polygon import signed_area
-from . import proximity, shapes
+from . import shapes
 from .grading import KINK, Grading
 from .influence import ElementSet
+from .proximity import keep_apart
 
 #: Neighbouring segments whose elements differ more than this in length are graded.
 JUMP = 10.0
 #: Increments between a slight kink and the tip from which the kink is not graded any more.
 FORGOTTEN = 3
-#: Longest element in units of its distance to another one. Its density then still converges like 3.5^−p.
-APART = 1.25
-#: The same for opposite sides of a body: what is left of equilibrium errors in a slender one is amplified by its
-#: slenderness squared.
-ACROSS = 0.6
-#: Elements are not halved below this part of the largest extent of the geometry.
-FLOOR = 1e-5
 #: A mouth nearer to an element's end than this part of its length moves the end instead of cutting a sliver.
 SLIVER = 0.08
 
@@ -69,9 +63,11 @@ def mesh(
     crack = _cracks(cracks, settings, grading, extent, edges)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
-    start, end, kind, source = _halved(
-        start, end, kind, source, _touching(edges, cracks, extent), len(edges), settings.grading_ratio, FLOOR * extent
-    )
+    pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
+    start, end, kind, source = keep_apart(
+        start, end, kind, source, pieces, _touching(edges, cracks, extent), len(edges), settings.grading_ratio, extent,
+        2 * (settings.order + 1),
+    )  # fmt: skip
     on_crack = source >= len(edges)
     rest = ~on_crack
     # A rigid rotation of a boundary must be in its elements' span, or it is not without stress.
@@ -321,33 +317,3 @@ def _touching(edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
             out[n_edges + s, :n_edges] |= met
             out[:n_edges, n_edges + s] |= met
     return out
-
-
-def _halved(start, end, kind, source, touching, n_edges, ratio, floor):
-    """Halve what stands too close, until nothing does or the ``floor`` is reached."""
-    # A graded element is 1/ratio times its distance to the next but one.
-    chained = max(2.5, 1.05 / ratio)
-    for _ in range(20):
-        tip = np.where(kind == shapes.ORDINARY, 0, kind)
-        start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
-        ratios = proximity.crowding(start, end, tip, source, touching, n_edges, APART, ACROSS, chained)
-        length = np.hypot(*(end - start).T)
-        cut = (ratios > 1 + 1e-9) & (length > 2 * floor)
-        if not cut.any():
-            break
-        middle = 0.5 * (start + end)
-        at = np.repeat(np.arange(len(start)), np.where(cut, 2, 1))
-        second = np.r_[False, at[1:] == at[:-1]] if len(at) else np.empty(0, bool)
-        first = np.r_[second[1:], False]
-        new_start, new_end, new_kind = start[at], end[at], kind[at]
-        new_end[first] = middle[at[first]]
-        new_start[second] = middle[at[second]]
-        was = kind[at]
-        starts, stops = (
-            (was == shapes.TIP_START) | (was == shapes.TIP_BOTH),
-            (was == shapes.TIP_END) | (was == shapes.TIP_BOTH),
-        )
-        new_kind[first] = np.where(starts, shapes.TIP_START, shapes.ORDINARY)[first]
-        new_kind[second] = np.where(stops, shapes.TIP_END, shapes.ORDINARY)[second]
-        start, end, kind, source = new_start, new_end, new_kind, source[at]
-    return start, end, kind, source

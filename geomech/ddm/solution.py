@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,11 @@ from .reactions import Reactions, reactions
 if TYPE_CHECKING:
     from .body import Body
     from .contact import FaceAnswer
+
+
+#: A residual above this is told to the log.
+WORTH_A_WARNING = 1e-3
+_log = logging.getLogger(__name__)
 
 
 class Solution:
@@ -153,7 +159,8 @@ class Solution:
 
     @cached_property
     def residual(self) -> float:
-        """Largest traction left over at the collocation nodes, relative to the largest applied there."""
+        """Largest traction left over at the collocation nodes, relative to the largest applied there. Mostly what loads,
+        discretised, lack in equilibrium; logs a warning above 1e-3."""
         body = self.body
         # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
         follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
@@ -163,11 +170,14 @@ class Solution:
         )
         scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
-        return left / scale if scale else left
+        residual = left / scale if scale else left
+        if residual > WORTH_A_WARNING:
+            _log.warning("the body's equations are left with a residual of %.1e", residual)
+        return residual
 
     @cached_property
     def condition(self) -> float:
-        """Estimated condition number of the matrices solved with, the worse one."""
+        """Estimated condition number of the matrices solved with, the worse one. Rows are scaled to one size."""
         body = self.body
         cracks = body.crack_system.rcond(self.closed) if not body.rough else body.face_equations.rcond(self.face_states)
         return 1.0 / min(cracks, body._outside.factor.rcond)

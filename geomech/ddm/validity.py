@@ -11,6 +11,9 @@ from ..model.polygon import signed_area
 
 #: Lengths below this part of the extent are zero.
 _SMALL = 1e-9
+#: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: K is off by a few per cent
+#: there, and by more below.
+SHARPEST_FOLD, SHARPEST_MOUTH = np.radians(10.0), np.radians(3.0)
 #: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two thousand.
 _PAIRS_AT_ONCE = 4_000_000
 
@@ -71,8 +74,9 @@ def _checked(loop: np.ndarray, name: str) -> np.ndarray:
 
 def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fresh: np.ndarray | None = None) -> None:
     """Raise ValueError naming the crack: not finite, no length, outside the rock, on the boundary without being a
-    mouth, crossing the outline, crossing or covering another without a shared node. ``fresh`` (n_segments,) bool limits
-    the comparison to segments that are new."""
+    mouth, crossing the outline or lying along it, crossing, covering or touching another without a shared node, folding back
+    on itself or leaving the boundary at an angle too sharp to be resolved. ``fresh`` (n_segments,) bool limits the comparison
+    to segments that are new."""
     n = cracks.n_segments
     if n == 0:
         return
@@ -118,12 +122,73 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
             near = _to_segments(segments[s], edges[j : j + 1])
             if not (mouth[s] & (near <= 1e-7 * span)).any():
                 raise ValueError(f"{name(s)}: crosses the outline near {_near(segments[s])}")
+        for i, _ in _overlaps(segments[new], edges, span):
+            raise ValueError(f"{name(new[i])}: lies along the boundary near {_near(segments[new[i]])}")
+        _check_mouths(cracks, new, edges, span, name)
     for i, j in _crossings(segments[new], segments):
         if new[i] != j:
             raise ValueError(f"{name(new[i])} and {name(j)} cross near {_near(segments[new[i]])} without a shared node")
     for i, j in _overlaps(segments[new], segments, span):
         if new[i] != j:
             raise ValueError(f"{name(new[i])} and {name(j)} coincide near {_near(segments[new[i]])}")
+    _check_touching(cracks, new, span, name)
+    _check_folds(cracks, new, name)
+
+
+def _check_mouths(cracks: Cracks, new: np.ndarray, edges: np.ndarray, span: float, name) -> None:
+    for s, e in np.argwhere(cracks.surface[cracks.segments[new]]):
+        x = cracks.nodes[cracks.segments[new[s], e]]
+        way = cracks.nodes[cracks.segments[new[s], 1 - e]] - x
+        here = edges[_to_pairs(np.broadcast_to(x, (len(edges), 2)), edges) <= 1e-7 * span]
+        # The directions in which the boundary goes on from here.
+        ahead = (here - x).reshape(-1, 2)
+        size = np.hypot(*ahead.T)
+        ahead, size = ahead[size > 1e-7 * span], size[size > 1e-7 * span]
+        if (ahead @ way > np.cos(SHARPEST_MOUTH) * size * np.hypot(*way)).any():
+            raise ValueError(f"{name(new[s])}: leaves the boundary at ({x[0]:g}, {x[1]:g}) at less than 3°")
+
+
+def _check_touching(cracks: Cracks, new: np.ndarray, span: float, name) -> None:
+    """New segments and others one of which ends on the other, where they share no node."""
+    segments = cracks.nodes[cracks.segments]
+    i, j = _boxes_meet(segments[new], segments, _SMALL * span)
+    i = new[i]
+    shared = (cracks.segments[i][:, :, None] == cracks.segments[j][:, None, :]).any(axis=(1, 2))
+    i, j = i[~shared], j[~shared]
+    for first, second in ((i, j), (j, i)):
+        for end in (0, 1):
+            touching = np.flatnonzero(_to_pairs(segments[first, end], segments[second]) <= _SMALL * span)
+            for k in touching[:1]:
+                x, y = segments[first[k], end]
+                raise ValueError(
+                    f"{name(first[k])} and {name(second[k])} touch at ({x:g}, {y:g}) without a shared node"
+                )
+
+
+def _check_folds(cracks: Cracks, new: np.ndarray, name) -> None:
+    flat = cracks.segments.ravel()
+    order = np.argsort(flat, kind="stable")
+    first = np.flatnonzero((cracks.valence[flat[order]] == 2) & ~cracks.surface[flat[order]])[::2]
+    one, two = order[first], order[first + 1] if len(first) else first
+    fresh = np.zeros(cracks.n_segments, bool)
+    fresh[new] = True
+    met = fresh[one // 2] | fresh[two // 2]
+    one, two = one[met], two[met]
+    node = cracks.nodes[flat[one]]
+    # The other end of a segment stands beside this one.
+    u, v = cracks.nodes[flat[one ^ 1]] - node, cracks.nodes[flat[two ^ 1]] - node
+    folded = np.sum(u * v, axis=1) > np.cos(SHARPEST_FOLD) * np.hypot(*u.T) * np.hypot(*v.T)
+    for k in np.flatnonzero(folded)[:1]:
+        x, y = node[k]
+        raise ValueError(f"{name(one[k] // 2)}: folds back on itself at ({x:g}, {y:g}), by more than 170°")
+
+
+def _to_pairs(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
+    """(n,) distance of each of ``points`` (n, 2) to its own segment (n, 2, 2)."""
+    a, d = segments[:, 0], segments[:, 1] - segments[:, 0]
+    rel = points - a
+    s = np.clip(np.sum(rel * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
+    return np.hypot(*(rel - s[:, None] * d).T)
 
 
 def inside(loops: list[np.ndarray], points: np.ndarray) -> np.ndarray:

@@ -53,11 +53,12 @@ def closed(
 
 def collinear_pair(stress: float, inner: float, outer: float) -> tuple[float, float]:
     """K_I at the inner and outer tips of two equal collinear cracks, inner < |x| < outer (Willmore 1949; Erdogan 1962)."""
-    from scipy.special import ellipe, ellipk
+    from scipy.special import ellipe, ellipkm1
 
     b, c = inner, outer
-    m = 1 - (b / c) ** 2
-    lam = float(ellipe(m) / ellipk(m))
+    # By 1 − k², which keeps its digits when the inner tips nearly meet.
+    rest = (b / c) ** 2
+    lam = float(ellipe(1 - rest) / ellipkm1(rest))
     root = stress * math.sqrt(math.pi)
     k_inner = root * (c**2 * lam - b**2) / math.sqrt(b * (c**2 - b**2))
     return k_inner, root * c**2 * (1 - lam) / math.sqrt(c * (c**2 - b**2))

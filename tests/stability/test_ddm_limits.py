@@ -1,0 +1,189 @@
+"""Geometry at the edge of what a crack solver can take: right against a reference, or refused with the reason.
+
+What is right to less than a few per cent by default must say so: `Solution.tip_errors` bounds the error.
+"""
+
+import logging
+import math
+
+import numpy as np
+import pytest
+
+from geomech import ddm
+from geomech.ddm.estimate import factors, largest
+from geomech.model import Cracks, DdmSettings, Material
+from geomech.reference import fracture, two_cracks
+
+ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
+MIXED = ddm.BodyLoad(remote_stress=[0.3, 1.0, 0.4])
+TENSION = ddm.BodyLoad(remote_stress=[0.0, 1.0, 0.0])
+SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+
+
+def pull(w, h, off=(0.0, 0.0), stress=1.0):
+    ends = np.array([[[-w, -h], [w, -h]], [[w, h], [-w, h]]]) + off
+    return ddm.BodyLoad(segments=ends, tractions=[[[0, -stress]] * 2, [[0, stress]] * 2])
+
+
+def lines(*polylines, **kwargs):
+    return Cracks.from_polylines([np.array(p, dtype=float) for p in polylines], aperture=math.inf, **kwargs)
+
+
+def off(solution, exact):
+    return np.abs(factors(solution) - exact).max() / largest(exact)
+
+
+def said(solution):
+    return solution.tip_errors.max() / largest(factors(solution))
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-5, 1e-7])
+def test_tips_that_nearly_touch(gap):
+    """Collinear cracks 1 long, down to 1e-7 between them (Willmore 1949): 5e-6 by default, as it says, and to a target."""
+    inner, outer = fracture.collinear_pair(1.0, gap / 2, 1.0)
+    exact = np.array([[outer, 0], [inner, 0], [inner, 0], [outer, 0]])
+    cracks = lines([[-1, 0], [-gap / 2, 0]], [[gap / 2, 0], [1, 0]])
+    solution = ddm.Body([], cracks, ROCK).solve(TENSION)
+    assert off(solution, exact) < min(1e-5, said(solution))
+    assert off(ddm.solve_to([], cracks, ROCK, TENSION, 1e-6), exact) < 1e-6
+
+
+def crossing(degrees):
+    t = math.radians(degrees)
+    nodes = np.array([[-1, 0], [1, 0], [-math.cos(t), -math.sin(t)], [math.cos(t), math.sin(t)], [0, 0]])
+    return Cracks(
+        nodes=nodes,
+        segments=np.array([[0, 4], [4, 1], [2, 4], [4, 3]]),
+        crack=np.array([0, 0, 1, 1]),
+        block=np.zeros(4, int),
+        birth_cycle=np.zeros(4, int),
+        aperture=np.full(4, math.inf),
+        surface=np.zeros(5, bool),
+        names=("a", "b"),
+    )
+
+
+#: K_I, K_II at the tips of two cracks 2 long that cross in their middle, angle in degrees → tips (1, 0) and (cos, sin)
+#: under `MIXED` (computed: order 8, elements down to 1e-5 at 3° and to 1e-2 at 1°, which changes 2e-7 and 3e-8).
+CROSSING = {
+    3: [[1.68009645, 0.59966634], [0.73466206, 0.02552407]],
+    1: [[1.64079165, 0.62367577], [0.7714560, -0.0322693]],
+}
+
+
+@pytest.mark.parametrize("degrees", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_cracks_that_cross_at_a_small_angle(degrees):
+    """Default settings 1e-3, 3e-6 at order 8."""
+    exact = np.array(CROSSING[degrees])[[0, 0, 1, 1]]
+    for order, tolerance in ((4, 1e-3), (8, 3e-6)):
+        solution = ddm.Body([], crossing(degrees), ROCK, DdmSettings(order=order)).solve(MIXED)
+        assert off(solution, exact) < tolerance
+
+
+def test_a_sliver_below_a_surface():
+    """A crack 0.8 long at depths of 1/20 and 1/40 of it, its roof pulled up: the clamped beam's edge moment M = qL²/12
+    gives K = √6 M d^(−3/2) with K_I/K_II = tan 52.07° (Hutchinson & Suo 1992, §IV), up to terms d/L, which are extrapolated
+    away (found: 0.1 % and 0.7 %)."""
+    ratio, size = [], []
+    for depth in (0.04, 0.02):
+        cracks = lines([[-0.4, 1 - depth], [0.4, 1 - depth]])
+        k_i, k_ii = factors(ddm.Body([SQUARE], cracks, ROCK).solve(pull(1, 1)))[0]
+        ratio.append(k_i / k_ii)
+        size.append(math.hypot(k_i, k_ii) / (math.sqrt(6) * 0.8**2 / 12 * depth**-1.5))
+    assert 2 * ratio[1] - ratio[0] == pytest.approx(math.tan(math.radians(52.07)), rel=0.02)
+    assert 2 * size[1] - size[0] == pytest.approx(1, rel=0.01)
+
+
+def test_thinner_slivers_are_refused():
+    """1e-4 of the crack would take ten thousand elements."""
+    for cracks in (
+        lines([[-0.4, 1 - 4e-5], [0.4, 1 - 4e-5]]),
+        lines([[-0.4, 0], [0.4, 0]], [[-0.4, 1e-4], [0.4, 1e-4]]),
+    ):
+        with pytest.raises(
+            ValueError, match="too thin a piece of rock between them, about .* m: it would take more than"
+        ):
+            ddm.Body([SQUARE], cracks, ROCK)
+
+
+@pytest.mark.parametrize(("gap", "tolerance"), [(1e-3, 1e-5), (1e-6, 1e-4)])
+def test_a_tip_that_nearly_reaches_the_surface(gap, tolerance):
+    """Default settings against a mesh for 1e-5."""
+    cracks = lines([[-1 + gap, 0], [-0.5, 0.2]])
+    solution = ddm.Body([SQUARE], cracks, ROCK).solve(pull(1, 1))
+    fine = ddm.solve_to([SQUARE], cracks, ROCK, pull(1, 1), 1e-4)
+    assert off(solution, factors(fine)) < tolerance and said(solution) < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("scale", "shift", "poisson"),
+    [(1.0, 0.0, 0.21), (1e-3 / 0.06, 0.0, 0.21), (1e4 / 0.06, 0.0, 0.21), (1e-9, 0.0, 0.21), (100.0, 1e7, 0.21),
+     (1.0, 0.0, 0.499), (1.0, 0.0, 0.0), (1.0, 1e7, 0.21)],
+)  # fmt: skip
+def test_sizes_offsets_and_poissons_ratios(scale, shift, poisson):
+    """The two-slot specimen from 6e-11 m to 10 km, at 1e7 m from the origin and nearly incompressible: K does not depend on
+    Poisson's ratio, and is 5e-6 from the reference; 2e-5 where 60 mm stand 1e7 m off (coordinates end at 2e-9 m)."""
+    w, h = 0.03 * scale, 0.06 * scale
+    loop = np.array([[-w, -h], [w, -h], [w, h], [-w, h]]) + shift
+    cracks = lines(*[np.array(ends) * scale + shift for ends in two_cracks.crack_ends(0)])
+    solution = ddm.Body([loop], cracks, Material("rock", 17e9, poisson)).solve(pull(w, h, shift, -1.0))
+    exact = np.column_stack([two_cracks.OPEN_SLOT_K_I[0], two_cracks.OPEN_SLOT_K_II[0]]) * math.sqrt(scale)
+    assert off(solution, exact) < (3e-5 if (scale, shift) == (1.0, 1e7) else 6e-6)
+    assert solution.residual < 1e-6 and solution.condition < 1e4
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e-6, 1e-8])
+def test_element_ratios(length):
+    """A kink of 45° and 1e-8 of the crack, and a small crack beside a large one, in its field."""
+    t = math.radians(45)
+    kink = lines([[-2, 0], [0, 0], [length * math.cos(t), length * math.sin(t)]])
+    solution = ddm.Body([], kink, ROCK).solve(MIXED)
+    fine = ddm.solve_to([], kink, ROCK, MIXED, 1e-4)
+    assert off(solution, factors(fine)) < 2e-3
+    small = lines([[-1, 0], [1, 0]], [[1.5, 0], [1.5 + length, 0]])
+    k = ddm.Body([], small, ROCK).solve(TENSION).tips["k_i"]
+    field = 1.5 / math.sqrt(1.25) * math.sqrt(math.pi * length / 2)
+    assert k[2] == pytest.approx(field, rel=2 * length + 1e-5)
+
+
+def folded(degrees):
+    t = math.radians(degrees)
+    return lines([[-2, 0], [0, 0], [0.3 * math.cos(t), 0.3 * math.sin(t)]])
+
+
+def test_sharp_folds(caplog):
+    """A kink of 150° is right to 1 %, of 165° uncertain by more and says so; beyond 170° it is refused."""
+    for degrees, tolerance in ((150, 5e-3), (165, 5e-2)):
+        solution = ddm.Body([], folded(degrees), ROCK).solve(MIXED)
+        error = off(solution, factors(ddm.solve_to([], folded(degrees), ROCK, MIXED, 1e-4)))
+        assert error < tolerance and error < 2 * said(solution)
+    with pytest.raises(ValueError, match="'crack 0': folds back on itself at .* by more than 170°"):
+        ddm.Body([], folded(171), ROCK)
+
+
+def test_an_uncertain_result_is_told(caplog):
+    """Constant elements on a fold."""
+    solution = ddm.Body([], folded(150), ROCK, DdmSettings(order=0, grading_layers=0)).solve(MIXED)
+    with caplog.at_level(logging.WARNING):
+        assert said(solution) > 0.01
+    assert "stress intensity factors are uncertain by" in caplog.text
+
+
+REFUSED = {
+    "coincide": lines([[0, 0], [0.5, 0]], [[0.2, 0], [0.7, 0]]),
+    "'crack 1' and 'crack 0' touch at": lines([[0, 0], [0.5, 0]], [[0.2, 0], [0.2, 0.5]]),
+    "touch at": lines([[0, 0], [0.5, 0]], [[0.5, 0], [0.7, 0.5]]),
+    "cross near": lines([[0, 0], [0.5, 0]], [[0.2, -0.3], [0.2, 0.5]]),
+    "not marked as a mouth": lines([[-1 + 1e-10, 0], [0.5, 0]]),
+    "lies on the boundary": lines([[-0.5, -0.5], [-1, 0], [-0.5, 0.5]]),
+    "lies along the boundary": lines([[-1, -0.5], [-1, 0.5]], surface=[(True, True)]),
+    "at less than 3°": lines([[-1, -0.5], [-0.98, 0.5]], surface=[(True, False)]),
+    "outside the rock": lines([[-0.5, -0.5], [-1.1, 0], [-0.5, 0.5]]),
+}
+
+
+@pytest.mark.parametrize("reason", REFUSED)
+def test_what_is_no_crack_in_a_body_is_refused_by_name(reason):
+    with pytest.raises(ValueError, match=reason) as raised:
+        ddm.Body([SQUARE], REFUSED[reason], ROCK)
+    assert "crack" in str(raised.value)
