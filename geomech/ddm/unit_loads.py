@@ -61,24 +61,27 @@ class UnitLoads:
     def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
         """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old numbers."""
         n_g = self.boundary.n_unknowns
-        for name, before in old._on_edges.items():
-            self._on_edges[name] = self._edge_load(name, before.applied[:n_g])
-            self._on_edges[name].eliminated = before.eliminated
-        keys = [key for key in old._recent if key in old._segments]
-        if not keys:
-            return
         new, kept = np.flatnonzero(c_old < 0), np.flatnonzero(c_old >= 0)
-        straight = np.array([old._segments[key].segment for key in keys])
-        fresh = self._linear_forces(self.faces.take(new), straight)
         to, fro, at = (
             n_g + x for x in (self.faces.unknowns(kept), old.faces.unknowns(c_old[kept]), self.faces.unknowns(new))
         )
-        for key, rows in zip(keys, fresh):
-            before = old._segments[key]
-            applied = np.empty((n_g + self.faces.n_unknowns, 4))
-            applied[:n_g], applied[to], applied[at] = before.applied[:n_g], before.applied[fro], rows
-            self._segments[key] = unit = UnitLoad(applied, before.segment, before.against)
+        added = self.faces.take(new)
+
+        def grown(before: UnitLoad, on_new: np.ndarray) -> UnitLoad:
+            applied = np.empty((n_g + self.faces.n_unknowns, before.applied.shape[1]))
+            applied[:n_g], applied[to], applied[at] = before.applied[:n_g], before.applied[fro], on_new
+            unit = UnitLoad(applied, before.segment, before.against, before.densities)
             unit.eliminated = before.eliminated
+            return unit
+
+        for name, before in old._on_edges.items():
+            self._on_edges[name] = grown(before, self._on_faces(name, added, before.densities))
+        keys = [key for key in old._recent if key in old._segments]
+        if not keys:
+            return
+        straight = np.array([old._segments[key].segment for key in keys])
+        for key, on_new in zip(keys, self._linear_forces(added, straight)):
+            self._segments[key] = grown(old._segments[key], on_new)
         self._recent = keys
 
     def of(self, applied: Applied) -> list[tuple[UnitLoad, np.ndarray]]:
@@ -186,41 +189,52 @@ class UnitLoads:
     def _centre(self, number: int) -> np.ndarray:
         return self.mesh.edges[self._hole(number), 0].mean(axis=0)
 
-    def _edge_load(self, name: str | int, on_boundary: np.ndarray | None = None) -> UnitLoad:
-        """What acts on whole edges; ``on_boundary`` if it is known already.
+    def _edge_load(self, name: str | int) -> UnitLoad:
+        """What acts on whole edges.
 
         "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy; "remote": the three stresses of the infinite plane,
         which its holes leave without traction; a number: pressure in that hole, constant and growing with x and with y
         from its centre.
         """
+        densities = self._edge_densities(name)
+        applied = [self._from_edges(self.boundary, densities), self._on_faces(name, self.faces, densities)]
+        return UnitLoad(np.concatenate(applied), densities=densities)
+
+    def _edge_densities(self, name: str | int) -> np.ndarray:
+        if not isinstance(name, int):
+            return np.stack([edge_densities(self.mesh.edges, unit) for unit in self._particular(name)], axis=-1)
         a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
-        points = self.faces.nodes.reshape(-1, 2)
-        if isinstance(name, int):
-            densities = np.zeros((len(a), 2, 3, 3))
-            here, centre = self._hole(name), self._centre(name)
-            # The normal of an edge points into the rock, as pressure does.
-            densities[here, 1, 0, 0] = 1.0
-            for k in (0, 1):
-                densities[here, 1, 0, k + 1] = 0.5 * (a + b)[here, k] - centre[k]
-                densities[here, 1, 1, k + 1] = 0.5 * (b - a)[here, k]
-            inside = np.zeros((self.faces.n_unknowns, 3))
-        else:
-            none, size = np.zeros(2), 6 if name == "force" else 3
-            units = [
-                Particular(self.centroid, e[:2], e[2:].reshape(2, 2), np.zeros(3), self.material)
-                if name == "force"
-                else Particular(self.centroid, none, np.zeros((2, 2)), e, self.material)
-                for e in np.eye(size)
-            ]
-            densities = np.stack([edge_densities(self.mesh.edges, unit) for unit in units], axis=-1)
-            inside = np.column_stack([on_elements(self.faces, unit.stress(points)) for unit in units])
+        densities = np.zeros((len(a), 2, 3, 3))
+        here, centre = self._hole(name), self._centre(name)
+        # The normal of an edge points into the rock, as pressure does.
+        densities[here, 1, 0, 0] = 1.0
+        for k in (0, 1):
+            densities[here, 1, 0, k + 1] = 0.5 * (a + b)[here, k] - centre[k]
+            densities[here, 1, 1, k + 1] = 0.5 * (b - a)[here, k]
+        return densities
 
-        def from_edges(targets: ElementSet) -> np.ndarray:
-            forces = line_forces(targets, a, b, 2, self.nu, self.tol, -1.0)
-            return forces.reshape(targets.n_unknowns, 6 * len(a)) @ densities.reshape(6 * len(a), -1)
+    def _particular(self, name: str) -> list[Particular]:
+        """The particular fields of unit body forces or of unit remote stresses."""
+        none = np.zeros(2)
+        if name == "remote":
+            return [Particular(self.centroid, none, np.zeros((2, 2)), unit, self.material) for unit in np.eye(3)]
+        return [
+            Particular(self.centroid, unit[:2], unit[2:].reshape(2, 2), np.zeros(3), self.material)
+            for unit in np.eye(6)
+        ]
 
-        first = from_edges(self.boundary) if on_boundary is None else on_boundary
-        return UnitLoad(np.concatenate([first, from_edges(self.faces) + inside]), densities=densities)
+    def _from_edges(self, targets: ElementSet, densities: np.ndarray) -> np.ndarray:
+        a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
+        forces = line_forces(targets, a, b, 2, self.nu, self.tol, -1.0)
+        return forces.reshape(targets.n_unknowns, 6 * len(a)) @ densities.reshape(6 * len(a), -1)
+
+    def _on_faces(self, name: str | int, faces: ElementSet, densities: np.ndarray) -> np.ndarray:
+        """What a load on whole edges does to the crack elements ``faces``."""
+        out = self._from_edges(faces, densities)
+        if not isinstance(name, int):
+            points = faces.nodes.reshape(-1, 2)
+            out += np.column_stack([on_elements(faces, unit.stress(points)) for unit in self._particular(name)])
+        return out
 
 
 def on_elements(c: ElementSet, stress: np.ndarray) -> np.ndarray:
