@@ -11,18 +11,19 @@ import time as clock
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from .. import dda
+from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
 from ..model.polygon import winding_number
+from .bodies import boundary_loads, elastic_bodies, solve_bodies, tip_rows
 from .compliance import crack_response
 from .mean_stress import rotated_mean_stress
 from .record import axial_strain, joined_faces, leading_load
 from .splitting import split_blocks
-from .tractions import BoundaryLoad, boundary_load
+from .tractions import BoundaryLoad
 
 log = logging.getLogger(__name__)
 
@@ -54,7 +55,7 @@ class Coupling:
         self.gauge = problem.gauge
         self.monitors = dict(problem.monitors)
         self.seconds: dict[str, float] = {}
-        self.work: Any = None
+        self.work = Work()
         self.number = 0
         self.load_step = 0
         self.known_motion: tuple[State, Motion] | None = None
@@ -98,7 +99,7 @@ class Coupling:
             if static:
                 # The passes of a step share its load, also when one of them has to take a shorter step.
                 load_time = result.state.time
-            tips = self._tips(solutions, self.nodes_of)
+            tips = tip_rows(self.problem, self.blocks, solutions, self.nodes_of)
             may_grow = growth_pass < self.problem.growth.max_passes
             events, stops = pending, stops or self._stops(pending)
             growth = self._growth(tips) if may_grow and not stops else None
@@ -170,56 +171,16 @@ class Coupling:
 
     def _solve_bodies(self, result) -> dict:
         """Every body under what the block solver's forces are on it; keeps loads and solutions."""
-        loads: dict[int, BoundaryLoad] = {}
         with self._timed("tractions"):
             # Equilibrium holds on the geometry at the start of the step.
-            motion = self._motion(self.state)
-            now = result.state.time
-            gravity = self.problem.loads.gravity.at(now)
-            tractions = self._edge_tractions(now)
-            for b in self.bodies:
-                loads[b] = boundary_load(
-                    b,
-                    self.blocks,
-                    self.state.vertices,
-                    motion,
-                    float(self.state.rotation[b]),
-                    result.contacts,
-                    tractions.get(b, []),
-                    [(p.at, p.history.at(now)) for p in self.problem.loads.point_loads if p.block == b],
-                    self.problem.materials[self.blocks.material[b]].density,
-                    gravity,
-                    result.acceleration[b],
-                    self.problem.dda.dynamic_factor * float(self.state.velocity[b, 2]),
-                )
+            loads = boundary_loads(self.problem, self.blocks, self.state, self._motion(self.state), result, self.bodies)
         self.loads = loads
         self.solutions = self._solve(self.bodies, loads, self.solutions)
         return self.solutions
 
     def _solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
-        from .. import ddm
-
         with self._timed("ddm solve"):
-            return {
-                b: body.solve(
-                    ddm.BodyLoad(
-                        segments=loads[b].segments,
-                        tractions=loads[b].tractions,
-                        body_force=loads[b].body_force,
-                        body_force_gradient=loads[b].body_force_gradient,
-                        about=loads[b].about,
-                    ),
-                    warm=warm.get(b),
-                )
-                for b, body in bodies.items()
-            }
-
-    def _edge_tractions(self, now: float) -> dict[int, list[tuple[int, np.ndarray]]]:
-        acting: dict[int, list[tuple[int, np.ndarray]]] = {}
-        for load in self.problem.loads.edge_tractions:
-            for edge in self.blocks.edges_named(load.edge_name):
-                acting.setdefault(int(self.blocks.vertex_block[edge]), []).append((int(edge), load.history.at(now)))
-        return acting
+            return solve_bodies(bodies, loads, warm)
 
     def _take_response(self, state: State, solutions: dict) -> float:
         """Set what DDA should assume next, and say how far off the last assumption was (relative strain)."""
@@ -251,23 +212,6 @@ class Coupling:
             known = self.compliances[block] = (body, closed, body.compliance(solution))
         return known[2]
 
-    def _tips(self, solutions: dict, nodes_of: dict[int, np.ndarray]) -> np.ndarray:
-        """TIP rows of all bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
-        if not solutions:
-            return np.empty(0, TIP)
-        from ..ddm.criteria import CRITERIA
-
-        criterion = CRITERIA[self.problem.growth.criterion]
-        rows = []
-        for b, solution in solutions.items():
-            tips = solution.tips.copy()
-            tips["node"] = nodes_of[b][tips["node"]]
-            tips["angle"], tips["k_eq"] = criterion(
-                tips["k_i"], tips["k_ii"], self.problem.materials[self.blocks.material[b]]
-            )
-            rows.append(tips)
-        return rows[0] if len(rows) == 1 else np.concatenate(rows)
-
     # -- growth --------------------------------------------------------------------------------------------------
 
     def _growth(self, tips: np.ndarray):
@@ -287,7 +231,8 @@ class Coupling:
         def look_ahead(cracks):
             nonlocal trial
             trial, nodes_of = self._bodies_of(cracks, trial)
-            return self._tips(self._solve(trial, self.loads, self.solutions), nodes_of)
+            ahead = self._solve(trial, self.loads, self.solutions)
+            return tip_rows(self.problem, self.blocks, ahead, nodes_of)
 
         growth = corrected(tips, grow, look_ahead, self.number, self.problem.growth.correct)
         if growth is not None:
@@ -395,29 +340,8 @@ class Coupling:
         self.bodies, self.nodes_of = self._bodies_of(self.cracks, self.bodies)
 
     def _bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
-        """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole network. What
-        keeps a fixed block in place, and so what strains it, is not known."""
-        cracked = np.arange(self.blocks.n_blocks) if self.problem.growth.initiation else np.unique(cracks.block)
-        cracked = cracked[~self.blocks.fixed[cracked]]
-        if not len(cracked):
-            return {}, {}
-        from .. import ddm
-
-        self.work = ddm.Work() if self.work is None else self.work
-        bodies, nodes_of = {}, {}
         with self._timed("ddm assembly"):
-            for b in cracked.tolist():
-                segments = np.flatnonzero(cracks.block == b)
-                nodes_of[b] = np.unique(cracks.segments[segments])
-                bodies[b] = ddm.Body(
-                    self.blocks.loops(b),
-                    cracks.take(segments),
-                    self.problem.materials[self.blocks.material[b]],
-                    self.problem.ddm,
-                    previous=kept.get(b),
-                    work=self.work,
-                )
-        return bodies, nodes_of
+            return elastic_bodies(self.problem, self.blocks, cracks, kept, self.work)
 
     # -- records -------------------------------------------------------------------------------------------------
 
@@ -439,7 +363,7 @@ class Coupling:
             monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in self.monitors.items()},
             statistics=statistics,
             seconds=dict(self.seconds),
-            work={} if self.work is None else dict(vars(self.work)),
+            work=dict(vars(self.work)) if any(vars(self.work).values()) else {},
         )
         vars(cycle)["motion"] = motion  # known here: the property need not find it again
         return cycle

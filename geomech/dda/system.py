@@ -12,6 +12,7 @@ from . import assembly
 from .basis import advance, energies
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import PENALTY_RATIO, JointTable, contact_springs, with_dashpots
+from .held import balanced, hold, with_rigid_motion
 from .loads import AppliedForces, Inertia, LoadMap, generalised
 from .moments import block_moments
 from .open_close import Settled, Unsettled, settle
@@ -27,9 +28,6 @@ _BLOCK_SHARE = 0.1
 _SLACK = 1e-14
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
-#: Loads on a lone block whose resultant is below this part of their size are in balance: it strains by less, and loads
-#: that balance on the undeformed block miss by about its strain on the deformed one.
-_BALANCE = 1e-2
 _UNKNOWN = -2
 _NEVER = -1
 
@@ -270,9 +268,12 @@ class BlockSystem:
             compliance, offset, gravity, load, dt, damping, n_free,
         )  # fmt: skip
         vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
-        held = self._held_now(static, load, points, edges, gravity, moments)
+        held = self.blocks.held
+        alone = static and self.blocks.n_blocks == 1 and n_free
+        if alone and balanced(load[0], points, edges, self._mass[0] * gravity, moments[0]):
+            held = with_rigid_motion(held)
         if held is not None and n_free:
-            _hold(held, matrix, right, vectors, found, order)
+            hold(held, matrix, right, vectors, found["block"], found["other"], order)
         n_contacts = len(found["block"])
         if n_free:
             settled = settle(
@@ -333,22 +334,6 @@ class BlockSystem:
         }
         return StepResult(new_state, dt, rows, forces, acceleration, statistics), largest
 
-    def _held_now(self, static, load, points, edges, gravity, moments) -> np.ndarray | None:
-        """(n_blocks, 6) unknowns that stay zero in this step, None without any.
-
-        A lone block under loads in balance has no support, and pressed by forces that keep their direction it is not
-        even stable: in statics its rigid motion, which carries no force, is held.
-        """
-        held = self.blocks.held
-        if static and self.blocks.n_blocks == 1 and not self._fixed[0]:
-            size = sum(float(np.abs(rows["force"]).sum()) for rows in (points, edges))
-            weight = self.density[0] * moments[0, 0] * float(np.abs(gravity).sum())
-            total = np.abs(load[0, :3] / [1.0, 1.0, np.sqrt(moments[0, 0])])
-            if weight <= _BALANCE * size and (total <= _BALANCE * size).all():
-                held = np.zeros((1, 6), bool) if held is None else held.copy()
-                held[0, :3] = True
-        return held
-
     def _on(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """The contact rows carried to the new geometry (gap and forces as they are)."""
         rows = rows.copy()
@@ -367,19 +352,6 @@ class BlockSystem:
         x, y = found["geometry"][contact, 5:7]
         a, b = names[found["block"][contact]], names[found["other"][contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
-
-
-def _hold(held, matrix, right, vectors, found, order) -> None:
-    """Take the unknowns ``held`` (n_blocks, 6) out of the equations, in place: their rows say that they are zero."""
-    block, unknown = np.nonzero(held & (order >= 0)[:, None])
-    row = order[block]
-    size = np.abs(matrix).max()
-    matrix[row, unknown, :] = 0.0
-    matrix[row, :, unknown] = 0.0
-    matrix[row, unknown, unknown] = size
-    right[row, unknown] = 0.0
-    vectors[:, :, :6] *= ~held[found["block"], None]
-    vectors[:, :, 6:] *= ~held[found["other"], None]
 
 
 def _unbalanced(matrix, right, vectors, found, order, settled: Settled) -> float:

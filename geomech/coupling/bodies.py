@@ -1,0 +1,107 @@
+"""The elastic bodies of cracked blocks: made from blocks and cracks, loaded with the block solver's forces, solved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..model import TIP, Blocks, Cracks, Motion, Problem, State
+from .tractions import BoundaryLoad, boundary_load
+
+if TYPE_CHECKING:
+    from ..ddm import Body, Work
+
+
+def elastic_bodies(
+    problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, work: Work
+) -> tuple[dict[int, Body], dict[int, np.ndarray]]:
+    """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole network.
+    What keeps a fixed block in place, and so what strains it, is not known.
+
+    ``kept``: earlier bodies of the same blocks, of which whatever has not changed is reused; ``work`` counts what was done.
+    """
+    cracked = np.arange(blocks.n_blocks) if problem.growth.initiation else np.unique(cracks.block)
+    cracked = cracked[~blocks.fixed[cracked]]
+    if not len(cracked):
+        return {}, {}
+    from .. import ddm
+
+    bodies, nodes_of = {}, {}
+    for b in cracked.tolist():
+        segments = np.flatnonzero(cracks.block == b)
+        nodes_of[b] = np.unique(cracks.segments[segments])
+        bodies[b] = ddm.Body(
+            blocks.loops(b),
+            cracks.take(segments),
+            problem.materials[blocks.material[b]],
+            problem.ddm,
+            previous=kept.get(b),
+            work=work,
+        )
+    return bodies, nodes_of
+
+
+def boundary_loads(
+    problem: Problem, blocks: Blocks, state: State, motion: Motion, result, bodies: dict
+) -> dict[int, BoundaryLoad]:
+    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on that
+    geometry the forces are in equilibrium."""
+    now = result.state.time
+    gravity = problem.loads.gravity.at(now)
+    acting: dict[int, list[tuple[int, np.ndarray]]] = {}
+    for load in problem.loads.edge_tractions:
+        for edge in blocks.edges_named(load.edge_name):
+            acting.setdefault(int(blocks.vertex_block[edge]), []).append((int(edge), load.history.at(now)))
+    return {
+        b: boundary_load(
+            b,
+            blocks,
+            state.vertices,
+            motion,
+            float(state.rotation[b]),
+            result.contacts,
+            acting.get(b, []),
+            [(p.at, p.history.at(now)) for p in problem.loads.point_loads if p.block == b],
+            problem.materials[blocks.material[b]].density,
+            gravity,
+            result.acceleration[b],
+            problem.dda.dynamic_factor * float(state.velocity[b, 2]),
+        )
+        for b in bodies
+    }
+
+
+def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
+    """block → solution of its body; ``warm``: earlier solutions, whose face states are the first guess."""
+    from .. import ddm
+
+    return {
+        b: body.solve(
+            ddm.BodyLoad(
+                segments=loads[b].segments,
+                tractions=loads[b].tractions,
+                body_force=loads[b].body_force,
+                body_force_gradient=loads[b].body_force_gradient,
+                about=loads[b].about,
+            ),
+            warm=warm.get(b),
+        )
+        for b, body in bodies.items()
+    }
+
+
+def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[int, np.ndarray]) -> np.ndarray:
+    """TIP rows of all solved bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
+    if not solutions:
+        return np.empty(0, TIP)
+    from ..ddm.criteria import CRITERIA
+
+    criterion = CRITERIA[problem.growth.criterion]
+    rows = []
+    for b, solution in solutions.items():
+        tips = solution.tips.copy()
+        tips["node"] = nodes_of[b][tips["node"]]
+        tips["angle"], tips["k_eq"] = criterion(tips["k_i"], tips["k_ii"], problem.materials[blocks.material[b]])
+        rows.append(tips)
+    return rows[0] if len(rows) == 1 else np.concatenate(rows)
