@@ -58,6 +58,7 @@ class FaceEquations:
         w[t] = np.where(held[t], memory.rest, 0.0)
         w[~held] = 0.0
         bound = laws.held_by_cohesion(memory.broken) if limit is None else limit
+        bound = np.where(states.way != 0, bound, 0.0)  # it may be infinite where nothing slips
         extra[t] = states.way * bound + slides * right[a]
         extra[a] += spring[a] * laws.aperture
         extra[t] -= spring[t] * memory.rest
@@ -252,7 +253,7 @@ class _Contact:
             states, _, reaction = self.newton(states, limit, single=True)
             now = self.laws.limit(reaction[self.laws.across], self.broken)
             # Near enough, Newton's method finishes what would take many more rounds.
-            if freeze % 4 == 0 or np.abs(now - limit).max() < _FROZEN_TOLERANCE * self.stress:
+            if freeze % 4 == 0 or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress:
                 found = self.newton(states)
                 if found is not None:
                     return found
