@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from . import shapes
@@ -40,7 +38,7 @@ class ElementEnds:
         tangents = np.concatenate([x for s in sets for x in (s.tangent, s.tangent)])
         ahead = np.zeros((len(first), 2))
         np.add.at(ahead, place, tangents)
-        #: Two ends meet, of elements that go straight on: their tangents, to round-off.
+        # Two ends meet, of elements that go straight on, to 1e-6 rad.
         self._straight = (np.bincount(place) == 2) & (np.hypot(*ahead.T) > 2 - 1e-13)
         self._ahead = 0.5 * ahead
         self.reach[self._straight] *= _NUDGE_STRAIGHT / _NUDGE
