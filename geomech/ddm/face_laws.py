@@ -143,7 +143,8 @@ def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
     rest = np.zeros((now.n, now.per))
     old = memory.rest.reshape(was.n, was.per)
     kept = same >= 0
-    rest[kept], source[kept], marks[kept] = old[same[kept]], same[kept, None], np.arange(now.per)
+    if kept.any():  # none is where the order has changed, and with it the number of nodes
+        rest[kept], source[kept], marks[kept] = old[same[kept]], same[kept, None], np.arange(now.per)
     for e in np.flatnonzero(~kept):
         rel = now.nodes[e][:, None] - was.start
         along = np.einsum("jec,ec->je", rel, was.tangent) / was.length

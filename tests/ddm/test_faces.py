@@ -8,6 +8,7 @@ import pytest
 from geomech import ddm
 from geomech.ddm import friction
 from geomech.model import OPEN, SLIP, STICK, Cracks, DdmSettings, JointLaw, Material
+from geomech.reference import fracture
 
 ROCK = Material("rock", 50e9, 0.25)
 ROUGH = JointLaw("rough", friction_angle=math.atan(0.6), cohesion=1e5)
@@ -123,6 +124,16 @@ def test_history_goes_on_where_faces_are_divided():
     back = longer.solve(under(0, -1e6, 0), history=grown)
     assert back.frictional_work > grown.frictional_work > loaded.frictional_work > 0
     assert abs(back.tips["k_ii"]).max() > 1e6 > 0.3 * abs(longer.solve(under(0, -1e6, 0)).tips["k_ii"]).max()
+
+
+def test_error_estimate_of_rough_faces_is_that_of_the_closed_form():
+    """The finer solution that the estimate is made with has other nodes; K_II = −(|τ| − μ|σ_n| − c) √(πa) in all."""
+    sol = plane([LINE], ROUGH, elements=2).solve(under(0, -20e6, 0))
+    exact = fracture.closed(np.array([0, -20e6, 0]), math.atan2(0.6, 0.8), 1.0, 0.6, 1e5)[1]
+    error = np.abs(sol.tips["k_ii"] - exact)
+    assert (sol.tip_errors[:, 0] == 0).all()
+    assert (error <= sol.tip_errors[:, 1]).all()
+    assert (sol.tip_errors[:, 1] <= 10 * error).all()
 
 
 def test_cement_holds_until_its_strength_and_is_lost_for_good():
