@@ -44,9 +44,10 @@ def check_outline(loops: list[np.ndarray], holes: Sequence[np.ndarray] = ()) -> 
         out.append(loop[::-1].copy() if area > 0 else loop)
     if out:
         edges = np.concatenate([np.stack([loop, np.roll(loop, -1, axis=0)], axis=1) for loop in out])
-        where = _crossings(edges, edges, upper=True)
-        if len(where):
-            i, j = where[0]
+        i, j = _boxes_meet(edges, edges)
+        i, j = i[i < j], j[i < j]
+        for k in np.flatnonzero(_crossing(edges[i], edges[j]))[:1]:
+            i, j = i[k], j[k]
             raise ValueError(f"the outline crosses itself: edges {i} and {j} near {_near(edges[i])}")
     first_hole = 1 if bounded else 0
     for k, hole in enumerate(out[first_hole:], 1):
@@ -115,24 +116,43 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
                     raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies on the boundary but is not marked as a mouth")
                 elif not rock[s, e]:
                     raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies outside the rock")
-        where = _crossings(segments[new], edges)
-        for i, j in where:
-            s = new[i]
+        i, j = _boxes_meet(segments[new], edges, _SMALL * span)
+        one, other = segments[new[i]], edges[j]
+        for k in np.flatnonzero(_crossing(one, other)):
+            s = new[i[k]]
             # A mouth touches its edge within round-off, which may look like a crossing.
-            near = _to_segments(segments[s], edges[j : j + 1])
+            near = _to_segments(segments[s], edges[j[k] : j[k] + 1])
             if not (mouth[s] & (near <= 1e-7 * span)).any():
                 raise ValueError(f"{name(s)}: crosses the outline near {_near(segments[s])}")
-        for i, _ in _overlaps(segments[new], edges, span):
-            raise ValueError(f"{name(new[i])}: lies along the boundary near {_near(segments[new[i]])}")
+        for k in np.flatnonzero(_overlapping(one, other, span))[:1]:
+            raise ValueError(f"{name(new[i[k]])}: lies along the boundary near {_near(one[k])}")
         _check_mouths(cracks, new, edges, span, name)
-    for i, j in _crossings(segments[new], segments):
-        if new[i] != j:
-            raise ValueError(f"{name(new[i])} and {name(j)} cross near {_near(segments[new[i]])} without a shared node")
-    for i, j in _overlaps(segments[new], segments, span):
-        if new[i] != j:
-            raise ValueError(f"{name(new[i])} and {name(j)} coincide near {_near(segments[new[i]])}")
-    _check_touching(cracks, new, span, name)
+    _check_pairs(cracks, segments, new, span, name)
     _check_folds(cracks, new, name)
+
+
+def _check_pairs(cracks: Cracks, segments: np.ndarray, new: np.ndarray, span: float, name) -> None:
+    """New segments against all: none may cross or cover another, nor end on one with which it shares no node."""
+    i, j = _boxes_meet(segments[new], segments, _SMALL * span)
+    i = new[i]
+    i, j = i[i != j], j[i != j]
+    if not len(i):
+        return
+    one, other = segments[i], segments[j]
+    for k in np.flatnonzero(_crossing(one, other))[:1]:
+        raise ValueError(f"{name(i[k])} and {name(j[k])} cross near {_near(one[k])} without a shared node")
+    for k in np.flatnonzero(_overlapping(one, other, span))[:1]:
+        raise ValueError(f"{name(i[k])} and {name(j[k])} coincide near {_near(one[k])}")
+    shared = (cracks.segments[i][:, :, None] == cracks.segments[j][:, None, :]).any(axis=(1, 2))
+    i, j = i[~shared], j[~shared]
+    for first, second in ((i, j), (j, i)) if len(i) else ():
+        for end in (0, 1):
+            touching = _to_pairs(segments[first, end], segments[second]) <= _SMALL * span
+            for k in np.flatnonzero(touching)[:1]:
+                x, y = segments[first[k], end]
+                raise ValueError(
+                    f"{name(first[k])} and {name(second[k])} touch at ({x:g}, {y:g}) without a shared node"
+                )
 
 
 def _check_mouths(cracks: Cracks, new: np.ndarray, edges: np.ndarray, span: float, name) -> None:
@@ -148,28 +168,13 @@ def _check_mouths(cracks: Cracks, new: np.ndarray, edges: np.ndarray, span: floa
             raise ValueError(f"{name(new[s])}: leaves the boundary at ({x[0]:g}, {x[1]:g}) at less than 3°")
 
 
-def _check_touching(cracks: Cracks, new: np.ndarray, span: float, name) -> None:
-    """New segments and others one of which ends on the other, where they share no node."""
-    segments = cracks.nodes[cracks.segments]
-    i, j = _boxes_meet(segments[new], segments, _SMALL * span)
-    i = new[i]
-    shared = (cracks.segments[i][:, :, None] == cracks.segments[j][:, None, :]).any(axis=(1, 2))
-    i, j = i[~shared], j[~shared]
-    for first, second in ((i, j), (j, i)):
-        for end in (0, 1):
-            touching = np.flatnonzero(_to_pairs(segments[first, end], segments[second]) <= _SMALL * span)
-            for k in touching[:1]:
-                x, y = segments[first[k], end]
-                raise ValueError(
-                    f"{name(first[k])} and {name(second[k])} touch at ({x:g}, {y:g}) without a shared node"
-                )
-
-
 def _check_folds(cracks: Cracks, new: np.ndarray, name) -> None:
+    if not (cracks.valence == 2).any():
+        return
     flat = cracks.segments.ravel()
     order = np.argsort(flat, kind="stable")
     first = np.flatnonzero((cracks.valence[flat[order]] == 2) & ~cracks.surface[flat[order]])[::2]
-    one, two = order[first], order[first + 1] if len(first) else first
+    one, two = order[first], order[first + 1]
     fresh = np.zeros(cracks.n_segments, bool)
     fresh[new] = True
     met = fresh[one // 2] | fresh[two // 2]
@@ -235,26 +240,21 @@ def _boxes_meet(first: np.ndarray, second: np.ndarray, slack: float = 0.0) -> tu
     return np.concatenate(rows), np.concatenate(columns)
 
 
-def _crossings(first: np.ndarray, second: np.ndarray, upper: bool = False) -> np.ndarray:
-    """(k, 2) pairs of segments that cross properly: each has the other's ends on both sides, beyond round-off."""
-    scale = np.abs(np.concatenate([first.reshape(-1, 2), second.reshape(-1, 2)])).max()
-    i, j = _boxes_meet(first, second)
-    if upper:
-        i, j = i[i < j], j[i < j]
-    one, other = first[i], second[j]
+def _crossing(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(k,) bool: pairs of segments (k, 2, 2) that cross properly: each has the other's ends on both sides, beyond
+    round-off."""
+    scale = max(np.abs(one).max(initial=0.0), np.abs(other).max(initial=0.0))
     tol1 = 1e-10 * scale * np.hypot(*(other[:, 1] - other[:, 0]).T)
     tol2 = 1e-10 * scale * np.hypot(*(one[:, 1] - one[:, 0]).T)
     a, b = _side_of(one[:, 0], other), _side_of(one[:, 1], other)
     c, d = _side_of(other[:, 0], one), _side_of(other[:, 1], one)
     across = ((a > tol1) & (b < -tol1)) | ((a < -tol1) & (b > tol1))
     astride = ((c > tol2) & (d < -tol2)) | ((c < -tol2) & (d > tol2))
-    return np.column_stack([i, j])[across & astride]
+    return across & astride
 
 
-def _overlaps(first: np.ndarray, second: np.ndarray, span: float) -> np.ndarray:
-    """(k, 2) pairs of segments that lie on one line and share more than a point."""
-    i, j = _boxes_meet(first, second, _SMALL * span)
-    one, other = first[i], second[j]
+def _overlapping(one: np.ndarray, other: np.ndarray, span: float) -> np.ndarray:
+    """(k,) bool: pairs of segments (k, 2, 2) that lie on one line and share more than a point."""
     d = one[:, 1] - one[:, 0]
     length = np.hypot(*d.T)
     t = d / length[:, None]
@@ -262,7 +262,7 @@ def _overlaps(first: np.ndarray, second: np.ndarray, span: float) -> np.ndarray:
     along = np.einsum("nkl,nl->nk", rel, t)
     off = np.abs(rel[..., 1] * t[:, None, 0] - rel[..., 0] * t[:, None, 1])
     common = np.minimum(along.max(axis=1), length) - np.maximum(along.min(axis=1), 0.0)
-    return np.column_stack([i, j])[(off.max(axis=1) <= _SMALL * span) & (common > 1e-7 * span)]
+    return (off.max(axis=1) <= _SMALL * span) & (common > 1e-7 * span)
 
 
 def _to_segments(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
