@@ -59,7 +59,7 @@ def measure(quick: bool = False) -> str:
     about a second."""
     from ..render.work_precision import draw
 
-    longest = 0.6 if quick else 12.0
+    longest = 0.6 if quick else 8.0
     points = [point for name in PROBLEMS for point in _curves(name, longest)]
     growth = growth_run.measure(10 if quick else 40)
     goals = _goals(points)
@@ -261,7 +261,7 @@ def _table(points: list[Point], growth: dict, goals: dict) -> str:
 
 
 def _said(seconds: float | None) -> str:
-    return "not reached" if seconds is None else f"{1e3 * seconds:.2g} ms"
+    return "not reached" if seconds is None else f"{1e3 * seconds:.3g} ms"
 
 
 def _machine() -> dict:
