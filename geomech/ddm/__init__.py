@@ -26,7 +26,7 @@ _PUBLIC = {
     "propagate": ".propagation",
     "solve_to": ".automatic",
 }
-_MODULES = ("criteria", "growth", "shapes")
+_MODULES = ("criteria", "growth", "initiation", "shapes")
 
 __all__ = [
     "Body",
@@ -40,6 +40,7 @@ __all__ = [
     "Work",
     "criteria",
     "growth",
+    "initiation",
     "propagate",
     "shapes",
     "solve_to",

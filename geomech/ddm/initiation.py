@@ -13,7 +13,7 @@ At a smooth surface the stress has a value, and so has the load at birth, whatev
 re-entrant corner it has none, and a stress concentration smaller than the rock's own scale does not break it. The
 stress may therefore be averaged from the surface inwards along the crack to be (Novozhilov 1969), over a distance that
 is the rock's: `material_length` gives the one with which a long crack fails at its K_Ic and a smooth wall at its
-strength. Zero, the default, is the strength at the point.
+strength. Corners are looked at only then. Zero, the default, is the strength at the point.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..conventions import normal_of
+from ..conventions import normal_of, traction
 from ..model import Cracks, GrowthSettings, Material
 from . import shapes
 from .network import Network, Point, nearest_on
@@ -141,7 +141,10 @@ def _spacing(settings: GrowthSettings) -> float:
 def _candidates(solution: Solution, material: Material, settings: GrowthSettings) -> list[Birth]:
     """All cracks that could be born, most overstressed first."""
     found: list[Birth] = []
-    for points, inward, segment, stress in (_on_curves(solution), _on_sides(solution), _on_faces(solution)):
+    surfaces = [_on_curves(solution), _on_sides(solution), _on_faces(solution)]
+    if settings.initiation_distance > 0:
+        surfaces.append(_at_corners(solution, settings.initiation_distance))
+    for points, inward, segment, stress in surfaces:
         free = _away(solution.body.cracks, points, segment, settings)
         found += _from_surface(solution, material, settings, points[free], inward[free], segment[free], stress(free))
     if settings.initiation == "everywhere":
@@ -199,15 +202,36 @@ def _on_faces(solution: Solution):
     return points, inward, segment, lambda which: solution.stress((points + beside)[which])
 
 
+def _at_corners(solution: Solution, distance: float):
+    """Re-entrant corners of outline and holes; stress has a value only away from them, so half-way along the ``distance``."""
+    corners, inward = [np.empty((0, 2))], [np.empty((0, 2))]
+    for loop in solution.body.loops:
+        heading, turn = _turns(loop)
+        sharp = turn < -CURVE
+        # Rock is on the left of both edges: along the mean of their normals.
+        into = heading - 0.5 * turn + 0.5 * math.pi
+        corners.append(loop[sharp])
+        inward.append(np.column_stack([np.cos(into), np.sin(into)])[sharp])
+    corners, inward = np.concatenate(corners), np.concatenate(inward)
+    return (
+        corners,
+        inward,
+        np.full(len(corners), -1),
+        lambda which: solution.stress((corners + 0.5 * distance * inward)[which]),
+    )
+
+
 def _sides_of_curves(loops: Sequence[np.ndarray]) -> np.ndarray:
     """(n_edges,) whether an edge turns by no more than `CURVE` into both its neighbours."""
-    sides = []
-    for loop in loops:
-        way = np.roll(loop, -1, axis=0) - loop
-        heading = np.arctan2(way[:, 1], way[:, 0])
-        turn = np.abs(np.mod(heading - np.roll(heading, 1) + math.pi, 2 * math.pi) - math.pi)
-        sides.append((turn <= CURVE) & (np.roll(turn, -1) <= CURVE))
-    return np.concatenate([np.empty(0, bool), *sides])
+    slight = [np.abs(_turns(loop)[1]) <= CURVE for loop in loops]
+    return np.concatenate([np.empty(0, bool), *(here & np.roll(here, -1) for here in slight)])
+
+
+def _turns(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) heading of the edge that leaves each vertex and the turn into it, rad; negative at re-entrant corners."""
+    way = np.roll(loop, -1, axis=0) - loop
+    heading = np.arctan2(way[:, 1], way[:, 0])
+    return heading, np.mod(heading - np.roll(heading, 1) + math.pi, 2 * math.pi) - math.pi
 
 
 def _away(cracks: Cracks, points: np.ndarray, own: np.ndarray, settings: GrowthSettings) -> np.ndarray:
@@ -250,15 +274,15 @@ def _from_surface(solution, material, settings, points, inward, segment, stress)
         here = np.flatnonzero(np.isfinite(way[:, 0]))
         felt = stress[here]
         if settings.initiation_distance > 0:
-            # Gauss points from the surface to the distance.
-            t, weight = np.polynomial.legendre.leggauss(4)
-            at = 0.5 * settings.initiation_distance * (1 + t)
+            # Gauss points in the root of the distance, which takes in what rises like 1/√r to a corner.
+            t, weight = np.polynomial.legendre.leggauss(5)
+            root = 0.5 * (1 + t)
+            at = settings.initiation_distance * root**2
             inner = points[here, None] + at[None, :, None] * way[here, None]
             ok = inside(loops, inner.reshape(-1, 2)).reshape(len(here), len(t)).all(axis=1)
             here, inner = here[ok], inner[ok]
-            felt = np.einsum("k,nkc->nc", weight / 2, solution.stress(inner.reshape(-1, 2)).reshape(-1, len(t), 3))
-        tension, shear, _ = overstress(felt, material)
-        size = tension if kind == "tension" else shear
+            felt = np.einsum("k,nkc->nc", weight * root, solution.stress(inner.reshape(-1, 2)).reshape(-1, len(t), 3))
+        size = _on_plane(kind, felt, way[here], material)
         for row, value in zip(here.tolist(), size.tolist()):
             yield Birth(
                 kind,
@@ -286,6 +310,18 @@ def _ways(stress: np.ndarray, material: Material, inward: np.ndarray) -> Iterato
     slant = math.pi / 4 - material.friction_angle / 2
     for turn in (slant, -slant):
         yield "shear", into(across + turn, shear > tension)
+
+
+def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material) -> np.ndarray:
+    """Overstress (n,) of ``stress`` (n, 3) on the very planes of cracks along ``way`` (n, 2): σ_n/T, or (|τ| + σ_n tan φ)/c. At a
+    point these are the planes that `overstress` is of; a mean has other principal directions than the surface."""
+    normal = normal_of(way)
+    t = traction(stress, normal)
+    pull = np.sum(t * normal, axis=1)
+    if kind == "tension":
+        return np.maximum(pull, 0.0) / material.tensile_strength
+    rub = np.abs(np.sum(t * way, axis=1))
+    return np.maximum(rub + pull * math.tan(material.friction_angle), 0.0) / material.cohesion
 
 
 def _in_rock(solution, material, settings) -> Iterator[Birth]:

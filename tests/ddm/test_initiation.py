@@ -8,7 +8,8 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm.initiation import bear, births, material_length, overstress
-from geomech.model import Cracks, GrowthSettings, Material
+from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
+from geomech.reference.fracture import EDGE_CRACK
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=1e6, tensile_strength=5e6, cohesion=20e6, friction_angle=math.radians(30))
 NONE = Cracks.from_polylines([])
@@ -170,3 +171,33 @@ def test_born_cracks_go_on_growing():
     # Both sides of the picture are images of one another.
     xs = np.sort(steps[-1].tips["point"][:, 0])
     assert xs.sum() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_sharp_notch_breaks_at_its_toughness():
+    """A notch of 10° is nearly an edge crack: with stress averaged over the material length it starts when K_I of the crack is
+    K_Ic (Kaya & Erdogan 1987), but for what follows the 1/√r, of the order of d/a: 0.054, 0.024, 0.0085 for d/a = 0.5, 0.22,
+    0.08. The point itself has no stress to go by. The corner is graded in six layers; the default two leave another 1.4 % in
+    the stress within 0.08 a of it."""
+    width, height = 0.1, 0.2
+    depth = 0.2 * width
+    gap = depth * math.tan(math.radians(5))
+    right = [[width, -height], [width, -gap], [width - depth, 0.0], [width, gap], [width, height]]
+    notched = np.array([[0.0, -height], *right, [0.0, height]])
+    ends = np.array([[[width, height], [0.0, height]], [[0.0, -height], [width, -height]]])
+    pull = ddm.BodyLoad(segments=ends, tractions=np.tile([[[0.0, 1e6]], [[0.0, -1e6]]], (1, 2, 1)))
+    solution = solved(pull, [notched], settings=DdmSettings(grading_layers=6))
+    k_i = 1e6 * EDGE_CRACK[0.2] * math.sqrt(math.pi * depth)
+    off = []
+    for strength in (8e6, 12e6, 20e6):
+        rock = Material("rock", 17e9, 0.21, k_ic=1e6, tensile_strength=strength)
+        distance = material_length(rock)
+        (first,) = births(
+            solution, rock, GrowthSettings(increment=2e-3, initiation="surface", initiation_distance=distance)
+        )
+        assert first.start == (width - depth, 0.0)
+        np.testing.assert_allclose(first.end, (first.start[0] - 2e-3, 0.0), atol=1e-5)
+        off.append(first.overstress * rock.k_ic / k_i - 1)
+        assert 0 < off[-1] < 0.12 * distance / depth
+    assert off[2] < 0.01
+    cracked = bear(NONE, lambda b: [notched], [first], 1)
+    ddm.Body([notched], cracked, ROCK)

@@ -42,6 +42,7 @@ def test_onset_and_breakdown_converge_to_the_closed_forms():
         assert errors[1] < 0.5 * errors[0]
 
 
+@pytest.mark.slow
 def test_shear_cracks_stop_where_they_stop_whatever_the_increment():
     """Half the increment: the same depth, to within the longer one."""
     depths = []
