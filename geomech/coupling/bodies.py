@@ -37,6 +37,7 @@ def elastic_bodies(
             problem.materials[blocks.material[b]],
             problem.ddm,
             previous=kept.get(b),
+            face_laws=problem.face_laws,
             work=work,
         )
     return bodies, nodes_of
@@ -72,8 +73,9 @@ def boundary_loads(
     }
 
 
-def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
-    """block → solution of its body; ``warm``: earlier solutions, whose face states are the first guess."""
+def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict, history: dict) -> dict:
+    """block → solution of its body; ``warm``: earlier solutions, whose face states are the first guess; ``history``: what
+    crack faces with friction remember of the load step before."""
     from .. import ddm
 
     return {
@@ -86,6 +88,7 @@ def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> di
                 about=loads[b].about,
             ),
             warm=warm.get(b),
+            history=history.get(b),
         )
         for b, body in bodies.items()
     }

@@ -63,6 +63,8 @@ class Coupling:
         self.solutions: dict[int, object] = {}
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
+        # What crack faces with friction remember of the load step before: its passes all begin there.
+        self.history: dict[int, object] = {}
         self._take_blocks()
 
     # -- the generator -------------------------------------------------------------------------------------------
@@ -124,6 +126,7 @@ class Coupling:
                         growth_pass,
                     )
                 self.state = result.state
+                self.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
                 return stops
             pending = self._take_growth(growth, result, solutions)
         raise AssertionError("unreachable: the last pass takes no growth")
@@ -180,7 +183,7 @@ class Coupling:
 
     def _solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
         with self._timed("ddm solve"):
-            return solve_bodies(bodies, loads, warm)
+            return solve_bodies(bodies, loads, warm, self.history)
 
     def _take_response(self, state: State, solutions: dict) -> float:
         """Set what DDA should assume next, and say how far off the last assumption was (relative strain)."""
@@ -205,11 +208,11 @@ class Coupling:
         return worst
 
     def _compliance(self, block: int, body, solution) -> np.ndarray:
-        """S in the block's own axes; it changes with the geometry and with which faces are closed, not with the load."""
-        closed = solution.closed.tobytes()
+        """S in the block's own axes; it changes with the geometry and the states of crack faces, not with the load."""
+        states = solution.closed.tobytes() if solution.memory is None else solution.face_states.key
         known = self.compliances.get(block)
-        if known is None or known[0] is not body or known[1] != closed:
-            known = self.compliances[block] = (body, closed, body.compliance(solution))
+        if known is None or known[0] is not body or known[1] != states:
+            known = self.compliances[block] = (body, states, body.compliance(solution))
         return known[2]
 
     # -- growth --------------------------------------------------------------------------------------------------
@@ -309,6 +312,9 @@ class Coupling:
                 point_loads=tuple(replace(p, block=child(p.block, p.at)) for p in self.problem.loads.point_loads),
             ),
         )
+        # Children keep the reference coordinates of their parent, and so its faces' memory.
+        parents = enumerate(split.parent.tolist())
+        self.history = {child: self.history[parent] for child, parent in parents if parent in self.history}
         self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
         self._take_blocks()
 

@@ -86,7 +86,8 @@ class RunSettings:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Everything a run needs. ``joint_of`` maps a pair of edge names to the law of contacts between such edges.
+    """Everything a run needs. ``joint_of`` maps a pair of edge names to the law of contacts between such edges, the cracks'
+    ``law`` counts in ``face_laws``.
 
     ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
     compression); ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
@@ -98,6 +99,7 @@ class Problem:
     materials: tuple[Material, ...]
     joints: tuple[JointLaw, ...]
     joint_of: dict[tuple[str, str], int] = field(default_factory=dict)
+    face_laws: tuple[JointLaw, ...] = (JointLaw("frictionless"),)
     loads: Loads = field(default_factory=Loads)
     dda: DdaSettings = field(default_factory=DdaSettings)
     ddm: DdmSettings = field(default_factory=DdmSettings)

@@ -37,8 +37,9 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         fixed=np.array([zone in tables.zones and tables.zones[zone].fixed for zone in drawing.zones]),
         held=_held(tables, drawing),
     )
-    cracks = replace(drawing.cracks, aperture=_apertures(tables, drawing.cracks))
     joints, joint_of = _joints(tables, drawing)
+    face_laws, law = _face_laws(tables, drawing.cracks, joints)
+    cracks = replace(drawing.cracks, aperture=_apertures(tables, drawing.cracks), law=law)
     carriers = gauge_carriers(check)
     return Problem(
         title=tables.title,
@@ -61,6 +62,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         ),
         joints=joints,
         joint_of=joint_of,
+        face_laws=face_laws,
         loads=_loads(tables, check),
         dda=_dda(tables),
         ddm=DdmSettings(**tables.ddm.model_dump()),
@@ -94,6 +96,25 @@ def _apertures(tables: SceneTables, cracks: Cracks) -> np.ndarray:
         return {"closed": 0.0, "slot": math.inf}[aperture] if isinstance(aperture, str) else float(aperture)
 
     return np.array([metres(name) for name in cracks.names])[cracks.crack] if cracks.n_segments else np.empty(0)
+
+
+def _face_laws(
+    tables: SceneTables, cracks: Cracks, joints: tuple[JointLaw, ...]
+) -> tuple[tuple[JointLaw, ...], np.ndarray]:
+    """The laws of crack faces, smooth ones first, and the law of every segment."""
+    known = {joint.name: joint for joint in joints}
+    laws = [Problem.face_laws[0]]
+
+    def number(crack: str) -> int:
+        entry = tables.cracks.get(crack, tables.cracks.get("default"))
+        if entry is None or entry.joint is None:
+            return 0
+        if known[entry.joint] not in laws:
+            laws.append(known[entry.joint])
+        return laws.index(known[entry.joint])
+
+    of_crack = np.array([number(name) for name in cracks.names], dtype=int)
+    return tuple(laws), of_crack[cracks.crack] if cracks.n_segments else np.empty(0, int)
 
 
 def _joints(tables: SceneTables, drawing: Drawing) -> tuple[tuple[JointLaw, ...], dict[tuple[str, str], int]]:

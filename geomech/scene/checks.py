@@ -22,6 +22,7 @@ def check(c: Check) -> None:
     if c.drawing is not None:
         _zones(c)
         _cracks(c)
+    _crack_joints(c)
     if c.drawing is not None and c.drawing.blocks is not None:
         _whole(c)
         check_edges(c)
@@ -112,6 +113,26 @@ def _cracks(c: Check) -> None:
             free = [crack for crack in known if crack not in given]
             c.refuse(
                 ("cracks", name), f"the geometry has no crack {name!r}", nearest(name, free) if free else _are(known)
+            )
+
+
+def _crack_joints(c: Check) -> None:
+    """The laws of crack faces must be there, and faces that are cemented must touch."""
+    for name, crack in (c.tables.cracks or {}).items():
+        if crack.joint is None or c.tables.joints is None:
+            continue
+        joint = c.tables.joints.get(crack.joint)
+        if joint is None:
+            c.refuse(
+                ("cracks", name, "joint"),
+                f"there is no joint {crack.joint!r}",
+                nearest(crack.joint, list(c.tables.joints)),
+            )
+        elif joint.tensile_strength_pa > 0 and crack.aperture not in ("closed", 0):
+            c.refuse(
+                ("cracks", name, "joint"),
+                f"faces with an aperture cannot have the tensile strength of joint {crack.joint!r}",
+                'say aperture = "closed", or name a joint without tensile strength',
             )
 
 

@@ -112,7 +112,8 @@ def _joints(c: Check) -> None:
                     ("joints", name), "the default joint names edges", "it rules all contacts that no other joint names"
                 )
             continue
-        if not (joint.edges or joint.between):
+        of_a_crack = any(crack.joint == name for crack in (c.tables.cracks or {}).values())
+        if not (joint.edges or joint.between or of_a_crack):
             c.refuse(("joints", name), f"joint {name!r} names no edges", 'add edges = ["…"], or call it `default`')
         for k, pattern in enumerate(joint.edges):
             names = joint_names((pattern,), known)

@@ -142,6 +142,9 @@ class CrackTable(Table):
     aperture: float | str = Field(
         "closed", description='"closed", "slot" (its faces never meet) or the initial aperture in m'
     )
+    joint: str | None = Field(
+        None, description="a name of [joints] whose law its faces, and those of its wings, follow (unset: they are smooth)"
+    )
 
     @field_validator("aperture", mode="before")
     @classmethod

@@ -64,6 +64,7 @@ tensile_strength_pa = 5e4
 aperture = "slot"
 [cracks.thin]
 aperture = 1e-4
+joint = "bedding"
 [gauge]
 from = [0.5, 0.0]
 to = [0.5, 1.0]
@@ -151,6 +152,7 @@ def test_every_setting_arrives(scene_file):
     assert p.blocks.held.tolist() == [[False, True, True, False, False, True], [False] * 6]
     assert p.materials[1].plane == "stress" and p.materials[0].k_ic == math.inf
     assert p.cracks.aperture.tolist() == [math.inf, math.inf, 1e-4]
+    assert p.cracks.law.tolist() == [0, 0, 1] and [law.name for law in p.face_laws] == ["frictionless", "bedding"]
     names = [law.name for law in p.joints]
     assert names == ["default", "bedding", "pair"]
     assert p.joints[0].friction_angle == pytest.approx(math.pi / 6) and p.joints[0].cohesion == 1e3
