@@ -84,3 +84,12 @@ def test_motion_is_recovered_from_the_vertices():
     point = np.array([1.3, 0.4])
     np.testing.assert_allclose(motion.current(0, point), gradient[0] @ point + shift[0], rtol=1e-13)
     np.testing.assert_allclose(motion.reference(0, motion.current(0, point)), point, rtol=1e-13)
+
+
+def test_sides_run_through_straight_vertices_and_round_the_start_of_a_loop():
+    """A square with two vertices more in its bottom, numbered from one of them; and a hole."""
+    square = np.array([[0.3, 0.0], [0.6, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
+    hole = np.array([[0.4, 0.4], [0.4, 0.6], [0.6, 0.6]])
+    blocks = Blocks.from_polygons([[square, hole]])
+    assert blocks.side_start == [5, 5, 2, 3, 4, 5, 6, 7, 8]
+    assert blocks.sides == {2: [2, 3], 3: [3, 4], 4: [4, 5], 5: [5, 0, 1, 2], 6: [6, 7], 7: [7, 8], 8: [8, 6]}

@@ -403,7 +403,7 @@ def test_arrays_of_any_length_survive(tmp_path):
     without a partial last one: all read back bit for bit."""
     row = sum(8 * (*f.shape, 1)[0] if f.dtype == "float64" else 4 for f in SERIES["tips"]) + 41
     last = (SMALL - 8) // row
-    for n in (1, 7, last, last + 1, 1 << 16, (1 << 16) + 12345):
+    for n in (1, 7, last, last + 1, 1 << 16, (1 << 16) + 12345, 3):
         rng = np.random.default_rng(n)
         names = {f.name: rng.random((n, *f.shape)) for f in SERIES["tips"] if f.dtype == "float64"}
         names |= {f.name: rng.integers(0, 99, n) for f in SERIES["tips"] if f.dtype == "int32"}
