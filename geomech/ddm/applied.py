@@ -187,7 +187,7 @@ def _left_over(wedge: WedgeLoad, body: Body) -> LineForces:
         d = edges[edge, 1] - edges[edge, 0]
         t = d / np.hypot(*d)
         rel = edges[edge] - wedge.point
-        if np.abs(rel @ np.array([-t[1], t[0]])).max() <= 1e-9 * body._extent:
+        if np.abs(rel @ np.array([-t[1], t[0]])).max() <= 1e-9 * body._extent + 2 * body._tol:
             continue
         out = np.array([t[1], -t[0]])
 

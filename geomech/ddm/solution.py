@@ -216,12 +216,14 @@ class Solution:
         n = len(points)
         where, double = self._ends.aside(points, side)
         stress, shift = np.zeros((len(where), 3)), np.zeros((len(where), 2))
-        nu = body.nu
+        nu, net = body.nu, sum((p.force for p in self._applied.kelvin), np.zeros(2))
 
         def add(start, end, kind, density, tol, force, side=1.0):
             add_fields(where, start, end, kind, density, nu, tol, side, force, stress, shift)
             if force:
-                shift[:] += _kelvin_constant(start, end, density, nu)
+                constant, carried = _kelvin_constant(start, end, density, nu)
+                shift[:] += constant
+                net[:] += carried
 
         for elements, values, seen_from in ((body.boundary, self._u, 1.0), (body.faces, self.jumps, side)):
             if elements.n:
@@ -239,6 +241,10 @@ class Solution:
             add(edges[:, 0], edges[:, 1], kind, self._edge_density, body._tol, True)
         for part in self._applied.lines:
             add(part.start, part.end, np.zeros(len(part.start), np.int64), part.density, 2 * OFF * body._extent, True)
+        if body.outlined:
+            # Forces that are in equilibrium but for the discretisation's error: their logarithms in units of the body, or
+            # displacement would know the unit of length.
+            shift += net * (3 - 4 * nu) * np.log(body._reach) / (4 * np.pi * (1 - nu))
         shift /= 2 * body.material.shear_modulus
         stress, shift = stress + self._applied.stress(where), shift + self._applied.displacement(where)
         for field in (stress, shift):
@@ -289,14 +295,19 @@ class Solution:
         return np.array([mean[0] - turn * arm[1], mean[1] + turn * arm[0], turn])
 
 
-def _kelvin_constant(start: np.ndarray, end: np.ndarray, density: np.ndarray, nu: float) -> np.ndarray:
-    """(2,) 2μ times the translation by which line forces in their own frames differ from Kelvin's solution.
+def _kelvin_constant(
+    start: np.ndarray, end: np.ndarray, density: np.ndarray, nu: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(2,) 2μ times the translation by which line forces in their own frames differ from Kelvin's solution, and their sum.
 
     The kernels have −y²/r² for his x²/r² = 1 − y²/r², which moves every element by a constant along itself; without it the
     plane would not be at rest far away.
     """
-    along = (end - start) * (density[:, 0] @ (shapes.moments()[shapes.ORDINARY, : density.shape[2]]))[:, None]
-    return along.sum(axis=0) / (8 * np.pi * (1 - nu))
+    whole = 0.5 * density @ shapes.moments()[shapes.ORDINARY, : density.shape[2]]
+    along = end - start
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    moved = (along * whole[:, :1]).sum(axis=0)
+    return moved / (4 * np.pi * (1 - nu)), moved + (across * whole[:, 1:]).sum(axis=0)
 
 
 def _rigid(motion: np.ndarray, centre: np.ndarray, points: np.ndarray) -> np.ndarray:
