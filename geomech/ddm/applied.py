@@ -16,6 +16,7 @@ from .point_loads import KelvinLoad, WedgeLoad
 from .unit_loads import on_elements
 
 if TYPE_CHECKING:
+    from .anchors import Anchors
     from .body import Body
 
 #: Where a point load cannot be singular it is spread over this part of the extent of the body.
@@ -53,8 +54,11 @@ class Applied:
         """Line forces besides the segments."""
         return [part for part in (self.functions, self.left_over) if part is not None]
 
-    def on(self, targets: ElementSet, on_boundary: bool, nu: float, tol: float) -> np.ndarray:
-        """(n_unknowns,) traction at the collocation nodes of ``targets`` from what is not `plain`."""
+    def on(
+        self, targets: ElementSet, on_boundary: bool, nu: float, tol: float, anchors: Anchors | None = None
+    ) -> np.ndarray:
+        """(n_unknowns,) traction at the collocation nodes of ``targets`` from what is not `plain`; ``anchors`` of the boundary's
+        held holes."""
         out = np.zeros(targets.n_unknowns)
         points = targets.nodes.reshape(-1, 2)
         # On the boundary, the wedges' own traction is what its line forces stand for.
@@ -62,6 +66,12 @@ class Applied:
             out += on_elements(targets, p.stress(points))
         for part in self.lines:
             out += part.on(targets, on_boundary, nu, tol)
+        if anchors is not None:
+            for part in self.lines:
+                unit = anchors.of_forces(part.start, part.end, part.density.shape[2] - 1)
+                out += anchors.rows @ np.tensordot(unit, part.density, 3)
+            for p in self.kelvin:
+                out += anchors.rows @ anchors.of_points(p.point[None], p.force[None])
         return out
 
     def stress(self, points: np.ndarray) -> np.ndarray:

@@ -90,9 +90,10 @@ class Body:
         self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
         marked: list[tuple[np.ndarray, int]] = []
         if self.supports:
-            n_outline = len(self.loops[0]) if self.outlined else 0
-            self.support_segments = place(self.supports, edges, n_outline, self._extent)
-            marked = marks(self.supports, self.support_segments, self.loops[0], settings.grading_layers)
+            if not self.outlined:
+                raise ValueError("supports need a body with an outline")
+            self.support_segments = place(self.supports, edges, self._extent)
+            marked = marks(self.supports, self.support_segments, self.loops, settings.grading_layers)
         self.mesh: Mesh = mesh(self.loops, cracks, settings, marked)
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
@@ -147,16 +148,24 @@ class Body:
         self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k))
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
-        self._loads = UnitLoads(self.mesh, self.centroid, self.material, tol, self._extent, self.outlined)
+        self._loads = UnitLoads(
+            self.mesh, self.centroid, self.material, tol, self._extent, self.outlined, system.anchors
+        )
         if same_boundary:
             self._loads.inherit(old._loads, c_old)
+        if self.compressed and system.anchors is not None:
+            raise ValueError("supports on holes need the dense solver")
         if self.compressed:
             self._w, self.crack_system = compressed(c, g, self.cracks.crack[c.source], system.solve, self._cg, nu, tol)
             return
         # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
         # make again, should the boundary change, than to carry along.
         everything = np.arange(g.n)
-        gc = block(g, c)
+
+        def gc(k):
+            rows = influence(g, c.take(k), nu, tol)
+            return rows if system.anchors is None else system.anchored(rows, system.anchors.of_jumps(c.take(k)))
+
         kept = same_boundary and not old.compressed
         self._w = reuse(
             old._w if kept else None,
@@ -164,7 +173,7 @@ class Body:
             c_old,
             g,
             c,
-            lambda r, k: system.solve(gc(everything, k)),
+            lambda r, k: system.solve(gc(k)),
         )
         cc = block(c, c)
 
@@ -240,7 +249,7 @@ class Body:
             rest[n_g:] = on_elements(self.faces, uniform)
         if not applied.plain:
             tol = 2 * OFF * self._extent
-            rest[:n_g] += applied.on(self.boundary, True, self.nu, tol)
+            rest[:n_g] += applied.on(self.boundary, True, self.nu, tol, self._outside.anchors)
             rest[n_g:] += applied.on(self.faces, False, self.nu, tol)
         imposed = np.zeros(0)
         if self.supports:

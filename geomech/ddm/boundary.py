@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .anchors import Anchors
 from .factor import Factor
 from .influence import ElementSet, influence, reuse
 from .mesh import Mesh
@@ -28,6 +29,7 @@ class BoundarySystem:
     rigid         (n, k) rigid motions of every loop that no support resists, nodal values
     weights       (k, n) their mean over the loop
     free_motions  those of the whole body, None when nothing is held
+    anchors       of the holes that are held, or None: they add to the boundary's rows, of ``matrix`` and of all loads
     factor        of ``matrix`` with the rigid motions lifted
     unchanged     whether all is ``previous``'s; ``at_old`` (n_elements,) the elements' numbers there, −1 where new
 
@@ -53,30 +55,54 @@ class BoundarySystem:
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
             self.matrix, self.known, self.factor = previous.matrix, previous.known, previous.factor
             self.rigid, self.weights, self.free_motions = previous.rigid, previous.weights, previous.free_motions
+            self.anchors = previous.anchors
             return
         self.elements, self.holds, self.extent = g, holds, extent
-        self.matrix = reuse(
-            previous.matrix if previous else None, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k)
-        )
+        # With holes anchored, the old matrix is not one of tractions alone.
+        known = previous.matrix if previous and previous.anchors is None else None
+        self.matrix = reuse(known, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
         self.known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
         self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
         self.free_motions: FreeMotions | None = None
+        self.anchors: Anchors | None = None
         if holds is not None:
-            self._hold_motions(mesh.edge_loop)
+            self._hold_motions(mesh)
+        if self.anchors is not None:
+            anchors = self.anchors
+            self.anchored(self.matrix, holds.mixed(anchors.of_jumps(g), anchors.of_shapes(holds.sources)))
+            self.anchored(self.known, anchors.of_jumps(holds.sources))
         # Column-major like the matrix: a sum of both orders takes several times as long.
         lifted = (self.weights.T @ self.rigid.T).T / extent
         self.factor = Factor(self.matrix + lifted, "the boundary equations are singular")
 
-    def _hold_motions(self, edge_loop: np.ndarray) -> None:
-        """Keep of the outline's rigid motions those that are free."""
+    def _hold_motions(self, mesh: Mesh) -> None:
+        """Keep of the rigid motions those that are free, and anchor holes by the others."""
         holds, g = self.holds, self.elements
-        free = holds.free_motions(self.rigid[:, :3])
-        self.free_motions = FreeMotions(*middle_of(g.take(np.flatnonzero(edge_loop[g.source] == 0)))[1:], free)
+        loop_of = mesh.edge_loop[g.source]
+        _, centre, radius = middle_of(g.take(np.flatnonzero(loop_of == 0)))
+        whole, _ = rigid_motions(g, np.zeros_like(mesh.edge_loop), (centre, radius))
+        self.free_motions = FreeMotions(centre, radius, holds.free_motions(whole))
         keep = ~holds.unknowns
-        modes = holds.turned(self.rigid[:, :3] @ free) * keep[:, None]
-        means = holds.turned((free.T @ self.weights[:3]).T).T * keep
-        self.rigid = np.hstack([modes, self.rigid[:, 3:]])
-        self.weights = np.concatenate([means, self.weights[3:]])
+        modes, means, anchors = [], [], Anchors(self._nu, self.extent)
+        for k in range(int(mesh.edge_loop.max()) + 1):
+            motions, weights = self.rigid[:, 3 * k : 3 * k + 3], self.weights[3 * k : 3 * k + 3]
+            # The outline goes where the whole body goes; a hole's own boundary is free as far as nothing holds that hole.
+            free = self.free_motions.combinations if k == 0 else holds.free_motions(motions)
+            modes.append(motions @ free)
+            means.append(holds.turned((free.T @ weights).T).T * keep)
+            if k and free.shape[1] < 3:
+                held = np.linalg.svd(free.T)[2][free.shape[1] :].T
+                _, middle, size = middle_of(g.take(np.flatnonzero(loop_of == k)))
+                hole = mesh.edges[mesh.edge_loop == k, 0]
+                anchors.add(motions @ held / self.extent, held, middle, size, hole)
+        self.rigid, self.weights = np.hstack(modes), np.concatenate(means)
+        self.anchors = anchors if anchors.number else None
+
+    def anchored(self, rows: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """``rows`` (n_elements' rows, k) of the boundary with what sources that give held holes ``motions`` (r, k) add, in
+        place."""
+        rows += self.anchors.rows @ motions
+        return rows
 
     def influence_on(self, targets: ElementSet, elements: np.ndarray) -> np.ndarray:
         """(targets.n_unknowns, …) traction on ``targets`` from the unknowns of the boundary's ``elements``."""
@@ -120,9 +146,11 @@ def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
     return perimeter, middle, float(np.sqrt(np.einsum("ej,ejc,ejc->", ds, rel, rel) / perimeter))
 
 
-def rigid_motions(g: ElementSet, edge_loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rigid_motions(
+    g: ElementSet, edge_loop: np.ndarray, about: tuple[np.ndarray, float] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(n, 3L) rigid motions of every loop in nodal unknowns and (3L, n) their mean over the loop; ``edge_loop`` (m,) the
-    loop of every edge."""
+    loop of every edge. The turn is ``about`` a centre and moves points at a radius by one; those of the loop if left out."""
     n_loops = int(edge_loop.max()) + 1 if len(edge_loop) else 0
     modes = np.zeros((g.n, 2, g.per, 3 * n_loops))
     weights = np.zeros_like(modes)
@@ -130,6 +158,8 @@ def rigid_motions(g: ElementSet, edge_loop: np.ndarray) -> tuple[np.ndarray, np.
     for k in range(n_loops):
         here = np.flatnonzero(loop_of == k)
         perimeter, middle, radius = middle_of(g.take(here))
+        if about is not None:
+            middle, radius = about
         rel, ds = g.nodes[here] - middle, g.quadrature[here]
         one, zero = np.ones(ds.shape), np.zeros(ds.shape)
         for m, motion in enumerate(((one, zero), (zero, one), (-rel[..., 1] / radius, rel[..., 0] / radius))):

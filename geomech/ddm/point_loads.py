@@ -11,11 +11,15 @@ from ..model import Material
 
 @dataclass(frozen=True, eq=False)
 class KelvinLoad:
-    """A force (2,) N/m at ``point`` (2,) of the infinite plane (Kelvin 1848; Crouch & Starfield 1983, §4.2)."""
+    """A force (2,) N/m at ``point`` (2,) of the infinite plane (Kelvin 1848; Crouch & Starfield 1983, §4.2).
+
+    Logarithms in displacement are of distances in units of ``unit`` (m).
+    """
 
     point: np.ndarray
     force: np.ndarray
     material: Material
+    unit: float = 1.0
 
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) Pa."""
@@ -44,7 +48,7 @@ class KelvinLoad:
         r2 = np.sum(rel * rel, axis=1)[:, None]
         mu, nu = self.material.shear_modulus, self.material.effective_poissons_ratio
         along = (rel @ self.force)[:, None] / r2
-        return (-(3 - 4 * nu) * 0.5 * np.log(r2) * self.force + along * rel) / (8 * np.pi * mu * (1 - nu))
+        return (-(3 - 4 * nu) * 0.5 * np.log(r2 / self.unit**2) * self.force + along * rel) / (8 * np.pi * mu * (1 - nu))
 
 
 @dataclass(frozen=True, eq=False)

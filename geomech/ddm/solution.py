@@ -244,7 +244,7 @@ class Solution:
         if body.outlined:
             # Forces that are in equilibrium but for the discretisation's error: their logarithms in units of the body, or
             # displacement would know the unit of length.
-            shift += net * (3 - 4 * nu) * np.log(body._reach) / (4 * np.pi * (1 - nu))
+            shift += net * (3 - 4 * nu) * np.log(body._extent) / (4 * np.pi * (1 - nu))
         shift /= 2 * body.material.shear_modulus
         stress, shift = stress + self._applied.stress(where), shift + self._applied.displacement(where)
         for field in (stress, shift):

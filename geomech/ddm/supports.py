@@ -1,4 +1,4 @@
-"""Supports: pieces of the outline on which displacement is imposed instead of traction, in both directions or in one.
+"""Supports: pieces of the boundary on which displacement is imposed instead of traction, in both directions or in one.
 
 On an element that a support holds, the known displacement goes to the right-hand side and the unknown is the reaction, a
 Kelvin line force with the shape functions that displacement has elsewhere. What is held is a pair of directions of every
@@ -25,9 +25,9 @@ _KINDS = ("both", "normal", "tangent", "x", "y")
 
 @dataclass(frozen=True)
 class Support:
-    """A piece of a body's outline that is held.
+    """A piece of a body's boundary that is held.
 
-    on     the number of an edge of the outline, or a straight piece of the boundary ((x, y), (x, y)), m
+    on     the number of an edge (the outline's first, then the holes'), or a straight piece of the boundary ((x, y), (x, y)), m
     hold   "both" (pinned), "normal" (a roller: free to slide along the side), "tangent", "x", "y", or a direction (x, y)
     name   what messages call it
 
@@ -57,11 +57,9 @@ class Support:
         object.__setattr__(self, "hold", tuple((way / np.hypot(*way)).tolist()))
 
 
-def place(supports: Sequence[Support], edges: np.ndarray, n_outline: int, extent: float) -> np.ndarray:
-    """(k, 2, 2) where the ``supports`` stand, each along the one of ``edges`` (m, 2, 2) it is on, of which the first
-    ``n_outline`` are the outline's. Raises ValueError naming the support: no such edge, off the outline, no length, overlap."""
-    if not n_outline:
-        raise ValueError("supports need a body with an outline")
+def place(supports: Sequence[Support], edges: np.ndarray, extent: float) -> np.ndarray:
+    """(k, 2, 2) where the ``supports`` stand, each along the one of ``edges`` (m, 2, 2) it is on. Raises ValueError naming the
+    support: no such edge, off the boundary, no length, overlap."""
     out = np.empty((len(supports), 2, 2))
     on = np.empty(len(supports), int)
     for k, support in enumerate(supports):
@@ -70,10 +68,8 @@ def place(supports: Sequence[Support], edges: np.ndarray, n_outline: int, extent
             out[k], _, on[k] = onto_boundary(edges, np.array(support.on), name, extent)
         else:
             if not 0 <= support.on < len(edges):
-                raise ValueError(f"{name}: there is no edge {support.on}, the outline has {n_outline}")
+                raise ValueError(f"{name}: there is no edge {support.on}, the body has {len(edges)}")
             out[k], on[k] = edges[support.on], support.on
-        if on[k] >= n_outline:
-            raise ValueError(f"{name}: stands on a hole; only the outline of a body can be held")
         for m in range(k):
             if on[m] == on[k]:
                 d = edges[on[k], 1] - edges[on[k], 0]
@@ -84,25 +80,27 @@ def place(supports: Sequence[Support], edges: np.ndarray, n_outline: int, extent
 
 
 def marks(
-    supports: Sequence[Support], placed: np.ndarray, loop: np.ndarray, layers: int
+    supports: Sequence[Support], placed: np.ndarray, loops: Sequence[np.ndarray], layers: int
 ) -> list[tuple[np.ndarray, int]]:
-    """Where the boundary needs nodes and how many graded layers there: the ends of the ``placed`` supports on an outline
-    ``loop`` (n, 2).
+    """Where the boundary needs nodes and how many graded layers there: the ends of the ``placed`` supports on ``loops``.
 
     Reactions are singular there like r^(−½) inside a side. At a corner they are so between a pinned and a free side, but not
     at a right angle between a roller and a free side (mirrored there, the corner is none) or between two held sides.
     """
-    extent = np.ptp(loop, axis=0).max()
+    tiny = 1e-9 * np.ptp(loops[0], axis=0).max()
+    before = np.concatenate([np.roll(loop, 1, axis=0) for loop in loops])
+    after = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
+    corners = np.concatenate(loops)
     out, ends = [], placed.reshape(-1, 2)
     for k, end in enumerate(ends):
         more = INSIDE_LAYERS
-        corner = np.hypot(*(loop - end).T) <= 1e-9 * extent
+        corner = np.hypot(*(corners - end).T) <= tiny
         if corner.any():
             at = int(np.argmax(corner))
-            before, after = loop[at - 1] - loop[at], loop[(at + 1) % len(loop)] - loop[at]
-            turn = np.arctan2(after[0] * before[1] - after[1] * before[0], after @ before) % (2 * np.pi)
+            u, v = after[at] - corners[at], before[at] - corners[at]
+            turn = np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v) % (2 * np.pi)
             others = np.delete(ends, k, axis=0)
-            met = (np.hypot(*(others - end).T) <= 1e-9 * extent).any()
+            met = (np.hypot(*(others - end).T) <= tiny).any()
             rolls = supports[k // 2].hold != "both" and turn < 0.55 * np.pi
             if met or rolls:
                 continue
@@ -189,14 +187,23 @@ class Holds:
         which = np.flatnonzero(at >= 0)
         if not len(which) or not len(matrix):
             return matrix
-        sources = self.sources.take(at[which])
-        # By columns, as they stand in memory.
-        columns = matrix.T.reshape(len(elements), 2, sources.per, len(matrix))
-        force = line_influence(targets, sources, nu, tol, -1.0).T.reshape(len(which), *columns.shape[1:])
-        pair = np.stack([columns[which], force / sources.length[:, None, None, None]])
-        pair = np.einsum("hjc,fhcnr->fhjnr", self.directions[at[which]], pair)
-        columns[which] = np.where(self.held[at[which]][:, :, None, None], pair[1], pair[0])
+        force = line_influence(targets, self.sources.take(at[which]), nu, tol, -1.0)
+        self._swap(matrix, force, which, at[which])
         return matrix
+
+    def mixed(self, jumps: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Columns (r, n_unknowns) of unit ``jumps`` on the boundary with those of unit ``forces`` (r, h_unknowns) where held."""
+        out = np.asfortranarray(jumps).copy(order="F")
+        self._swap(out, np.asfortranarray(forces), self.elements, np.arange(len(self.elements)))
+        return out
+
+    def _swap(self, matrix: np.ndarray, force: np.ndarray, which: np.ndarray, at: np.ndarray) -> None:
+        # By columns, as they stand in memory.
+        rows, per = len(matrix), self.boundary.per
+        columns = matrix.T.reshape(-1, 2, per, rows)
+        force = force.T.reshape(len(which), 2, per, rows) / self.sources.length[at][:, None, None, None]
+        pair = np.einsum("hjc,fhcnr->fhjnr", self.directions[at], np.stack([columns[which], force]))
+        columns[which] = np.where(self.held[at][:, :, None, None], pair[1], pair[0])
 
     def known(self, targets: ElementSet, nu: float, tol: float) -> np.ndarray:
         """(targets.n_unknowns, h_unknowns) traction on ``targets`` from displacement of the held elements, local."""

@@ -15,6 +15,7 @@ from .particular import Particular, edge_densities
 from .placing import OFF, onto_boundary
 
 if TYPE_CHECKING:
+    from .anchors import Anchors
     from .applied import Applied
 
 #: Loads on so many different segments are remembered.
@@ -45,13 +46,23 @@ class UnitLoad:
 class UnitLoads:
     """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `kernels` for ``tol``.
 
-    ``outlined``: whether the first loop is an outline; if not, all are holes in the infinite plane.
+    ``outlined``: whether the first loop is an outline; if not, all are holes in the infinite plane. ``anchors``: of the
+    boundary's held holes.
     """
 
-    def __init__(self, mesh: Mesh, centroid: np.ndarray, material: Material, tol: float, extent: float, outlined: bool):
+    def __init__(
+        self,
+        mesh: Mesh,
+        centroid: np.ndarray,
+        material: Material,
+        tol: float,
+        extent: float,
+        outlined: bool,
+        anchors: Anchors | None = None,
+    ):
         self.mesh, self.boundary, self.faces = mesh, mesh.boundary, mesh.cracks
         self.centroid, self.material, self.nu = centroid, material, material.effective_poissons_ratio
-        self.tol, self.extent = tol, extent
+        self.tol, self.extent, self.anchors = tol, extent, anchors
         n_loops = int(mesh.edge_loop.max()) + 1 if len(mesh.edges) else 0
         self.in_plane, self.n_holes = not outlined, n_loops - outlined
         self._segments: dict[bytes, UnitLoad] = {}
@@ -179,8 +190,13 @@ class UnitLoads:
         t = d / np.hypot(*d.T)[:, None]
         turn = np.stack([t, np.column_stack([-t[:, 1], t[:, 0]])], axis=1)
         by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
-        out = np.einsum("nmce,mcx->mnex", by_end, turn)
-        return np.ascontiguousarray(out.reshape(len(segments), targets.n_unknowns, 4))
+        out = np.einsum("nmce,mcx->mnex", by_end, turn).reshape(len(segments), targets.n_unknowns, 4)
+        if targets is self.boundary and self.anchors is not None:
+            unit = self.anchors.of_forces(segments[:, 0], segments[:, 1], 1)
+            by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
+            moved = np.einsum("rmce,mcx->mrex", by_end, turn).reshape(len(segments), -1, 4)
+            out = out + self.anchors.rows @ moved
+        return np.ascontiguousarray(out)
 
     def _hole(self, number: int) -> np.ndarray:
         """Edges of a hole."""
@@ -198,6 +214,9 @@ class UnitLoads:
         """
         densities = self._edge_densities(name)
         applied = [self._from_edges(self.boundary, densities), self._on_faces(name, self.faces, densities)]
+        if self.anchors is not None:
+            unit = self.anchors.of_forces(self.mesh.edges[:, 0], self.mesh.edges[:, 1], 2)
+            applied[0] += self.anchors.rows @ np.tensordot(unit, densities, 3)
         return UnitLoad(np.concatenate(applied), densities=densities)
 
     def _edge_densities(self, name: str | int) -> np.ndarray:

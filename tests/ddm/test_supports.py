@@ -5,7 +5,7 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm import Support
-from geomech.model import Cracks, Material
+from geomech.model import Cracks, DdmSettings, Material
 
 ROCK = Material("rock", youngs_modulus=10e9, poissons_ratio=0.25)
 SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
@@ -168,14 +168,65 @@ def test_growth_reuses_a_held_boundary():
     assert solutions[1].residual < 1e-9
 
 
+@pytest.mark.parametrize("hold", ["both", "x", (0.6, 0.8)])
+def test_a_held_hole_holds_the_body(hold):
+    """The hole moves as a linear displacement, the outline carries the uniform stress that goes with it: displacement is
+    absolute, to round-off. What the hole's support leaves free keeps the outline's mean at zero."""
+    hole = np.array([[-0.2, -0.1], [0.3, -0.2], [0.4, 0.35], [-0.15, 0.4]])
+    body = ddm.Body([SQUARE], NONE, ROCK, holes=[hole], supports=tuple(Support(k, hold) for k in range(4, 8)))
+    gradient = np.array([[1e-4, 3e-4], [-2e-4, 5e-5]])
+    xx, yy, xy = np.linalg.solve(ROCK.compliance(), [gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
+    along = body.mesh.edges[:, 1] - body.mesh.edges[:, 0]
+    out = np.column_stack([along[:, 1], -along[:, 0]]) / np.hypot(*along.T)[:, None]
+    carried = out @ np.array([[xx, xy], [xy, yy]])
+    if hold != "both":
+        way = np.array((1.0, 0.0) if hold == "x" else hold)
+        carried[4:] -= np.outer(carried[4:] @ way, way)
+    sides = dict(enumerate(carried if hold != "both" else carried[:4]))
+    sol = body.solve(ddm.BodyLoad(sides=sides, displacements=[lambda x: x @ gradient.T] * 4))
+    points = np.array([[0.7, 0.2], [-0.7, 0.8]])
+    assert np.allclose(sol.displacement(points), points @ gradient.T, rtol=0, atol=1e-11 * 3e-4)
+    assert np.allclose(sol.stress(points), [xx, yy, xy], rtol=1e-10)
+
+
+def test_a_block_hangs_on_a_bolt():
+    """A pinned hole takes weight, tractions and point loads in whatever form they come, with a crack that grows beside it;
+    against order 7, and from body to body."""
+    bolt = tuple(Support(k) for k in range(4, 8))
+    lines = np.array([[-0.8, 0.5], [-0.5, 0.7], [-0.4, 0.75]])
+    loads = (
+        (ddm.BodyLoad(body_force=[1e4, -2e4]), [3.64e4, -7.28e4]),
+        (ddm.BodyLoad(points=[[1, 0.3], [-0.6, -0.6]], forces=[[1e4, 0], [0, 2e4]]), [1e4, 2e4]),
+        (ddm.BodyLoad(sides={2: [1e4, -2e4], 1: lambda x: 1e4 * x}), [4e4, -4e4]),
+    )
+    first = ddm.Body(
+        [SQUARE], Cracks.from_polylines([lines[:2]], aperture=np.inf), ROCK, holes=[0.3 * SQUARE], supports=bolt
+    )
+    for load, force in loads:
+        first.solve(load)
+        first.solve(load)
+    grown = Cracks.from_polylines([lines], aperture=np.inf)
+    body = ddm.Body([SQUARE], grown, ROCK, holes=[0.3 * SQUARE], supports=bolt, previous=first)
+    fine = ddm.Body([SQUARE], grown, ROCK, DdmSettings(order=7), holes=[0.3 * SQUARE], supports=bolt)
+    for load, force in loads:
+        sol = body.solve(load)
+        size = np.abs(force).max()
+        # What four singular corners of the bolt leave.
+        assert np.allclose(sol.reactions.force.sum(axis=0), -np.array(force), rtol=0, atol=1e-4 * size)
+        other = fine.solve(load).tips
+        scale = np.hypot(other["k_i"], other["k_ii"]).max()
+        assert np.allclose(sol.tips["k_i"], other["k_i"], rtol=0, atol=3e-4 * scale)
+        assert sol.residual < 1e-9
+
+
 @pytest.mark.parametrize(
     ("supports", "message"),
     [
-        ((Support(8, name="base"),), "support 'base': there is no edge 8, the outline has 4"),
+        ((Support(8, name="base"),), "support 'base': there is no edge 8, the body has 8"),
         ((Support(((-1, -1.1), (1, -1.1))),), "support 0 lies .* off the boundary"),
         ((Support(((0.5, -1), (0.5, -1))),), "support 0 has no length"),
         ((Support(0), Support(((0.5, -1), (0.8, -1)), name="b")), "support 0 and support 'b' overlap"),
-        ((Support(4),), "stands on a hole"),
+        ((Support(5), Support(((0.3, 0.3), (0.3, -0.3)), "x")), "support 0 and support 1 overlap"),
     ],
 )
 def test_refusals_name_the_support(supports, message):
