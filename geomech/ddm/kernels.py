@@ -276,7 +276,8 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
                     # Twice the angle from the element to the target.
                     turn = both(ux * tx + uy * ty, uy * tx - ux * ty)
                     turn = turn * turn
-                    # Half the trace and, turned, the shear and half the deviator (σyy − σxx)/2 of each direction.
+                    # Traction along the normal + i times that along the tangent, from what acts along and across the
+                    # element: (half the deviator (σyy − σxx)/2 + i shear), turned, and half the trace.
                     if force:
                         for k in range(n1):
                             at = k * _STEP
