@@ -9,6 +9,7 @@ from importlib import import_module
 TOPICS = {
     "accuracy": "geomech.bench.accuracy",
     "ddm": "geomech.bench.work_precision",
+    "kernels": "geomech.bench.kernels",
     "startup": "geomech.bench.startup",
 }
 

@@ -16,19 +16,19 @@ from . import kernels, shapes
 #: Element–point pairs (some 30 ns each) below which another thread does not pay for itself.
 PAIRS_PER_THREAD = 8000
 #: The processors this process may use, where the system tells.
-_THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 _pool: ThreadPoolExecutor | None = None
 
 
 def _spread(n: int, pairs: int, work: Callable[[int, int], None]) -> None:
     """Run ``work(first, last)`` over range(n), in chunks on threads when there is enough of it."""
     global _pool
-    chunks = min(_THREADS, pairs // PAIRS_PER_THREAD)
+    chunks = min(THREADS, pairs // PAIRS_PER_THREAD)
     if chunks < 2:
         work(0, n)
         return
     if _pool is None:
-        _pool = ThreadPoolExecutor(_THREADS, thread_name_prefix="geomech-ddm")
+        _pool = ThreadPoolExecutor(THREADS, thread_name_prefix="geomech-ddm")
     bounds = np.linspace(0, n, chunks + 1).astype(int)
     # list() hands on what a thread raised.
     list(_pool.map(work, bounds[:-1].tolist(), bounds[1:].tolist()))

@@ -190,7 +190,7 @@ def test_an_entry_depends_on_its_two_elements_alone(monkeypatch):
         assert np.array_equal(part, whole[np.ix_(targets.unknowns(r), sources.unknowns(k))])
     monkeypatch.setattr(matrices, "PAIRS_PER_THREAD", 100)
     for threads in (1, 2, 3, 7):
-        monkeypatch.setattr(matrices, "_THREADS", threads)
+        monkeypatch.setattr(matrices, "THREADS", threads)
         assert np.array_equal(influence(targets, sources, NU, 1e-9), whole)
 
 
@@ -212,5 +212,5 @@ def test_a_field_at_a_point_does_not_depend_on_other_points(monkeypatch):
         chosen = rng.permutation(700)[:n]
         assert np.array_equal(at(chosen), whole[chosen])
     monkeypatch.setattr(matrices, "PAIRS_PER_THREAD", 100)
-    monkeypatch.setattr(matrices, "_THREADS", 3)
+    monkeypatch.setattr(matrices, "THREADS", 3)
     assert np.array_equal(at(np.arange(700)), whole)
