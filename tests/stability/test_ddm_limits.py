@@ -94,6 +94,15 @@ def test_a_sliver_below_a_surface():
     assert 2 * size[1] - size[0] == pytest.approx(1, rel=0.01)
 
 
+@pytest.mark.parametrize("degrees", [10, 5, 4])
+def test_a_mouth_at_a_small_angle(degrees):
+    """A crack 0.8 long that leaves the side nearly along it: default settings against order 8 (found: 2e-4, 4e-4, 8e-4)."""
+    t = math.radians(degrees)
+    cracks = lines([[-1, 0], [-1 + 0.8 * math.sin(t), 0.8 * math.cos(t)]], surface=[(True, False)])
+    exact = factors(ddm.Body([SQUARE], cracks, ROCK, DdmSettings(order=8, grading_layers=4)).solve(pull(1, 1)))
+    assert off(ddm.Body([SQUARE], cracks, ROCK).solve(pull(1, 1)), exact) < 3e-3
+
+
 def test_thinner_slivers_are_refused():
     """1e-4 of the crack would take ten thousand elements."""
     for cracks in (
