@@ -102,6 +102,10 @@ youngs_modulus_pa = 5e9
 poissons_ratio = 0.3
 density_kg_m3 = 2000
 k_ic_pa_sqrt_m = 5e5
+k_iic_pa_sqrt_m = 8e5
+tensile_strength_pa = 4e6
+cohesion_pa = 2e7
+internal_friction_angle_deg = 45
 plane = "stress"
 [loads]
 gravity_m_s2 = [0.0, -9.81]
@@ -137,6 +141,9 @@ increment_m = 0.02
 min_increment_m = 0.001
 join_distance = 0.7
 max_passes = 11
+initiation = "surface"
+initiation_distance_m = 0.003
+initiation_spacing_m = 0.05
 [run]
 end_time_s = 5
 stop_at = ["initiation"]
@@ -184,9 +191,15 @@ def test_every_setting_arrives(scene_file):
         "grading_ratio": 0.4,
         "grading_layers": 1,
         "solver": "compressed",
+        "target_error": None,
+        "grading_error": None,
     }
     assert (p.growth.criterion, p.growth.increment, p.growth.min_increment) == ("g", 0.02, 0.001)
     assert (p.growth.join_distance, p.growth.max_passes) == (0.7, 11)
+    assert (p.growth.initiation, p.growth.initiation_distance, p.growth.initiation_spacing) == ("surface", 0.003, 0.05)
+    whole = next(m for m in p.materials if math.isfinite(m.cohesion))
+    assert (whole.k_iic, whole.tensile_strength, whole.cohesion) == (8e5, 4e6, 2e7)
+    assert whole.friction_angle == pytest.approx(math.pi / 4)
     assert p.run.end_time == 5 and p.run.stop_at == ("initiation",)
     assert p.gauge == ((0, (0.5, 0.0)), (0, (0.5, 1.0)))
     assert p.monitors == {"corner": (0, (1.0, 1.0))}
