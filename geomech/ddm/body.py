@@ -269,8 +269,7 @@ class Body:
     @cached_property
     def laws(self) -> FaceLaws:
         """The faces' laws, node by node."""
-        cracks = self.cracks
-        return FaceLaws(self.face_laws, self.faces, cracks.aperture, cracks.law, 2 * self.material.shear_modulus)
+        return FaceLaws(self.face_laws, self.faces, self.cracks, 2 * self.material.shear_modulus)
 
     @cached_property
     def never_loaded(self) -> FaceMemory:

@@ -5,6 +5,7 @@ filling of stiffness k_n: λ = −k_n (w_n + a)/2μ. Closed faces carry shear up
 or through k_s. Faces with tensile strength are cemented: they hold together, without aperture, until the normal traction
 passes the strength at a node; there cement and cohesion are lost for good. Cohesion otherwise is not used up by slip.
 Stiffness does not act across open faces.
+What grows is torn from whole rock: fresh faces have the friction of their crack's law, but no cohesion, cement or filling.
 """
 
 from __future__ import annotations
@@ -97,24 +98,25 @@ class FaceLaws:
     normal, shear   stiffness of the filling over 2μ, Pa/m; inf: rigid
     """
 
-    def __init__(
-        self, laws: Sequence[JointLaw], elements: ElementSet, aperture: np.ndarray, law: np.ndarray, twice_mu: float
-    ):
+    def __init__(self, laws: Sequence[JointLaw], elements: ElementSet, cracks: Cracks, twice_mu: float):
         self.elements, self.twice_mu = elements, twice_mu
 
         def at_nodes(values: np.ndarray) -> np.ndarray:
             return np.repeat(values[elements.source], elements.per)
 
-        def of_law(value) -> np.ndarray:
-            return at_nodes(np.array([value(one) for one in laws], dtype=float)[law])
+        def of_law(value, fresh: float) -> np.ndarray:
+            of_segment = np.array([value(one) for one in laws], dtype=float)[law]
+            return at_nodes(np.where(cracks.birth_cycle > 0, fresh, of_segment))
 
-        apart = at_nodes(aperture)
+        law, apart = cracks.law, at_nodes(cracks.aperture)
         self.closes = np.isfinite(apart)
         self.aperture = np.where(self.closes, twice_mu * np.where(self.closes, apart, 0.0), 0.0)
-        self.friction, self.cohesion = of_law(lambda one: one.friction), of_law(lambda one: one.cohesion)
-        self.strength = of_law(lambda one: one.tensile_strength)
-        self.normal = of_law(lambda one: np.inf if one.normal_stiffness is None else one.normal_stiffness) / twice_mu
-        self.shear = of_law(lambda one: np.inf if one.shear_stiffness is None else one.shear_stiffness) / twice_mu
+        self.friction = at_nodes(np.array([one.friction for one in laws])[law])
+        self.cohesion = of_law(lambda one: one.cohesion, 0.0)
+        self.strength = of_law(lambda one: one.tensile_strength, 0.0)
+        rigid = np.inf
+        self.normal = of_law(lambda one: one.normal_stiffness or rigid, rigid) / twice_mu
+        self.shear = of_law(lambda one: one.shear_stiffness or rigid, rigid) / twice_mu
         self.rough = self.closes & ((self.friction > 0) | (self.cohesion > 0))
         node = np.arange(elements.n * elements.per)
         along = node // elements.per * 2 * elements.per + node % elements.per

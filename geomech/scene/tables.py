@@ -143,7 +143,7 @@ class CrackTable(Table):
         "closed", description='"closed", "slot" (its faces never meet) or the initial aperture in m'
     )
     joint: str | None = Field(
-        None, description="a name of [joints] whose law its faces, and those of its wings, follow (unset: they are smooth)"
+        None, description="a name of [joints] whose law its faces follow, its wings with friction only (unset: smooth)"
     )
 
     @field_validator("aperture", mode="before")

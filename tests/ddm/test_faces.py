@@ -1,6 +1,7 @@
 """Laws of crack faces: states, inequalities at the nodes, memory, what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -204,3 +205,19 @@ def test_work_is_counted_from_body_to_body():
     again.solve(pressed(-1e6, -20e6), warm=first)
     assert again.work.bodies == 2 and again.work.boundary_assemblies == before["boundary_assemblies"] == 1
     assert again.work.elements_assembled - before["elements_assembled"] == again.counts["elements_new"]
+
+
+def test_what_grows_from_a_cemented_crack_is_not_cemented():
+    """Pulled along a wing that grew from a cemented flaw, the wing opens; drawn with the flaw it would hold."""
+    law = JointLaw("cemented", friction_angle=0.5, cohesion=5e6, tensile_strength=50e6, normal_stiffness=1e12)
+
+    def winged(birth):
+        cracks = Cracks.from_polylines([np.array([[0.0, 0.0], [1.0, 0.0], [1.3, 0.0]])])
+        cracks = replace(cracks, birth_cycle=np.array([0, birth]))
+        return ddm.Body([], cracks, ROCK, face_laws=(law,)).solve(under(0, 1e6, 0))
+
+    assert (winged(0).states == STICK).all()
+    grown = winged(1)
+    on_wing = grown.body.faces.source == 1
+    assert (grown.states[on_wing] == OPEN).all() and (grown.states[~on_wing] == STICK).all()
+    assert grown.tips["k_i"].max() > 0
