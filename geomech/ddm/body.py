@@ -331,9 +331,12 @@ class Body:
 
     def compliance(self, sol: Solution | None = None) -> np.ndarray:
         """(3, 3) added compliance, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform boundary stress,
-        with the face states of ``sol`` (all open if None); symmetrised. Raises ValueError in the infinite plane."""
+        with the face states of ``sol`` (all open if None); symmetrised. Raises ValueError in the infinite plane
+        and with supports, against which a uniform boundary stress says nothing."""
         if not self.outlined:
             raise ValueError("the mean strain of cracks needs a body with an outline")
+        if self.supports:
+            raise ValueError("the compliance that cracks add is that of a body without supports")
         if not self.faces.n:
             return np.zeros((3, 3))
         right = np.column_stack([-on_elements(self.faces, unit) for unit in np.eye(3)])

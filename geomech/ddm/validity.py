@@ -48,7 +48,10 @@ def check_outline(loops: list[np.ndarray], holes: Sequence[np.ndarray] = ()) -> 
         i, j = i[i < j], j[i < j]
         for k in np.flatnonzero(_crossing(edges[i], edges[j]))[:1]:
             i, j = i[k], j[k]
-            raise ValueError(f"the outline crosses itself: edges {i} and {j} near {_near(edges[i])}")
+            loop = np.repeat(np.arange(len(out)), [len(loop) for loop in out]) + (0 if bounded else 1)
+            one, other = ("the outline" if m == 0 else f"hole {m}" for m in loop[[i, j]])
+            what = f"{one} crosses itself: edges {i} and {j}" if one == other else f"{one} and {other} cross"
+            raise ValueError(f"{what} near {_near(edges[i])}")
     first_hole = 1 if bounded else 0
     for k, hole in enumerate(out[first_hole:], 1):
         if bounded and not inside(out[:1], hole).all():

@@ -248,5 +248,26 @@ def test_supports_and_displacements_are_checked():
         body.solve(ddm.BodyLoad(displacements=[[0, np.inf]]))
     with pytest.raises(ValueError, match="support 0: expected"):
         body.solve(ddm.BodyLoad(displacements=[[0, 1, 2]]))
+    with pytest.raises(ValueError, match="without supports"):
+        body.compliance()
+    with pytest.raises(ValueError, match="support 0: expected a Support"):
+        ddm.Body([SQUARE], NONE, ROCK, supports=("base",))
     with pytest.raises(ValueError, match="outline"):
         ddm.Body([], NONE, ROCK, supports=(Support(0),))
+
+
+def test_holes_are_checked():
+    hole = 0.3 * SQUARE
+    for holes, message in (
+        ([hole, 0.5 * hole], "hole 2: inside hole 1"),
+        ([hole, hole + 0.2], "hole 1 and hole 2 cross"),
+        ([hole[:2]], "hole 1: expected at least three vertices"),
+        ([hole * np.nan], "hole 1: vertex 0 is not finite"),
+        ([np.array([[0, 0], [1, 0], [2, 0]])], "hole 1: encloses no area"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            ddm.Body([], NONE, ROCK, holes=holes)
+    with pytest.raises(ValueError, match="the outline and hole 1 cross"):
+        ddm.Body([SQUARE], NONE, ROCK, holes=[hole + 0.9])
+    with pytest.raises(ValueError, match="lies outside the rock"):
+        ddm.Body([], Cracks.from_polylines([np.array([[0, 0], [0.1, 0]])]), ROCK, holes=[hole])
