@@ -8,7 +8,7 @@ import numpy as np
 
 from .dislocations import Arm, stress_intensity
 
-#: Atkinson, Smelser & Sanchez 1982, Table 1: a/R → coefficients T_1 … T_5 and S_1 … S_5 of the series of `atkinson`.
+#: Atkinson, Smelser & Sanchez 1982, quoted from later literature (T_1 confirmed by `central_crack` to 3e-6): a/R → coefficients T_1 … T_5 and S_1 … S_5 of the series of `atkinson`.
 T = {
     0.1: (1.014998, 0.503597, 0.376991, 0.376991, 0.314159),
     0.2: (1.060049, 0.514907, 0.382430, 0.383392, 0.318086),
@@ -57,7 +57,8 @@ def small_crack(ratio: float, angle: float) -> tuple[float, float]:
 
 def atkinson(ratio: float, angle: float) -> tuple[float, float]:
     """N_I and |N_II| by the series in (a/R)², ``ratio`` = a/R a key of `T` (Atkinson, Smelser & Sanchez 1982); four terms
-    of the second, whose fifth is below 2e-3 there."""
+    of the second, whose fifth is below 2e-3 there. The paper was not at hand: signs in the fourth term of N_II are those that
+    agree with `central_crack` to what the series leaves out."""
     c2 = math.cos(angle) ** 2
     s2, k = 1 - c2, 2 * c2 - 1
     first = (

@@ -8,7 +8,7 @@ from .dislocations import Arm, stress_intensity
 from .holes import kirsch_stress
 
 #: Radial cracks of length L from a hole of radius R, plane pulled across them: L/R → K_I/(σ√(πL)), one crack and two
-#: (Bowie 1956, as tabulated by Paris & Sih 1965). Beside `factor` they are right to 3 % for two cracks, 5 % for one.
+#: (Bowie 1956, as tabulated by Paris & Sih 1965; the table was not at hand and is not confirmed). Beside `factor` they are right to 3 % for two cracks, 5 % for one.
 BOWIE_ONE = {0.2: 2.30, 0.5: 1.73, 1.0: 1.37, 2.0: 1.06}
 BOWIE_TWO = {0.2: 2.41, 0.5: 1.83, 1.0: 1.45, 2.0: 1.21}
 

@@ -35,7 +35,7 @@ def edge_crack_strip(ratio: float) -> float:
     return math.sqrt(math.tan(angle) / angle) * bracket / math.cos(angle)
 
 
-#: Edge crack in pure bending, σ = 6M/W²: a/W → F (Kaya & Erdogan 1987, Table 1).
+#: Edge crack in pure bending, σ = 6M/W²: a/W → F (Kaya & Erdogan 1987; the crack solver at order 8 has the same digits).
 EDGE_CRACK_BENDING = {
     0.1: 1.0472, 0.2: 1.0553, 0.3: 1.1241, 0.4: 1.2606, 0.5: 1.4972, 0.6: 1.9140, 0.7: 2.7252, 0.8: 4.6764
 }  # fmt: skip
