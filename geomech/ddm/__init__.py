@@ -4,6 +4,9 @@
     sol = body.solve(ddm.BodyLoad(remote_stress=[0, 1e6, 0]))
     sol.tips["k_i"], sol.faces.opening, sol.stress(points), sol.displacement(points)
 
+    sol = ddm.solve_to(loops, cracks, material, load, target_error=1e-6)    # the mesh follows from the error
+    sol.tip_errors                                                          # how far to trust each K
+
 `criteria` say where a tip goes, `growth` takes it there, and `propagate` does both again and again:
 
     for step in ddm.propagate(loops, cracks, material, load, control="toughness"):

@@ -3,7 +3,7 @@
 More elements of one order do not make K more accurate, a higher order does: by a factor of ten to a hundred from one even
 order to the next (odd ones are hardly better than the even one below). So a straight crack is one element as long as
 nothing is near (`proximity` halves what is), a side of a body two, and the order follows the target. The orders are those
-whose median error over thirty problems (`tests/validation/test_automatic.py`) is a tenth of the target.
+whose median error over the problems of `tests/validation/test_automatic.py` is below half the target.
 """
 
 from __future__ import annotations

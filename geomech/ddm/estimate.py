@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 #: The estimate is so many times the difference to the finer solution. Over the battery of `tests/validation/test_automatic.py`
-#: the difference alone is 0.3 to 2.5 times the error.
+#: the difference alone is 0.35 to 1.3 times the error.
 SAFETY = 2.0
 #: An estimated error above this part of the largest K is told to the log.
 WORTH_A_WARNING = 0.01
