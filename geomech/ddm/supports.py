@@ -64,7 +64,7 @@ def place(supports: Sequence[Support], edges: np.ndarray, extent: float) -> np.n
     on = np.empty(len(supports), int)
     for k, support in enumerate(supports):
         if not isinstance(support, Support):
-            raise ValueError(f"support {k}: expected a Support, got {support!r}")
+            raise TypeError(f"support {k}: expected a Support, got {support!r}")
         name = called(supports, k)
         if isinstance(support.on, tuple):
             out[k], _, on[k] = onto_boundary(edges, np.array(support.on), name, extent)

@@ -250,7 +250,7 @@ def test_supports_and_displacements_are_checked():
         body.solve(ddm.BodyLoad(displacements=[[0, 1, 2]]))
     with pytest.raises(ValueError, match="without supports"):
         body.compliance()
-    with pytest.raises(ValueError, match="support 0: expected a Support"):
+    with pytest.raises(TypeError, match="support 0: expected a Support"):
         ddm.Body([SQUARE], NONE, ROCK, supports=("base",))
     with pytest.raises(ValueError, match="outline"):
         ddm.Body([], NONE, ROCK, supports=(Support(0),))
