@@ -27,6 +27,10 @@ from .proximity import keep_apart
 JUMP = 10.0
 #: Increments between a slight kink and the tip from which the kink is not graded any more.
 FORGOTTEN = 3
+#: Sides that turn by less than this go straight on, rad, …
+STRAIGHT = math.radians(0.1)
+#: … and elements there are of one length when the longer is less than so many times the shorter.
+ALIKE = 1.2
 #: A mouth nearer to an element's end than this part of its length moves the end instead of cutting a sliver.
 SLIVER = 0.08
 
@@ -65,7 +69,7 @@ def mesh(
     source[len(boundary[0]) :] += len(edges)
     pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
     start, end, kind, source = keep_apart(
-        start, end, kind, source, pieces, _touching(edges, cracks, extent), len(edges), settings.grading_ratio, extent,
+        start, end, kind, source, pieces, _touching(loops, edges, cracks, extent), len(edges), settings.grading_ratio, extent,
         2 * (settings.order + 1),
     )  # fmt: skip
     on_crack = source >= len(edges)
@@ -104,7 +108,7 @@ def _boundary(loops, edges, cracks, settings, grading, extent, marks):
         for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
             corner[k] = max(corner[k], deep)
     first = np.cumsum([0] + [len(loop) for loop in loops])
-    nodes, source = [], []
+    lines: list[np.ndarray] = []
     for k in range(len(loops)):
         n_edges, span = len(loops[k]), spans[k]
         for i in range(n_edges):
@@ -118,9 +122,12 @@ def _boundary(loops, edges, cracks, settings, grading, extent, marks):
                 grading,
                 extent,
             )
-            line = _with_mouths(edges[edge], fractions, mouths, grading, span, extent)
-            nodes.append(np.stack([line[:-1], line[1:]], axis=1))
-            source.append(np.full(len(line) - 1, edge))
+            lines.append(_with_mouths(edges[edge], fractions, mouths, grading, span, extent))
+        for i in np.flatnonzero(np.abs(angles[first[k] : first[k + 1]] - np.pi) < STRAIGHT):
+            before, after = first[k] + (i - 1) % n_edges, first[k] + i
+            lines[before], lines[after] = _evened(lines[before], lines[after], grading.ratio)
+    nodes = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+    source = [np.full(len(line) - 1, edge) for edge, line in enumerate(lines)]
     pairs = np.concatenate(nodes)
     return pairs[:, 0], pairs[:, 1], np.zeros(len(pairs), np.int64), np.concatenate(source)
 
@@ -142,6 +149,27 @@ def _side(edge, length: float, size: float, at_start: int, at_end: int, grading:
     least = [grading.finest(end, length, extent) * n / length for end in edge]
     fine = grading.fractions(at_start, least[0]) + inner + [n - f for f in grading.fractions(at_end, least[1])][::-1]
     return np.array([0.0, *(f / n for f in fine), 1.0])
+
+
+def _evened(before: np.ndarray, after: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """The points (n, 2) of two sides that go straight on, with elements of one length where they meet.
+
+    Loads mostly end there. Their tractions jump, and what that leaves of singularities at nodes cancels between elements
+    that are mirror images (beside longer neighbours a short load lost 0.3 % of its force, so 1e-6).
+    """
+    ends = [np.hypot(*(before[-1] - before[-2])), np.hypot(*(after[1] - after[0]))]
+    short, long = min(ends), max(ends)
+    if long < ALIKE * short:
+        return before, after
+    steps = [short]
+    while steps[-1] / ratio < long / ALIKE:
+        steps.append(steps[-1] / ratio)
+    f = np.array(steps)[:, None] / long
+    if ends[0] > ends[1]:
+        more = before[-1] + f[::-1] * (before[-2] - before[-1])
+        return np.concatenate([before[:-1], more, before[-1:]]), after
+    more = after[0] + f * (after[1] - after[0])
+    return before, np.concatenate([after[:1], more, after[1:]])
 
 
 def _with_mouths(edge, fractions, mouths, grading, span, extent) -> np.ndarray:
@@ -293,8 +321,8 @@ def _forgotten(cracks: Cracks, ends, here) -> bool:
     return True
 
 
-def _touching(edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
-    """(m, m) which edges and segments meet in a node."""
+def _touching(loops: list[np.ndarray], edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
+    """(m, m) which edges and segments meet in a node; sides that go straight on count as one."""
     n_edges, n = len(edges), len(edges) + cracks.n_segments
     out = np.eye(n, dtype=bool)
     ends = np.concatenate([edges, cracks.nodes[cracks.segments]]) if n else np.empty((0, 2, 2))
@@ -306,6 +334,11 @@ def _touching(edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
         one, other = at_node[:-step], at_node[step:]
         meet = number[one] == number[other]
         out[one[meet] // 2, other[meet] // 2] = out[other[meet] // 2, one[meet] // 2] = True
+    bends = [np.abs(interior_angles(loop) - np.pi) >= STRAIGHT for loop in loops]
+    if any(not bend.all() for bend in bends):
+        # From bend to bend; a loop's last sides belong to its first ones when it begins on a straight.
+        side = np.concatenate([np.cumsum(bend) % max(bend.sum(), 1) + n_edges * k for k, bend in enumerate(bends)])
+        out[:n_edges, :n_edges] |= side[:, None] == side
     if n_edges and cracks.n_segments:
         a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
         length = np.hypot(*d.T)
