@@ -153,14 +153,14 @@ def _singular_nodes(cracks: Cracks) -> np.ndarray:
 
 def _about_singular(mesh: Any, cracks: Cracks) -> tuple[np.ndarray, np.ndarray]:
     """The centres (k, 2) of the triangles about singular nodes and the node of each (k,)."""
-    from scipy.spatial import cKDTree
-
     at = cracks.nodes[_singular_nodes(cracks)]
     if not len(at):
         return np.empty((0, 2)), np.empty(0, int)
     singular = np.zeros(len(mesh.points), bool)
     reach = 1e-9 * float(np.ptp(mesh.points, axis=0).max())
-    singular[np.concatenate(cKDTree(mesh.points).query_ball_point(at, reach)).astype(int)] = True
+    # So few of them that a tree is not worth its import.
+    for node in at:
+        singular |= np.abs(mesh.points - node).max(axis=1) <= reach
     triangle, corner = np.nonzero(singular[mesh.triangles])
     return mesh.points[mesh.triangles[triangle]].mean(axis=1), mesh.triangles[triangle, corner]
 

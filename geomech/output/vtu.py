@@ -189,7 +189,8 @@ def _put(path: Path | str, content: bytes | bytearray) -> None:
         written = os.write(handle, content)
         while written < len(content):
             written += os.write(handle, memoryview(content)[written:])
-        os.ftruncate(handle, written)
+        if os.fstat(handle).st_size > written:
+            os.ftruncate(handle, written)
     finally:
         os.close(handle)
 
