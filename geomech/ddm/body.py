@@ -12,6 +12,7 @@ complement S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC of the crack unknowns. The matri
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -29,7 +30,7 @@ from .face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
 from .friction import FaceEquations
 from .functionals import TipFunctionals
 from .influence import ElementSet, influence, reuse
-from .iterative import compressed, is_compressed
+from .iterative import FACTORABLE, NotSolved, compressed, is_compressed
 from .loads import BodyLoad
 from .mesh import Mesh, mesh, outline_edges
 from .placing import OFF
@@ -38,6 +39,8 @@ from .supports import Holds, Support, called, marks, place, values_at
 from .unit_loads import UnitLoad, UnitLoads, on_elements
 from .validity import check_cracks, check_outline, outlined
 from .work import Work
+
+_log = logging.getLogger(__name__)
 
 
 class Body:
@@ -103,7 +106,8 @@ class Body:
             self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
-        self.compressed = is_compressed(settings.solver, self.faces.n_unknowns)
+        self._factored_after_all = previous is not None and previous._factored_after_all
+        self.compressed = is_compressed(settings.solver, self.faces.n_unknowns) and not self._factored_after_all
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         self._assemble(previous)
 
@@ -225,6 +229,25 @@ class Body:
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
         `faces.NotConverged` when the contact of crack faces does not settle.
         """
+        try:
+            return self._solved(load, warm, equilibrium_tolerance, history)
+        except NotSolved as failure:
+            # The iteration was picked by the number of unknowns; elements that are very unlike stop it.
+            if self.settings.solver != "auto" or self.faces.n_unknowns > FACTORABLE:
+                raise
+            _log.info("%s; factored instead", failure)
+            self.compressed, self._factored_after_all = False, True
+            vars(self).pop("face_equations", None)
+            self._assemble(None)
+            return self._solved(load, warm, equilibrium_tolerance, history)
+
+    def _solved(
+        self,
+        load: BodyLoad,
+        warm: Solution | None,
+        equilibrium_tolerance: float,
+        history: Solution | FaceMemory | None,
+    ) -> Solution:
         applied, units, rest, imposed = self.lay_out(load, equilibrium_tolerance)
         g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)

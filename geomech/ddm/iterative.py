@@ -28,6 +28,8 @@ ENOUGH = 1e-9
 #: Crack unknowns from which "auto" compresses. One load is quicker so, matrices included, from 1200, one with closing
 #: faces from 2000; factors answer further loads on the same cracks sooner.
 CROSSOVER = 2500
+#: Crack unknowns up to which "auto" factors after all what the iteration does not solve (a gigabyte, half a minute).
+FACTORABLE = 12000
 
 
 class NotSolved(np.linalg.LinAlgError):
