@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from borehole import VARIANTS, last_network, steps, wall
+from borehole import RADIUS, VARIANTS, last_network, steps, wall
 from compare_borehole import report
 
 
@@ -28,11 +28,14 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
 def picture(runs, file: Path) -> None:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(5 * len(runs), 5), layout="constrained")
+    # A chip of the wall is a hundredth of the hole: only the top of it is shown.
+    views = {"breakout": ((-0.2, 0.2), (0.88, 1.12))}
+    figure = Figure(figsize=(5 * len(runs), 3.8), layout="constrained")
     for axes, (name, run) in zip(figure.subplots(1, len(runs), squeeze=False)[0], runs.items()):
-        axes.fill(*wall().T, color="0.9", edgecolor="0.3")
-        cracks = last_network(run)
-        for start, end in cracks.nodes[cracks.segments]:
-            axes.plot(*zip(start, end), color="firebrick", linewidth=1.5)
-        axes.set(title=f"{name.replace('_', ' ')}: {cracks.n_cracks} cracks", aspect="equal", xlabel="x (σ_H), m")
+        cracks, (x, y) = last_network(run), views.get(name, ((-3.0, 3.0), (-1.8, 1.8)))
+        axes.fill(*wall().T / RADIUS, color="white", edgecolor="0.3")
+        for start, end in cracks.nodes[cracks.segments] / RADIUS:
+            axes.plot(*zip(start, end), color="firebrick", linewidth=2, solid_capstyle="round")
+        axes.set(title=name.replace("_", " "), aspect="equal", xlim=x, ylim=y, facecolor="0.88")
+        axes.set(xlabel="along σ_H, radii", ylabel="along σ_h, radii")
     figure.savefig(file, dpi=120)
