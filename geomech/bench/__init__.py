@@ -10,6 +10,7 @@ TOPICS = {
     "accuracy": "geomech.bench.accuracy",
     "ddm": "geomech.bench.work_precision",
     "kernels": "geomech.bench.kernels",
+    "many": "geomech.bench.many_cracks",
     "startup": "geomech.bench.startup",
 }
 

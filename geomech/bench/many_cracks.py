@@ -1,0 +1,45 @@
+"""Hundreds of cracks: iterating on compressed equations beside factoring them.
+
+Cracks of lengths 1 to 6 in the infinite plane, each in a cell of its own, under one load that opens them; processor time of
+one thread or more, matrices and solution together, a body made anew.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+#: Cracks are the squares of these; networks beyond ``FACTORED`` cracks a side are not factored (minutes, many gigabytes).
+SIDES, FACTORED = (5, 7, 11, 16, 23, 36), 16
+
+
+def measure(quick: bool = False) -> str:
+    """The table; ``quick`` leaves out what takes more than some seconds."""
+    from ..ddm import Body, BodyLoad
+    from ..model import Cracks, DdmSettings, Material
+    from ..reference.crack_arrays import cracks_in_cells
+
+    rock = Material("rock", 10e9, 0.25)
+    load = BodyLoad(remote_stress=np.array([0.2e6, 1e6, 0.3e6]))
+
+    def solved(cracks: Cracks, solver: str):
+        start = time.process_time()
+        solution = Body([], cracks, rock, DdmSettings(solver=solver)).solve(load)
+        tips = solution.tips
+        return solution, np.stack([tips["k_i"], tips["k_ii"]]), time.process_time() - start
+
+    lines = [
+        "many cracks in the infinite plane: processor time of matrices and solution",
+        "  cracks  unknowns   iterated   products   factored   largest difference of K",
+    ]
+    for side in SIDES[: -2 if quick else None]:
+        cracks = Cracks.from_polylines(cracks_in_cells(side), aperture=np.inf)
+        solution, k, seconds = solved(cracks, "compressed")
+        body = solution.body
+        row = f"  {cracks.n_cracks:6d}  {body.faces.n_unknowns:8d} {seconds:8.2f} s {body.crack_system.products:10d}"
+        if side <= (11 if quick else FACTORED):
+            _, exact, longer = solved(cracks, "dense")
+            row += f" {longer:8.2f} s   {np.abs(k - exact).max() / np.abs(exact).max():.1e}"
+        lines.append(row)
+    return "\n".join(lines)
