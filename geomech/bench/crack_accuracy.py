@@ -9,18 +9,13 @@ import numpy as np
 
 from ..model import Cracks, DdmSettings
 from ..reference import boundary_collocation, branched, crack_arrays, cracked_hole, fracture, plates, two_cracks
-from .crack_problems import ROCK
+from .crack_problems import ROCK, rectangle
 
 #: (case, computed, reference, source)
 Row = tuple[str, float, float, str]
 
 COMPUTED = "computed independently"
 PULL = np.array([0.0, 1.0, 0.0])
-
-
-def rectangle(half_width: float, half_height: float) -> np.ndarray:
-    w, h = half_width, half_height
-    return np.array([[-w, -h], [w, -h], [w, h], [-w, h]])
 
 
 def pulled(half_width: float, half_height: float, stress: float = 1.0, bending: float = 0.0):

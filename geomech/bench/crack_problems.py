@@ -79,7 +79,9 @@ def factors(solution: Solution) -> np.ndarray:
     return np.column_stack([solution.tips["k_i"], solution.tips["k_ii"]])
 
 
-def _rectangle(w: float, h: float) -> np.ndarray:
+def rectangle(half_width: float, half_height: float) -> np.ndarray:
+    """(4, 2) a plate about the origin, counter-clockwise."""
+    w, h = half_width, half_height
     return np.array([[-w, -h], [w, -h], [w, h], [-w, h]])
 
 
@@ -111,13 +113,13 @@ def arc_of_tangents(segments: int) -> CrackProblem:
 
 def edge_crack() -> CrackProblem:
     return CrackProblem(
-        "edge crack in a strip", [np.array([[-0.5, 0.0], [0.0, 0.0]])], (0.0, 1.0, 0.0), _rectangle(0.5, 1.5), [(True, False)],
+        "edge crack in a strip", [np.array([[-0.5, 0.0], [0.0, 0.0]])], (0.0, 1.0, 0.0), rectangle(0.5, 1.5), [(True, False)],
         reference=None,
     )  # fmt: skip
 
 
 def specimen() -> CrackProblem:
-    return CrackProblem("two-crack specimen", two_cracks.crack_ends(0), (0.0, -1.0, 0.0), _rectangle(0.03, 0.06))
+    return CrackProblem("two-crack specimen", two_cracks.crack_ends(0), (0.0, -1.0, 0.0), rectangle(0.03, 0.06))
 
 
 def random_cracks() -> CrackProblem:

@@ -25,11 +25,15 @@ def measure(quick: bool = False) -> str:
     rows = []
     with tempfile.TemporaryDirectory() as scratch:
         geomech = [sys.executable, "-m", "geomech"]
-        run = [*geomech, "run", str(PIPELINE / "scene.toml"), "--variant", "phi_0", "--quiet", "--out"]
+
+        def run(phi: int, folder: str) -> list[str]:
+            scene = [str(PIPELINE / "scene.toml"), "--variant", f"phi_{phi}"]
+            return [*geomech, "run", *scene, "--quiet", "--out", f"{scratch}/{folder}"]
+
         first = {**os.environ, "NUMBA_CACHE_DIR": str(Path(scratch) / "cache")}
         if not quick:
-            rows.append(("first run of a specimen, compiling", _seconds([*run, f"{scratch}/first"], first)))
-        _seconds([*run, f"{scratch}/warm-up"])
+            rows.append(("first run of a specimen, compiling", _seconds(run(0, "first"), first)))
+        _seconds(run(0, "warm-up"))
         python = [sys.executable, "-c"]
         for label, command in (
             ("python, nothing imported", [*python, "pass"]),
@@ -41,8 +45,7 @@ def measure(quick: bool = False) -> str:
             rows.append((label, statistics.median(_seconds(command) for _ in range(repeats))))
         # Each into a folder of its own: files that are there already are written over, which is quicker than making them.
         for phi in (0, 90) if quick else (0, 30, 60, 90):
-            specimen = [*geomech, "run", str(PIPELINE / "scene.toml"), "--variant", f"phi_{phi}", "--quiet", "--out"]
-            times = [_seconds([*specimen, f"{scratch}/phi_{phi}_{k}"]) for k in range(3 if phi in (30, 60) else repeats)]
+            times = [_seconds(run(phi, f"phi_{phi}_{k}")) for k in range(3 if phi in (30, 60) else repeats)]
             rows.append((f"specimen φ = {phi}° to coalescence, everything written", statistics.median(times)))
     width = max(len(label) for label, _ in rows)
     lines = [f"whole processes, wall time, median of {repeats} (the first run once)"]

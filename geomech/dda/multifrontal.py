@@ -380,7 +380,7 @@ class BlockSolver:
             for fronts in pieces:
                 eliminate(fronts)
         eliminate(t.rest)
-        self._factored = data[36 * self._diagonal[:, None] + np.arange(36)]
+        self._factored = self._diagonal_of(data)
         self.counts["factorisations"] += 1
 
     def substitute(self, right: np.ndarray) -> np.ndarray:
@@ -397,11 +397,15 @@ class BlockSolver:
         """The product with the matrix of ``data``."""
         return multiply(data, self.pointer, self.columns, x)[0]
 
+    def _diagonal_of(self, data: np.ndarray) -> np.ndarray:
+        """(n, 36) the diagonal blocks of ``data``."""
+        return data[36 * self._diagonal[:, None] + np.arange(36)]
+
     def _near(self, data: np.ndarray) -> bool:
         """Whether the kept factorisation is of nearly the same matrix."""
         if self._factored is None:
             return False
-        now = data[36 * self._diagonal[:, None] + np.arange(36)]
+        now = self._diagonal_of(data)
         change = np.abs(now - self._factored).max(axis=1)
         return int((change > CHANGED * np.abs(now).max(axis=1)).sum()) <= FEW
 
