@@ -161,7 +161,18 @@ print(sorted({absent!r} & {{name.split(".")[0] for name in sys.modules}}))
 """
 
 
-@pytest.mark.parametrize("module", ["geomech", "geomech.ddm", "geomech.dda", "geomech.ddm.body", "geomech.ddm.criteria", "geomech.ddm.growth", "geomech.ddm.propagation"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "geomech",
+        "geomech.ddm",
+        "geomech.dda",
+        "geomech.ddm.body",
+        "geomech.ddm.criteria",
+        "geomech.ddm.growth",
+        "geomech.ddm.propagation",
+    ],
+)
 def test_solvers_stand_alone(module):
     """Each solver imports with none of the packages of scenes, drawings and pictures installed."""
     absent = {"pydantic", "shapely", "gmsh", "vtk", "vtkmodules", "pyvista", "matplotlib", "meshio", "imageio"}

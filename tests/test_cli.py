@@ -330,7 +330,6 @@ def test_doctor_names_a_library_that_is_missing():
     assert "libnever-there.so.7" in check.found
 
 
-
 def test_a_scene_runs_from_the_command_line_to_its_folder(tmp_path, capsys):
     """Two load steps on the two-crack specimen, nothing made up: the K of the files is that of the isolated specimen.
 

@@ -46,18 +46,18 @@ THREADED = 1500
 class Tree:
     """The order of elimination. Fronts stand in postorder, blocks are numbered as they are eliminated.
 
-        rank          (n_blocks,)     the number of each block as given
-        pivots        (n_fronts + 1,) first own block of every front
-        parent        (n_fronts,)     −1 for a root
-        reach         (n_fronts + 1,) first entry of every front in ``boundary``
-        boundary      (…,)            blocks that a front's elimination reaches, ascending
-        seat          (…,)            where each of them stands in the parent's front
-        entries       (n_fronts + 1,) first matrix block of every front in ``entry``
-        entry, row, column            the matrix block, and where it stands in the front
-        stack         (n_fronts,)     where the front leaves its S
-        z, x          (n_fronts + 1,) first entry of Z, and of X and F_BP
-        pieces        (k, 2)          ranges of fronts that are independent of one another
-        rest          (m,)            fronts that need them, in order
+    rank          (n_blocks,)     the number of each block as given
+    pivots        (n_fronts + 1,) first own block of every front
+    parent        (n_fronts,)     −1 for a root
+    reach         (n_fronts + 1,) first entry of every front in ``boundary``
+    boundary      (…,)            blocks that a front's elimination reaches, ascending
+    seat          (…,)            where each of them stands in the parent's front
+    entries       (n_fronts + 1,) first matrix block of every front in ``entry``
+    entry, row, column            the matrix block, and where it stands in the front
+    stack         (n_fronts,)     where the front leaves its S
+    z, x          (n_fronts + 1,) first entry of Z, and of X and F_BP
+    pieces        (k, 2)          ranges of fronts that are independent of one another
+    rest          (m,)            fronts that need them, in order
     """
 
     rank: np.ndarray
@@ -97,7 +97,10 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
             half = np.argpartition(along, len(blocks) // 2)
             first, second = blocks[half[: len(blocks) // 2]], blocks[half[len(blocks) // 2 :]]
             side[first], side[second] = 1, 2
-            cut_first, cut_second = _meets(first, 2, side, pointer, neighbour), _meets(second, 1, side, pointer, neighbour)
+            cut_first, cut_second = (
+                _meets(first, 2, side, pointer, neighbour),
+                _meets(second, 1, side, pointer, neighbour),
+            )
             side[blocks] = 0
             if cut_first.sum() < cut_second.sum():
                 separator, first = first[cut_first], first[~cut_first]
@@ -204,7 +207,9 @@ def _independent(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[
     return np.stack([first[tops], tops + 1], axis=1), np.flatnonzero(high)
 
 
-def _stacked(children: list[list[int]], far: np.ndarray, pieces: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, int]:
+def _stacked(
+    children: list[list[int]], far: np.ndarray, pieces: np.ndarray, rest: np.ndarray
+) -> tuple[np.ndarray, int]:
     """Where each front leaves its S when children's are cleared as they are used, and the room that takes."""
     at = np.zeros(len(far), np.int64)
     base = 0
@@ -221,7 +226,25 @@ def _stacked(children: list[list[int]], far: np.ndarray, pieces: np.ndarray, res
 
 @_jit
 def _eliminate(
-    fronts, data, pivots, parent, reach, seat, entries, entry, row, column, stack, z_at, x_at, child, sibling, room, z, x, y
+    fronts,
+    data,
+    pivots,
+    parent,
+    reach,
+    seat,
+    entries,
+    entry,
+    row,
+    column,
+    stack,
+    z_at,
+    x_at,
+    child,
+    sibling,
+    room,
+    z,
+    x,
+    y,
 ):
     """Eliminate ``fronts``, ascending. ``child`` and ``sibling`` chain the children of a front."""
     for f in fronts:

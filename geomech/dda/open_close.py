@@ -18,6 +18,7 @@ from numba import njit
 from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .contact_springs import Springs
+from .contacts import ContactSet
 
 #: After this many iterations only the worst contacts of each block are switched: opened all at once, the contacts of a block
 #: let it fly, to be closed all at once in the next iteration.
@@ -161,21 +162,20 @@ def settle(
     pattern: assembly.Pattern,
     matrix: np.ndarray,
     right: np.ndarray,
-    *,
-    block: np.ndarray,
-    other: np.ndarray,
+    found: ContactSet,
     vectors: np.ndarray,
-    partner: np.ndarray,
-    gap: np.ndarray,
     springs: Springs,
-    state: np.ndarray,
-    direction: np.ndarray,
-    bonded: np.ndarray,
-    shear_force: np.ndarray,
+    gap: np.ndarray,
     slack: float,
     max_iterations: int,
 ) -> Settled:
-    """Iterate from the given states to consistent ones. Raises `Unsettled` when ``max_iterations`` do not suffice."""
+    """Iterate from the states of ``found`` to consistent ones; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the blocks' own
+    part, ``springs`` and ``gap`` those of this step (dashpots included).
+
+    Raises `Unsettled` when ``max_iterations`` do not suffice.
+    """
+    block, other, partner, shear_force = found.block, found.other, found.partner, found.shear
+    state, direction, bonded = found.state, found.direction, found.bonded
     data = np.empty(pattern.size)
     side = np.empty(6 * pattern.n)
     seen: set[bytes] = set()

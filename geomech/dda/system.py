@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
 from .basis import advance, energies
-from .contact_search import describe_contacts, find_contacts
-from .contact_springs import PENALTY_RATIO, JointTable, contact_springs, with_dashpots
+from .contact_springs import with_dashpots
+from .contacts import ContactFinder, ContactSet
 from .held import balanced, hold, with_rigid_motion
 from .loads import AppliedForces, Inertia, LoadMap, generalised
 from .moments import block_moments
@@ -26,10 +26,6 @@ _WINDOW = 2.2
 _BLOCK_SHARE = 0.1
 #: Gaps below this many times the largest coordinate are round-off and decide nothing.
 _SLACK = 1e-14
-#: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
-_TOUCH = 1e-7
-_UNKNOWN = -2
-_NEVER = -1
 
 
 class BlockSystem:
@@ -56,22 +52,19 @@ class BlockSystem:
         self.materials = tuple(materials)
         self.joints = tuple(joints) or (JointLaw("frictionless"),)
         self.settings = settings or DdaSettings()
-        self._joint_index = joint_index or (lambda edge_name, other_name: 0)
-        self._table = JointTable.of(self.joints)
         self._load_map = LoadMap(blocks)
-        self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
-        self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
 
         of = np.asarray(blocks.material, dtype=int)
         self.density = np.array([m.density for m in self.materials])[of]
         self._stiffness = np.ascontiguousarray(np.array([m.stiffness() for m in self.materials])[of])
         self.compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
-        self._modulus = np.array([m.plane_modulus for m in self.materials])[of]
+        modulus = np.array([m.plane_modulus for m in self.materials])[of]
+        joint_index = joint_index or (lambda edge_name, other_name: 0)
+        self._finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus)
         self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
         self._moving = np.flatnonzero(~self._fixed)
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
-        self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
         self._no_compliance = np.zeros((blocks.n_blocks, 3, 3))
@@ -83,7 +76,6 @@ class BlockSystem:
         if (areas <= 0).any():
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self._mass = self.density * areas
-        self._size = float(np.ptp(vertices, axis=0).max())
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
         self._slack = _SLACK * float(np.abs(vertices).max())
         self._limit = min(
@@ -114,14 +106,16 @@ class BlockSystem:
         moments = block_moments(vertices, self._next, self._start)
         limit = self._limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
-        found = self._search(state, vertices, _WINDOW * limit)
+        found = self._finder.find(state, vertices, _WINDOW * limit)
         reason, before = "", np.inf
         cuts = 0
         while True:
             try:
-                result, largest = self._attempt(state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time)
+                result, largest = self._attempt(
+                    state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
+                )
             except Unsettled as failure:
-                reason = f"{failure}{self._where(found, failure.contact)}"
+                reason = f"{failure}{self._finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
             else:
                 if largest <= 1.0001 * limit:
@@ -132,7 +126,7 @@ class BlockSystem:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     limit = 1.1 * largest
-                    found = self._search(state, vertices, _WINDOW * limit)
+                    found = self._finder.find(state, vertices, _WINDOW * limit)
                     continue
                 before = largest
                 shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
@@ -149,7 +143,9 @@ class BlockSystem:
         if not (area > 0).all():
             crushed = int(np.argmin(area > 0))
             name = self.blocks.names[crushed] if self.blocks.names else f"block {crushed}"
-            raise NotConverged(f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness")
+            raise NotConverged(
+                f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness"
+            )
 
     def _foreseen(self, vertices, carried, moments, loads, time, dt, limit) -> float:
         """``dt`` shortened where the velocity alone would carry a vertex beyond the limit."""
@@ -164,74 +160,6 @@ class BlockSystem:
         # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
         return min(dt, float(2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit))))
 
-    def _search(self, state: State, vertices: np.ndarray, window: float) -> dict[str, np.ndarray]:
-        old = state.contacts
-        keys = old["vertex"] * len(vertices) + old["edge"]
-        rank = np.argsort(keys, kind="stable")
-        table = find_contacts(vertices, self._next, self._previous, self._start, self._fixed, window, keys[rank])
-        geometry, mate, parent = describe_contacts(
-            table, vertices, self._next, self._previous, window,
-            np.ascontiguousarray(old["vertex"]), np.ascontiguousarray(old["edge"]),
-            np.ascontiguousarray(old["normal"]), rank,
-        )  # fmt: skip
-        law = self._laws(table[:, 1], mate)
-        partner = table[:, 2:]
-        if (law == _NEVER).any():
-            keep = law != _NEVER
-            renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
-            table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
-            partner = renumber[table[:, 2:]]
-        block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
-        stiffest = PENALTY_RATIO * np.maximum(self._modulus[block], self._modulus[other])
-        kn, ks = self.settings.normal_penalty, self.settings.shear_penalty
-        normal_penalty = stiffest if kn is None else np.full(len(block), float(kn))
-        springs = contact_springs(
-            self._table,
-            law,
-            geometry[:, 4],
-            normal_penalty,
-            normal_penalty if ks is None else np.full(len(block), float(ks)),
-        )
-        contact_state = np.zeros(len(block), np.int64)
-        shear, slip = np.zeros(len(block)), np.zeros(len(block))
-        bonded = np.zeros(len(block), np.int64)
-        known = parent >= 0
-        if known.any():
-            rows = old[parent[known]]
-            contact_state[known], shear[known], slip[known] = rows["state"], rows["shear_force"], rows["slip"]
-            bonded[known] = rows["bonded"]
-        if not known.all():
-            # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
-            fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
-            if len(old) == 0 and state.time == 0.0:
-                bonded[fresh & (geometry[:, 4] > 0)] = 1
-            contact_state[fresh & (partner < 0).all(axis=1)] = STICK
-        bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
-        direction = np.where(contact_state == SLIP, np.sign(shear), 0.0)
-        rough = (springs.friction > 0) | (bonded > 0)
-        contact_state[(contact_state == SLIP) & rough & (direction == 0)] = STICK
-        contact_state[(contact_state == STICK) & ~rough] = SLIP
-        return {
-            "vertex": table[:, 0].copy(), "edge": table[:, 1].copy(), "partner": np.ascontiguousarray(partner),
-            "block": block, "other": other, "geometry": np.ascontiguousarray(geometry), "law": law, "springs": springs,
-            "state": contact_state, "direction": direction, "bonded": bonded, "shear": shear, "slip": slip,
-        }  # fmt: skip
-
-    def _laws(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
-        a, b = self._edge_name[edge], self._edge_name[mate]
-        law = self._law_of[a, b]
-        if (law == _UNKNOWN).any():
-            names = self.blocks.edge_names
-            for i, j in {(int(i), int(j)) for i, j in zip(a, b, strict=True)}:
-                index = self._joint_index(names[i], names[j])
-                if index is not None and not 0 <= index < len(self.joints):
-                    raise ValueError(
-                        f"edges {names[i]!r} and {names[j]!r} have joint law {index}, out of {len(self.joints)}"
-                    )
-                self._law_of[i, j] = _NEVER if index is None else index
-            law = self._law_of[a, b]
-        return law
-
     def _pattern(self, block: np.ndarray, other: np.ndarray, moments: np.ndarray) -> assembly.Pattern:
         if int(self._free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self._free, block, other)
@@ -240,7 +168,9 @@ class BlockSystem:
             self._sparse = block, assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
         return self._sparse[1]
 
-    def _attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time) -> tuple[StepResult, float]:
+    def _attempt(
+        self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
+    ) -> tuple[StepResult, float]:
         time = state.time + dt
         acting = time if load_time is None else load_time
         gravity = loads.gravity.at(acting)
@@ -254,37 +184,40 @@ class BlockSystem:
         compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
         offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
-        geometry = found["geometry"]
         damping = 0.0 if static else self.settings.damping
-        springs, gap = found["springs"], np.ascontiguousarray(geometry[:, 3])
+        springs, gap = found.springs, np.ascontiguousarray(found.gap)
         if damping:
             mass = np.where(self._fixed, np.inf, self._mass)
-            springs, gap = with_dashpots(springs, gap, np.minimum(mass[found["block"]], mass[found["other"]]), damping, dt)
+            springs, gap = with_dashpots(springs, gap, np.minimum(mass[found.block], mass[found.other]), damping, dt)
         n_free = len(self._moving)
-        pattern = self._pattern(found["block"], found["other"], moments) if n_free else None
+        pattern = self._pattern(found.block, found.other, moments) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assembly.assemble_blocks(
             order, moments, density, self._stiffness, self.compliance, carried, stress, crack_strain, given,
             compliance, offset, gravity, load, dt, damping, n_free,
         )  # fmt: skip
-        vectors = assembly.contact_vectors(found["block"], found["other"], geometry, order, moments)
+        vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
         held = self.blocks.held
         alone = static and self.blocks.n_blocks == 1 and n_free
         if alone and balanced(load[0], points, edges, self._mass[0] * gravity, moments[0]):
             held = with_rigid_motion(held)
         if held is not None and n_free:
-            hold(held, matrix, right, vectors, found["block"], found["other"], order)
-        n_contacts = len(found["block"])
+            hold(held, matrix, right, vectors, found.block, found.other, order)
         if n_free:
             settled = settle(
-                pattern, matrix, right, block=found["block"], other=found["other"], vectors=vectors,
-                partner=found["partner"], gap=gap, springs=springs, state=found["state"],
-                direction=found["direction"], bonded=found["bonded"], shear_force=found["shear"], slack=self._slack,
-                max_iterations=self.settings.max_open_close_iterations,
-            )  # fmt: skip
+                pattern,
+                matrix,
+                right,
+                found,
+                vectors,
+                springs,
+                gap,
+                self._slack,
+                self.settings.max_open_close_iterations,
+            )
         else:
-            zero = np.zeros(n_contacts)
-            settled = Settled(np.zeros((0, 6)), found["state"], zero, found["bonded"], zero, zero, zero, zero, 0)
+            zero = np.zeros(len(found))
+            settled = Settled(np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, 0)
 
         increment = np.zeros((self.blocks.n_blocks, 6))
         increment[self._moving] = settled.unknowns[order[self._moving]]
@@ -294,20 +227,12 @@ class BlockSystem:
             crack_strain,
         )  # fmt: skip
         kinetic, elastic = energies(velocity, new_stress, self.compliance, density, moments, self._fixed)
-        new_gap = settled.gap - (gap - geometry[:, 3])
+        new_gap = settled.gap - (gap - found.gap)
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
 
-        rows = np.zeros(n_contacts, CONTACT)
-        for name in ("vertex", "edge", "block", "other", "law"):
-            rows[name] = found[name]
-        rows["state"], rows["bonded"] = settled.state, settled.bonded
-        rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
-        rows["gap"], rows["length"] = new_gap, geometry[:, 4]
-        rows["normal_force"], rows["shear_force"] = settled.normal_force, settled.shear_force
-        # Sliding is what the spring did not take up elastically.
-        stretch = (found["shear"] - settled.shear_force) / springs.shear
-        rows["slip"] = found["slip"] + np.where(settled.state == SLIP, settled.sliding - stretch, 0.0)
-
+        rows = found.rows(
+            settled.state, settled.bonded, settled.normal_force, settled.shear_force, new_gap, settled.sliding
+        )
         inertia = Inertia(density, gravity, acceleration, carried[:, 2], self._fixed)
         forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), inertia)
         new_state = State(
@@ -317,7 +242,7 @@ class BlockSystem:
             stress=new_stress,
             rotation=state.rotation + increment[:, 2],
             crack_strain=new_crack,
-            contacts=self._on(new_vertices, rows),
+            contacts=self._finder.carried(new_vertices, rows),
         )
         closed = settled.state != OPEN
         statistics = {
@@ -327,45 +252,26 @@ class BlockSystem:
             "kinetic_energy": kinetic,
             "elastic_energy": elastic,
             "contact_energy": 0.5
-            * float((closed * (new_gap**2 * found["springs"].normal + settled.shear_force**2 / springs.shear)).sum()),
-            "worst_penetration": float(max(0.0, -new_gap.min())) if n_contacts else 0.0,
+            * float((closed * (new_gap**2 * found.springs.normal + settled.shear_force**2 / springs.shear)).sum()),
+            "worst_penetration": float(max(0.0, -new_gap.min())) if len(found) else 0.0,
             "max_displacement_ratio": largest / self.half_height,
             "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),
         }
         return StepResult(new_state, dt, rows, forces, acceleration, statistics), largest
 
-    def _on(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """The contact rows carried to the new geometry (gap and forces as they are)."""
-        rows = rows.copy()
-        start, point = vertices[rows["edge"]], vertices[rows["vertex"]]
-        along = vertices[self._next[rows["edge"]]] - start
-        length = np.hypot(along[:, 0], along[:, 1])
-        rows["point"] = point
-        rows["position"] = np.einsum("ij,ij->i", point - start, along) / length**2
-        rows["normal"] = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
-        return rows
 
-    def _where(self, found: dict[str, np.ndarray], contact: int) -> str:
-        if contact < 0:
-            return ""
-        names = self.blocks.names or tuple(f"block {b}" for b in range(self.blocks.n_blocks))
-        x, y = found["geometry"][contact, 5:7]
-        a, b = names[found["block"][contact]], names[found["other"][contact]]
-        return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
-
-
-def _unbalanced(matrix, right, vectors, found, order, settled: Settled) -> float:
+def _unbalanced(matrix, right, vectors, found: ContactSet, order, settled: Settled) -> float:
     """Largest residual of the equations of motion, contact forces as reported, over the largest force among them."""
     if len(right) == 0:
         return 0.0
     own = np.einsum("bij,bj->bi", matrix, settled.unknowns)
     residual = np.vstack([right - own, np.zeros((1, 6))])
     scale = max(float(np.abs(right).max()), float(np.abs(own).max()))
-    if len(found["block"]):
+    if len(found):
         push = settled.normal_force[:, None] * vectors[:, 0] + settled.shear_force[:, None] * vectors[:, 1]
         # Fixed blocks have order −1: their share lands in the spare last row.
-        np.add.at(residual, order[found["block"]], push[:, :6])
-        np.add.at(residual, order[found["other"]], push[:, 6:])
+        np.add.at(residual, order[found.block], push[:, :6])
+        np.add.at(residual, order[found.other], push[:, 6:])
         scale = max(scale, float(np.abs(push).max()))
     return float(np.abs(residual[:-1]).max()) / scale if scale > 0 else 0.0
 

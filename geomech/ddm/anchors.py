@@ -58,7 +58,9 @@ class Anchors:
         return len(self._forces)
 
     def _fields(self):
-        return [[KelvinLoad(point, force, self._unit, self._extent) for point, force in forces] for forces in self._forces]
+        return [
+            [KelvinLoad(point, force, self._unit, self._extent) for point, force in forces] for forces in self._forces
+        ]
 
     def of_jumps(self, sources: ElementSet) -> np.ndarray:
         """(r, n_unknowns) from unit nodal jumps, local."""

@@ -83,7 +83,9 @@ def maximum_energy_release_rate(
     return angle, k_eq
 
 
-def largest_relative_release_rate(k_i: np.ndarray, k_ii: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
+def largest_relative_release_rate(
+    k_i: np.ndarray, k_ii: np.ndarray, material: Material
+) -> tuple[np.ndarray, np.ndarray]:
     """F-criterion (Shen & Stephansson 1993): the kink with the largest F = G_I/G_Ic + G_II/G_IIc, with K_eq = √F K_Ic.
 
     So F = (k_1/K_Ic)² + (k_2/K_IIc)² with the factors k_1, k_2 of an infinitesimal kink (`kink_factors`); a kink that
@@ -115,7 +117,9 @@ def largest_relative_release_rate(k_i: np.ndarray, k_ii: np.ndarray, material: M
     return angle, k_eq
 
 
-def minimum_strain_energy_density(k_i: np.ndarray, k_ii: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
+def minimum_strain_energy_density(
+    k_i: np.ndarray, k_ii: np.ndarray, material: Material
+) -> tuple[np.ndarray, np.ndarray]:
     """Sih (1974): the tip turns to a local minimum of S = a11 K_I² + 2 a12 K_I K_II + a22 K_II².
 
     With κ = 3 − 4ν (ν the effective Poisson's ratio) and 16πμ taken out,

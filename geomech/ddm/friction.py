@@ -253,7 +253,10 @@ class _Contact:
             states, _, reaction = self.newton(states, limit, single=True)
             now = self.laws.limit(reaction[self.laws.across], self.broken)
             # Near enough, Newton's method finishes what would take many more rounds.
-            if freeze % 4 == 0 or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress:
+            if (
+                freeze % 4 == 0
+                or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress
+            ):
                 found = self.newton(states)
                 if found is not None:
                     return found

@@ -180,7 +180,10 @@ class BodyLoad:
             if value is None:
                 continue
             value = np.ascontiguousarray(value, dtype=float)
-            if value.ndim != len(shape) or value.shape != (*(value.shape[:1] if shape[0] < 0 else shape[:1]), *shape[1:]):
+            if value.ndim != len(shape) or value.shape != (
+                *(value.shape[:1] if shape[0] < 0 else shape[:1]),
+                *shape[1:],
+            ):
                 raise ValueError(f"{name}: expected shape {str(shape).replace('-1', 'm')}, got {value.shape}")
             if not np.isfinite(value).all():
                 raise ValueError(f"{name}: not finite")

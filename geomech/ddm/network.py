@@ -37,8 +37,10 @@ class Obstacle:
     def same_as(self, other: Obstacle | None) -> bool:
         if other is None:
             return False
-        return self is other or (self.row is not None and self.row is other.row) or (
-            self.row is None and other.row is None and self.a == other.a and self.b == other.b
+        return (
+            self is other
+            or (self.row is not None and self.row is other.row)
+            or (self.row is None and other.row is None and self.a == other.a and self.b == other.b)
         )
 
     def ends_at(self, nodes: set[int], at: Point) -> bool:
@@ -148,9 +150,7 @@ class Network:
                 ends.append(np.roll(loop, -1, axis=0))
             a, b = np.concatenate(starts), np.concatenate(ends)
             boxes = np.stack([np.minimum(a, b), np.maximum(a, b)], axis=1)
-            self._edges[block] = boxes, [
-                Obstacle(tuple(p), tuple(q), None) for p, q in zip(a.tolist(), b.tolist())
-            ]
+            self._edges[block] = boxes, [Obstacle(tuple(p), tuple(q), None) for p, q in zip(a.tolist(), b.tolist())]
         return self._edges[block]
 
     def nodes_on(self, obstacle: Obstacle, block: int) -> list[tuple[int, Point]]:

@@ -48,7 +48,9 @@ class KelvinLoad:
         r2 = np.sum(rel * rel, axis=1)[:, None]
         mu, nu = self.material.shear_modulus, self.material.effective_poissons_ratio
         along = (rel @ self.force)[:, None] / r2
-        return (-(3 - 4 * nu) * 0.5 * np.log(r2 / self.unit**2) * self.force + along * rel) / (8 * np.pi * mu * (1 - nu))
+        return (-(3 - 4 * nu) * 0.5 * np.log(r2 / self.unit**2) * self.force + along * rel) / (
+            8 * np.pi * mu * (1 - nu)
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -53,7 +53,9 @@ def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
     alike = [edge for edge in known if edge not in taken and edge.startswith(kind + colon)]
     close = difflib.get_close_matches(name, alike, 1, cutoff=0.6) if not brought else []
     listed = ", ".join(f"{edge!r}{' (loaded already)' if edge in taken else ''}" for edge in known)
-    hint = (f"did you mean {close[0]!r}? " if close else "") + (f"edges are {listed}" if known else "no edge has a name")
+    hint = (f"did you mean {close[0]!r}? " if close else "") + (
+        f"edges are {listed}" if known else "no edge has a name"
+    )
     if c.drawing.model is None:
         return f"{hint}; name edges by [[geometry.edges]]"
     if brought:

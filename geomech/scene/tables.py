@@ -114,7 +114,8 @@ class ZoneTable(Table):
     material: str | None = Field(None, description="a name of [materials] (unset: the only one there is)")
     fixed: bool = Field(False, description="true: its blocks do not move")
     guided: Literal["x", "y"] | None = Field(
-        None, description='"x" or "y": its blocks move along that axis only and neither turn nor shear, as a press\'s platen'
+        None,
+        description='"x" or "y": its blocks move along that axis only and neither turn nor shear, as a press\'s platen',
     )
 
 

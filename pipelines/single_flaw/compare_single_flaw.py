@@ -30,12 +30,12 @@ What this does and does not say
 class Wings:
     """Observer of the wing from the flaw's right end: a row for every cycle in which it grew.
 
-        load       (n,) Pa, axial stress
-        wing       (n,) m, its length before it grew
-        tip        (n, 2) m
-        k          (n, 2) K_I and K_II there, Pa √m
-        k_eq       (n,) of the criterion
-        direction  (n,) degrees from the load's axis, along the segment it then grew
+    load       (n,) Pa, axial stress
+    wing       (n,) m, its length before it grew
+    tip        (n, 2) m
+    k          (n, 2) K_I and K_II there, Pa √m
+    k_eq       (n,) of the criterion
+    direction  (n,) degrees from the load's axis, along the segment it then grew
     """
 
     rows: list[tuple] = field(default_factory=list)
@@ -68,7 +68,9 @@ class Wings:
     def on_end(self, summary, error=None) -> None:
         self.end = summary["end"]
         load, wing, tip, k, k_eq, direction = zip(*self.rows) if self.rows else [[]] * 6
-        self.load, self.wing, self.k_eq, self.direction = (np.array(x, dtype=float) for x in (load, wing, k_eq, direction))
+        self.load, self.wing, self.k_eq, self.direction = (
+            np.array(x, dtype=float) for x in (load, wing, k_eq, direction)
+        )
         self.tip, self.k = np.array(tip).reshape(-1, 2), np.array(k).reshape(-1, 2)
 
     @property

@@ -325,9 +325,7 @@ def test_slivers_are_merged_along_their_longest_side():
     blocks = Blocks.from_polygons([SQUARE])
     state = moving(blocks)
     gap = 1e-9
-    cracks = network(
-        [[2, 0], [2, 3], [2 + gap, 0], [2 + gap, 3]], [[0, 1], [2, 3]], crack=[0, 1], surface=[0, 1, 2, 3]
-    )
+    cracks = network([[2, 0], [2, 3], [2 + gap, 0], [2 + gap, 3]], [[0, 1], [2, 3]], crack=[0, 1], surface=[0, 1, 2, 3])
     split = split_blocks(blocks, state, cracks)
     assert split.blocks.n_blocks == 2 and split.cracks.n_segments == 0
     np.testing.assert_allclose(split.blocks.areas(), 6.0, atol=1e-8)

@@ -20,7 +20,9 @@ def springs_between(n, seed, islands=False):
         triangles = np.concatenate(hulls)
     else:
         triangles = Delaunay(points).simplices
-    pairs = np.unique(np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    pairs = np.unique(
+        np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0
+    )
     number = np.arange(n)
     keys = np.unique(np.concatenate([number * n + number, pairs @ [n, 1], pairs @ [1, n]]))
     rows, columns = keys // n, keys % n

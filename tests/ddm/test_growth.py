@@ -21,7 +21,7 @@ def tips_of(cracks, angle=0.0, k_eq=1.0):
     rows = np.zeros(len(nodes), TIP)
     rows["node"] = nodes
     for row, node in zip(rows, nodes):
-        (at, end), = np.argwhere(cracks.segments == node)
+        ((at, end),) = np.argwhere(cracks.segments == node)
         row["crack"], row["block"], row["point"] = cracks.crack[at], cracks.block[at], cracks.nodes[node]
         out = cracks.nodes[node] - cracks.nodes[cracks.segments[at, 1 - end]]
         row["direction"] = out / np.hypot(*out)
@@ -183,7 +183,9 @@ def test_hole_and_corner():
 
 
 def test_a_mouth_that_is_there_is_used_again():
-    cracks = Cracks.from_polylines([[[0.0, -10.0], [0.0, -8.0]], [[0.3, -7.0], [0.02, -9.5]]], surface=[(True, False), (False, False)])
+    cracks = Cracks.from_polylines(
+        [[[0.0, -10.0], [0.0, -8.0]], [[0.3, -7.0], [0.02, -9.5]]], surface=[(True, False), (False, False)]
+    )
     growth = grow(cracks, only(tips_of(cracks, angle=np.array([0, 0, 0.0])), (0.02, -9.5)))
     assert growth.joins and growth.joins[0].other_crack == 0
     assert growth.cracks.surface.sum() == 1

@@ -14,9 +14,7 @@ def test_loops_are_turned_rock_on_the_left():
     assert blocks.n_blocks == 2 and blocks.n_vertices == 12
     assert blocks.loop_start.tolist() == [0, 4, 8, 12] and blocks.block_loop.tolist() == [0, 2, 3]
     np.testing.assert_allclose(blocks.areas(), [2.0 - 0.5, 2.0], rtol=1e-15)
-    signed = [
-        0.5 * np.sum(p[:, 0] * np.roll(p[:, 1], -1) - p[:, 1] * np.roll(p[:, 0], -1)) for p in blocks.loops(0)
-    ]
+    signed = [0.5 * np.sum(p[:, 0] * np.roll(p[:, 1], -1) - p[:, 1] * np.roll(p[:, 0], -1)) for p in blocks.loops(0)]
     assert signed[0] > 0 > signed[1]
 
 

@@ -15,6 +15,7 @@ def test_area_moments_of_a_rectangle_with_a_hole_far_from_the_origin():
     assert area == pytest.approx(7.0, rel=1e-12)
     centre = (8 * np.array([2, 1]) - np.array([1.5, 1.0])) / 7
     assert centroid - shift == pytest.approx(centre, abs=1e-9)
+
     def about(b, h, at):
         own = np.diag([b**3 * h / 12, b * h**3 / 12])
         return own + b * h * np.outer(np.array(at) - centre, np.array(at) - centre)

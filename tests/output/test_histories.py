@@ -175,7 +175,12 @@ def test_progress_tells_the_time_left_at_the_pace_of_load_steps(tmp_path, monkey
     lines = [line for line in out.getvalue().splitlines() if "%" in line]
     assert ["left" in line for line in lines] == [False, False, True, True, True, True]
     # 98 % at 1 s a step; 97 % at 2 s in two steps; the same 97 % with 4 and 6 s in two steps.
-    assert [line.rpartition(", about ")[2] for line in lines[2:]] == ["98 s left", "97 s left", "3 min left", "5 min left"]
+    assert [line.rpartition(", about ")[2] for line in lines[2:]] == [
+        "98 s left",
+        "97 s left",
+        "3 min left",
+        "5 min left",
+    ]
 
 
 def test_a_percentage_is_not_said_again_at_once(tmp_path, monkeypatch):

@@ -327,7 +327,10 @@ def test_faces_of_an_open_bent_crack_part_by_opening_and_slip(tmp_path):
     faces = solution.faces
     along = np.diff(line, axis=0)
     along /= np.hypot(*along.T)[:, None]
-    jump = faces.opening[..., None] * normal_of(along)[faces.segment, None] + faces.slip[..., None] * along[faces.segment, None]
+    jump = (
+        faces.opening[..., None] * normal_of(along)[faces.segment, None]
+        + faces.slip[..., None] * along[faces.segment, None]
+    )
     jumps = cKDTree(faces.points.reshape(-1, 2))
     widest = np.hypot(*jump.reshape(-1, 2).T).max()
     moved = grid.point_data["displacement"][:, :2]

@@ -34,7 +34,9 @@ def run_pipeline(out: Path, *wishes: str) -> SimpleNamespace:
 
     Wings.on_end = keep
     try:
-        code = main(["run", str(FOLDER), "--quiet", "--out", str(out), *(w for wish in wishes for w in ("--set", wish))])
+        code = main(
+            ["run", str(FOLDER), "--quiet", "--out", str(out), *(w for wish in wishes for w in ("--set", wish))]
+        )
     finally:
         Wings.on_end = ended
     assert code == DONE
@@ -50,7 +52,15 @@ def study(tmp_path_factory):
 def test_run_ends_as_told_and_writes_its_files(study):
     assert study.files.summary["end"] == "end of the scene"
     names = {path.name for path in study.out.iterdir()}
-    assert names >= {"comparison.txt", "summary.json", "events.csv", "tips.csv", "history.csv", "blocks.pvd", "cracks.pvd"}
+    assert names >= {
+        "comparison.txt",
+        "summary.json",
+        "events.csv",
+        "tips.csv",
+        "history.csv",
+        "blocks.pvd",
+        "cracks.pvd",
+    }
     text = (study.out / "comparison.txt").read_text()
     assert "Initiation" in text and "nan" not in text
     cracks = study.files.grid("cracks", int(study.files.history["cycle"][-1]))

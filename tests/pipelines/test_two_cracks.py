@@ -134,7 +134,9 @@ def test_all_four_as_published(tmp_path):
     assert np.nanmin([loads[30], loads[60], np.inf]) > max(loads[0], loads[90])
     for phi in (0, 90):
         begin = runs[f"phi_{phi}"].watch.load("initiation")
-        assert expected_initiation(phi) <= begin * (1 + 1e-4) <= expected_initiation(phi) + 0.1 * COARSE_STEP * (1 + 1e-3)
+        assert (
+            expected_initiation(phi) <= begin * (1 + 1e-4) <= expected_initiation(phi) + 0.1 * COARSE_STEP * (1 + 1e-3)
+        )
     assert abs(abs(coalescence_angle_deg(runs["phi_90"].watch.last.cracks)) - 90) < 1.0
     found = coalescence_angle_deg(runs["phi_0"].watch.last.cracks)
     assert found == pytest.approx(published.COALESCENCE_ANGLE_DEG["experiment"][0], abs=5.0)

@@ -369,12 +369,10 @@ def test_gravity_needs_something_fixed_unless_blocks_may_fall(scene_file):
     load_scene(scene_file(text), ["dda.dynamic_factor=1"])
     (error,) = faults(scene_file, text, overrides=["zones.rock.fixed=true"])
     assert "every load acts on fixed blocks (rock)" in error.message
-    load_scene(scene_file(text + '[zones.base]\nfixed = true\n'), ["geometry.zones=" + RESTING])
+    load_scene(scene_file(text + "[zones.base]\nfixed = true\n"), ["geometry.zones=" + RESTING])
 
 
-RESTING = (
-    '[{ name = "rock", rectangle = [0.0, 0.0, 1.0, 2.0] }, { name = "base", rectangle = [-1.0, -1.0, 2.0, 0.0] }]'
-)
+RESTING = '[{ name = "rock", rectangle = [0.0, 0.0, 1.0, 2.0] }, { name = "base", rectangle = [-1.0, -1.0, 2.0, 0.0] }]'
 
 
 def test_fixing_the_loaded_specimen_is_refused_and_not_advised(scene_file):

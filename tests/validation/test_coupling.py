@@ -191,9 +191,7 @@ def test_a_plate_with_a_hole_cracks_where_its_wall_reaches_the_strength():
     assert [event.kind for event in events[:2]] == ["birth", "birth"] and events[-1].kind == "split"
     ends = np.array([[[w, h], [-w, h]], [[-w, -h], [w, -h]]])
     load = ddm.BodyLoad(segments=ends, tractions=np.tile([[[0.0, 1.0]], [[0.0, -1.0]]], (1, 2, 1)))
-    alone = next(
-        ddm.propagate([plate, hole], problem.cracks, rock, load, growth, control="toughness")
-    )
+    alone = next(ddm.propagate([plate, hole], problem.cracks, rock, load, growth, control="toughness"))
     assert alone.load_factor <= -events[0].load < alone.load_factor + step
     np.testing.assert_allclose(
         sorted(event.point for event in events[:2]), sorted(event.point for event in alone.events), atol=1e-9

@@ -43,7 +43,9 @@ def tip_after(increment: float, correct: bool) -> np.ndarray:
     """Where the upper tip is after 16 mm of growth in steps of ``increment``."""
     growth = GrowthSettings(increment=increment, min_increment=increment, correct=correct)
     passes = round(GROWN / increment) + 1
-    last = [c for c in takewhile(lambda c: c.number <= passes, cycles(replace(slanted_crack_in_tension(), growth=growth)))][-1]
+    last = [
+        c for c in takewhile(lambda c: c.number <= passes, cycles(replace(slanted_crack_in_tension(), growth=growth)))
+    ][-1]
     tip = last.tips[last.tips["end"] == 1][0]
     return tip["point"]
 
