@@ -1,0 +1,213 @@
+"""The contacts of a step: found on the present geometry, given joint laws and springs, remembering the step before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import CONTACT, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from .contact_search import describe_contacts, find_contacts
+from .contact_springs import PENALTY_RATIO, JointTable, Springs, contact_springs
+
+#: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
+_TOUCH = 1e-7
+_UNKNOWN = -2
+_NEVER = -1
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSet:
+    """Contacts (n,) as a step begins.
+
+    vertex, edge, block, other, law   as in CONTACT rows
+    partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
+    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2)
+    springs              stiffness and strengths
+    state, direction, bonded, shear, slip   what was carried over: state and sense of sliding to try first, bond, N, m
+    """
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    block: np.ndarray
+    other: np.ndarray
+    law: np.ndarray
+    partner: np.ndarray
+    geometry: np.ndarray
+    springs: Springs
+    state: np.ndarray
+    direction: np.ndarray
+    bonded: np.ndarray
+    shear: np.ndarray
+    slip: np.ndarray
+
+    @property
+    def gap(self) -> np.ndarray:
+        """(n,) m, negative where the vertex penetrates."""
+        return self.geometry[:, 3]
+
+    def __len__(self) -> int:
+        return len(self.vertex)
+
+    def rows(
+        self,
+        state: np.ndarray,
+        bonded: np.ndarray,
+        normal_force: np.ndarray,
+        shear_force: np.ndarray,
+        gap: np.ndarray,
+        sliding: np.ndarray,
+    ) -> np.ndarray:
+        """CONTACT rows of the finished step, on the geometry on which it was assembled; all arguments (n,)."""
+        rows = np.zeros(len(self), CONTACT)
+        for name in ("vertex", "edge", "block", "other", "law"):
+            rows[name] = getattr(self, name)
+        rows["state"], rows["bonded"] = state, bonded
+        rows["position"], rows["normal"], rows["point"] = (
+            self.geometry[:, 0],
+            self.geometry[:, 1:3],
+            self.geometry[:, 5:7],
+        )
+        rows["gap"], rows["length"] = gap, self.geometry[:, 4]
+        rows["normal_force"], rows["shear_force"] = normal_force, shear_force
+        # Sliding is what the spring did not take up elastically.
+        stretch = (self.shear - shear_force) / self.springs.shear
+        rows["slip"] = self.slip + np.where(state == SLIP, sliding - stretch, 0.0)
+        return rows
+
+
+class ContactFinder:
+    """Finds the contacts of ``blocks`` and gives each its law and springs.
+
+    ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        joints: Sequence[JointLaw],
+        joint_index: Callable[[str, str], int | None],
+        settings: DdaSettings,
+        modulus: np.ndarray,
+    ) -> None:
+        self.names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
+        self._edge_names = blocks.edge_names
+        self._n_joints = len(joints)
+        self._joint_index = joint_index
+        self._settings = settings
+        self._modulus = modulus
+        self._table = JointTable.of(joints)
+        self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
+        self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
+        self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
+        self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
+        self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
+        self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
+        self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
+        self._size = float(np.ptp(blocks.vertices, axis=0).max())
+
+    def find(self, state: State, vertices: np.ndarray, window: float) -> ContactSet:
+        """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it."""
+        old = state.contacts
+        keys = old["vertex"] * len(vertices) + old["edge"]
+        rank = np.argsort(keys, kind="stable")
+        table = find_contacts(vertices, self._next, self._previous, self._start, self._fixed, window, keys[rank])
+        geometry, mate, parent = describe_contacts(
+            table, vertices, self._next, self._previous, window,
+            np.ascontiguousarray(old["vertex"]), np.ascontiguousarray(old["edge"]),
+            np.ascontiguousarray(old["normal"]), rank,
+        )  # fmt: skip
+        law = self._laws(table[:, 1], mate)
+        partner = table[:, 2:]
+        if (law == _NEVER).any():
+            keep = law != _NEVER
+            renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
+            table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
+            partner = renumber[table[:, 2:]]
+        block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
+        springs = self._springs(block, other, law, geometry[:, 4])
+        contact_state, direction, bonded, shear, slip = self._remembered(
+            old, parent, state.time, geometry, partner, springs
+        )
+        return ContactSet(
+            vertex=table[:, 0].copy(),
+            edge=table[:, 1].copy(),
+            block=block,
+            other=other,
+            law=law,
+            partner=np.ascontiguousarray(partner),
+            geometry=np.ascontiguousarray(geometry),
+            springs=springs,
+            state=contact_state,
+            direction=direction,
+            bonded=bonded,
+            shear=shear,
+            slip=slip,
+        )
+
+    def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
+        stiffest = PENALTY_RATIO * np.maximum(self._modulus[block], self._modulus[other])
+        kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
+        normal = stiffest if kn is None else np.full(len(block), float(kn))
+        return contact_springs(
+            self._table, law, length, normal, normal if ks is None else np.full(len(block), float(ks))
+        )
+
+    def _remembered(self, old, parent, time, geometry, partner, springs):
+        """What contacts keep of their rows ``parent`` (−1: new) in ``old``: state, direction, bonded, shear force, slip."""
+        n = len(parent)
+        contact_state = np.zeros(n, np.int64)
+        shear, slip = np.zeros(n), np.zeros(n)
+        bonded = np.zeros(n, np.int64)
+        known = parent >= 0
+        if known.any():
+            rows = old[parent[known]]
+            contact_state[known], shear[known], slip[known] = rows["state"], rows["shear_force"], rows["slip"]
+            bonded[known] = rows["bonded"]
+        if not known.all():
+            # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
+            fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
+            if len(old) == 0 and time == 0.0:
+                bonded[fresh & (geometry[:, 4] > 0)] = 1
+            contact_state[fresh & (partner < 0).all(axis=1)] = STICK
+        bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
+        direction = np.where(contact_state == SLIP, np.sign(shear), 0.0)
+        rough = (springs.friction > 0) | (bonded > 0)
+        contact_state[(contact_state == SLIP) & rough & (direction == 0)] = STICK
+        contact_state[(contact_state == STICK) & ~rough] = SLIP
+        return contact_state, direction, bonded, shear, slip
+
+    def _laws(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
+        a, b = self._edge_name[edge], self._edge_name[mate]
+        law = self._law_of[a, b]
+        if (law == _UNKNOWN).any():
+            names = self._edge_names
+            for i, j in {(int(i), int(j)) for i, j in zip(a, b, strict=True)}:
+                index = self._joint_index(names[i], names[j])
+                if index is not None and not 0 <= index < self._n_joints:
+                    raise ValueError(
+                        f"edges {names[i]!r} and {names[j]!r} have joint law {index}, out of {self._n_joints}"
+                    )
+                self._law_of[i, j] = _NEVER if index is None else index
+            law = self._law_of[a, b]
+        return law
+
+    def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""
+        rows = rows.copy()
+        start, point = vertices[rows["edge"]], vertices[rows["vertex"]]
+        along = vertices[self._next[rows["edge"]]] - start
+        length = np.hypot(along[:, 0], along[:, 1])
+        rows["point"] = point
+        rows["position"] = np.einsum("ij,ij->i", point - start, along) / length**2
+        rows["normal"] = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
+        return rows
+
+    def where(self, found: ContactSet, contact: int) -> str:
+        """Which contact of ``found`` it is, for messages; empty for −1."""
+        if contact < 0:
+            return ""
+        x, y = found.geometry[contact, 5:7]
+        a, b = self.names[found.block[contact]], self.names[found.other[contact]]
+        return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
