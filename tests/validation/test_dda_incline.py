@@ -1,0 +1,177 @@
+"""Blocks on an incline: held to the friction angle, sliding, stacked, toppling; `geomech.reference.block_on_incline`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from block_problems import GRAVITY, WEIGHT, march, moved, rectangle, settled, system_of, turned
+
+from geomech.model import JointLaw, Material, State
+from geomech.reference import block_motion
+from geomech.reference import block_on_incline as exact
+
+SLOPE = np.radians(30)
+DOWN = -np.array([np.cos(SLOPE), np.sin(SLOPE)])
+STEPS = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1]
+
+
+def block_on_slope(friction_deg: float, **settings):
+    base, block = turned(rectangle(-4, -1, 6, 0), SLOPE), turned(rectangle(4, 0, 5, 1), SLOPE)
+    return system_of([base, block], np.radians(friction_deg), **settings)
+
+
+def travel(system, state) -> float:
+    return float(moved(system, state)[1] @ DOWN)
+
+
+@pytest.mark.parametrize("dt", STEPS)
+@pytest.mark.parametrize("excess_deg", [1e-4, 0.1, 5.0])
+def test_a_block_at_rest_stays_to_the_friction_angle_at_every_step(dt, excess_deg):
+    # From static equilibrium: 1e-4° above the incline is 3.5e-6 of tan φ. Nothing moves beyond the round-off of coordinates.
+    system = block_on_slope(30 + excess_deg)
+    state = settled(system)
+    end = march(system, state, WEIGHT, 60 * dt, dt)
+    assert abs(travel(system, end) - travel(system, state)) < 1e-13
+    assert np.abs(end.velocity[1]).max() < 1e-10
+
+
+@pytest.mark.parametrize("dt", STEPS)
+def test_a_block_just_steeper_than_its_friction_angle_slides_at_every_step(dt):
+    # 0.01° below the incline it must go, as slowly as it should: the stick is not one of the solver's making.
+    strong, weak = block_on_slope(31), block_on_slope(29.99)
+    state = settled(strong)
+    end = march(weak, state, WEIGHT, 60 * dt, dt)
+    acceleration = block_motion.incline_acceleration(SLOPE, np.radians(29.99))
+    # One corner lets go before the other, and the block starts with parts of its elastic shear of a micrometre.
+    assert travel(weak, end) - travel(strong, state) == pytest.approx(
+        0.5 * acceleration * end.time**2, rel=1e-3, abs=5e-7
+    )
+
+
+@pytest.mark.parametrize("dt", STEPS[1:])
+def test_a_block_that_weighs_at_once_sticks(dt):
+    # The shock of the weight makes it vibrate, and it creeps while it is light: by parts of its elastic shortening
+    # (W/E' = 2.4 µm), a few times, then it must stand. 30 ms are twenty of its periods.
+    system = block_on_slope(35)
+    end = march(system, State.at_rest(system.blocks), WEIGHT, max(0.03, 20 * dt), dt)
+    assert abs(travel(system, end)) < 2e-5
+    later = march(system, end, WEIGHT, end.time + max(0.005, 10 * dt), dt)
+    assert abs(travel(system, later) - travel(system, end)) < 2e-7
+
+
+def test_sliding_is_right_at_any_step_and_any_penalty():
+    # From equilibrium at 35° the friction drops to 15°. Trapezoidal sums of a constant acceleration are exact, so what
+    # remains is the elastic shear let go (W/E over the path): no part of it may come from dt or from the penalty.
+    rows = []
+    acceleration = block_motion.incline_acceleration(SLOPE, np.radians(15))
+    for penalty in (1e10, 1e11, 4e11, 1e13):
+        state = settled(block_on_slope(35, normal_penalty=penalty, shear_penalty=penalty))
+        system = block_on_slope(15, normal_penalty=penalty, shear_penalty=penalty)
+        row = []
+        for dt in (2e-2, 5e-3, 1e-3):
+            end = march(system, state, WEIGHT, 0.5, dt)
+            row.append((travel(system, end) - travel(system, state)) / (0.5 * acceleration * 0.25) - 1)
+        rows.append(row)
+        print(f"penalty {penalty:8.0e} Pa, error at dt = 20, 5, 1 ms: " + " ".join(f"{e:9.2e}" for e in row))
+    errors = np.array(rows)
+    assert np.abs(errors).max() < 1e-7
+    assert np.ptp(errors) < 1e-8
+
+
+def test_a_block_pushed_up_the_incline_comes_to_rest_and_stays():
+    # Up the slope friction and weight both stop it: v²/(2g (sin α + cos α tan φ)); then 35° holds it on 30°. It lands on its elastic shear:
+    # a micrometre or a few, 1e-4 of the way, whatever dt.
+    expected = 1.0 / (2 * GRAVITY * (np.sin(SLOPE) + np.cos(SLOPE) * np.tan(np.radians(35))))
+    errors = []
+    for dt in (4e-3, 1e-3, 2.5e-4):
+        system = block_on_slope(35, rock=Material("rock", 10e9, 0.0, density=2600.0))
+        state = settled(system)
+        at = travel(system, state)
+        state.velocity[1, :2] = -DOWN
+        end = march(system, state, WEIGHT, 0.16, dt)
+        errors.append(abs((at - travel(system, end)) / expected - 1))
+        # Stopped short, it swings on its elastic shear of a micrometre, and no more.
+        later = march(system, end, WEIGHT, 0.2, dt)
+        assert abs(travel(system, later) - travel(system, end)) < 2e-6
+    print("pushed up, error at dt = 4, 1, 0.25 ms:", " ".join(f"{e:.1e}" for e in errors))
+    assert max(errors) < 3e-4
+
+
+@pytest.mark.parametrize(("base_deg", "between_deg"), [(20, 45), (20, 10), (24, 26), (27, 15), (35, 10), (40, 35)])
+def test_stacked_blocks_slide_each_at_its_own_rate(base_deg, between_deg):
+    polygons = [
+        turned(p, SLOPE) for p in (rectangle(-6, -1, 9, 0), rectangle(4, 0, 7, 1), rectangle(5, 1, 6, 2))
+    ]  # fmt: skip
+    names = [[["", "", "slope", ""]], [[""] * 4], [[""] * 4]]
+    joints = [JointLaw("base", np.radians(base_deg)), JointLaw("between", np.radians(between_deg))]
+    system = system_of(
+        polygons, joints, names=names, joint_index=lambda a, b: 0 if "slope" in (a, b) else 1,
+        rock=Material("rock", 50e9, 0.0, density=2600.0),
+    )  # fmt: skip
+    end = march(system, State.at_rest(system.blocks), WEIGHT, 0.3, 2e-3)
+    lower, upper = 0.5 * 0.3**2 * np.array(
+        exact.stacked_accelerations(SLOPE, np.radians(base_deg), np.radians(between_deg), (3.0, 1.0))
+    )  # fmt: skip
+    got = moved(system, end)[1:] @ DOWN
+    print(f"φ {base_deg}° under {between_deg}°: {got[0]:.6f} {got[1]:.6f} m, should be {lower:.6f} {upper:.6f}")
+    # Weight put on at once: micrometres of elastic shear and start.
+    assert got == pytest.approx([lower, upper], abs=1e-5)
+
+
+def column(slenderness: float, friction: float):
+    """A column 1 m high with its lower corner at the origin, stiff enough to start like a rigid one."""
+    polygons = [turned(p, SLOPE) for p in (rectangle(-2, -1, 3, 0), rectangle(0, 0, np.tan(slenderness), 1))]
+    return system_of(
+        polygons, friction, rock=Material("stiff", 1e11, 0.0, density=2600.0), max_displacement_ratio=1.0,
+    )  # fmt: skip
+
+
+def start(slenderness: float, friction: float) -> tuple[float, float]:
+    """(toe's acceleration down the slope, angular acceleration) of a column in the first 50 ms, taken in one step on the
+    geometry at rest, so that nothing has tilted yet."""
+    system, dt = column(slenderness, friction), 0.05
+    state = system.step(State.at_rest(system.blocks), WEIGHT, dt).state
+    toe = (state.vertices - system.blocks.vertices)[4] @ DOWN
+    return 2 * toe / state.time**2, 2 * state.rotation[1] / state.time**2
+
+
+def test_sliding_toppling_map():
+    """Every mode of the (δ, φ) map and how fast it starts: 150 columns from slender to squat, slippery to rough."""
+    worst = 0.0
+    for slenderness in np.radians(np.arange(3, 60, 6.0)):
+        for friction in np.radians(np.arange(2.5, 60, 4.0)):
+            toe, spin = exact.starting_accelerations(slenderness, friction, SLOPE, 1.0)
+            got = start(slenderness, friction)
+            worst = max(worst, abs(got[0] - toe) / GRAVITY, abs(got[1] - spin) / GRAVITY)
+    print(f"largest difference of starting accelerations over the map: {worst:.1e} g")
+    # Elastic shortening, W/E' ≤ 0.3 µm, over ½ g dt² = 12 mm; the rotation of a column b wide is b times more sensitive.
+    assert worst < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("what", "boundary_deg"),
+    [("sliding", 0.0), ("toppling", 0.0), ("turns as it slides", 10.0), ("turns as it slides", 20.0)]
+    + [("slides as it topples", d) for d in (5.0, 10.0, 20.0)],
+)
+def test_boundaries_of_the_map_are_where_they_should_be(what, boundary_deg):
+    """Located by bisection. The threshold, 2e-4 g, moves them by 0.01° at most; the rest is elasticity, W/(E' b)."""
+    least = 2e-4 * GRAVITY
+    d = np.radians(boundary_deg)
+    if what == "sliding":
+        moves, lo, hi, expected = (lambda f: start(np.radians(45), f)[0] > least), 10, 50, 30.0
+    elif what == "toppling":
+        moves, lo, hi, expected = (lambda s: start(s, np.radians(40))[1] > least), 10, 50, 30.0
+    elif what == "turns as it slides":
+        moves, lo, hi, expected = (lambda f: start(d, f)[1] < least), 1, 29, boundary_deg
+    else:
+        moves, lo, hi = (lambda f: start(d, f)[0] > least), 1, 30
+        expected = np.degrees(exact.toe_holds_above(d, SLOPE))
+    lo, hi = np.radians(lo), np.radians(hi)
+    assert moves(lo)
+    assert not moves(hi)
+    for _ in range(15):
+        middle = 0.5 * (lo + hi)
+        lo, hi = (middle, hi) if moves(middle) else (lo, middle)
+    found = np.degrees(0.5 * (lo + hi))
+    print(f"{what} {boundary_deg:g}: boundary at {found:.4f}°, should be {expected:.4f}°")
+    assert found == pytest.approx(expected, abs=0.02)
