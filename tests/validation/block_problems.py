@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,14 +50,13 @@ def march(
     return state
 
 
-def settled(system: dda.BlockSystem, loads: Loads = WEIGHT, steps: int = 5, dt: float = 1.0) -> State:
+def settled(
+    system: dda.BlockSystem, loads: Loads = WEIGHT, steps: int = 5, dt: float = 1.0, joint_index: Callable | None = None
+) -> State:
     """Static equilibrium under ``loads``, at time zero and at rest."""
-    from dataclasses import replace
-
     still = dda.BlockSystem(
-        system.blocks, system.materials, system.joints, system._joint_index,
-        replace(system.settings, dynamic_factor=0.0),
-    )  # fmt: skip
+        system.blocks, system.materials, system.joints, joint_index, replace(system.settings, dynamic_factor=0.0)
+    )
     state = State.at_rest(system.blocks)
     for _ in range(steps):
         state = still.step(state, loads, dt).state
