@@ -84,7 +84,8 @@ def check_states(
     """Forces of the present states and the states they call for.
 
     Returns (forces (n, 4): N, S, new gap, sliding in the step; new state; new direction; new bonded; violation (n,) N, 0
-    where the state stands). ``slack`` (m) is the round-off of coordinates: gaps and slips below it decide nothing.
+    where the state stands). ``slack`` (m) is the round-off of coordinates: gaps below it decide nothing; slip, which is counted
+    from the step's start, is known a thousand times better.
     """
     n = block.shape[0]
     forces = np.zeros((n, 4))
@@ -133,14 +134,14 @@ def check_states(
         elif state[c] == STICK:
             strength = max(0.0, friction[c] * forces[c, 0] + (cohesion[c] if bonded[c] else 0.0))
             excess = abs(forces[c, 1]) - strength
-            if excess > 1e-9 * strength + shear[c] * slack:
+            if excess > 1e-9 * strength + 1e-3 * shear[c] * slack:
                 new_state[c], new_bonded[c] = SLIP, 0
                 new_direction[c] = np.sign(forces[c, 1])
                 violation[c] = excess
         elif friction[c] > 0.0:
             strength = max(0.0, friction[c] * forces[c, 0])
             trial = direction[c] * (shear0[c] - shear[c] * slide)
-            if strength - trial > 1e-9 * strength + shear[c] * slack:
+            if strength - trial > 1e-9 * strength + 1e-3 * shear[c] * slack:
                 # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial

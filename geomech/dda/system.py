@@ -24,8 +24,8 @@ log = logging.getLogger(__name__)
 _WINDOW = 2.2
 #: No step moves a vertex by more than this part of the smallest block's size, √area, whatever the settings allow.
 _BLOCK_SHARE = 0.1
-#: Gaps below this many times the largest coordinate are round-off and decide nothing.
-_SLACK = 1e-14
+#: Gaps below this many times the largest coordinate, its round-off, decide nothing.
+_SLACK = 5e-16
 
 
 class BlockSystem:
