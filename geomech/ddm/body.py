@@ -23,6 +23,7 @@ from ..model.polygon import area_moments
 from . import shapes
 from .applied import Applied, apply, check_equilibrium
 from .automatic import for_target
+from .bordered import SMALLEST, Base, Bordered
 from .boundary import BoundarySystem
 from .contact import settle_faces
 from .crack_system import CrackSystem
@@ -146,9 +147,6 @@ class Body:
         self.work.elements_assembled += self.counts["elements_new"]
         self.work.bodies += 1
 
-        def block(rows, columns):
-            return lambda r, k: influence(rows.take(r), columns.take(k), nu, tol)
-
         self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k))
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
@@ -179,17 +177,26 @@ class Body:
             c,
             lambda r, k: system.solve(gc(k)),
         )
-        cc = block(c, c)
+
+        def of(rows, elements):
+            return rows if len(elements) == c.n else rows[c.unknowns(elements)]
 
         def schur(r, k):
-            direct = cc(r, k)
+            direct = influence(c.take(r), c.take(k), nu, tol)
             if not g.n:
                 return direct
             # Column-major like the first: a difference of both orders takes several times as long.
-            return direct - (self._w[:, c.unknowns(k)].T @ self._cg[c.unknowns(r)].T).T
+            return direct - (of(self._w.T, k) @ of(self._cg, r).T).T
 
         known = old.crack_system.matrix if kept else None
-        self.crack_system = CrackSystem(reuse(known, c_old, c_old, c, c, schur), self.work)
+        if known is None or self.rough or c.n_unknowns < SMALLEST:
+            whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
+            matrix = Bordered(c, Base(c, whole))
+        else:
+            matrix = known.grown(c, c_old, schur)
+            if matrix.worn:
+                matrix = matrix.renewed()
+        self.crack_system = CrackSystem(matrix, self.work)
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times what the supports hold of displacement, less that of particular fields."""
@@ -249,7 +256,9 @@ class Body:
         history: Solution | FaceMemory | None,
     ) -> Solution:
         applied, units, rest, imposed = self.lay_out(load, equilibrium_tolerance)
-        g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, self.crack_system.opened)
+        # Rough faces have equations of their own: the inverse of S is no use to them.
+        opening = np.zeros_like if self.rough else self.crack_system.opened
+        g, r, y, reduced, opened = self._loads.add(units, rest, self._outside, self._cg, opening)
         pressure = load.face_pressure(self.faces.nodes, self.faces.source, self.cracks.n_segments)
         answer = settle_faces(self, reduced, opened, pressure, warm, history)
         self.work.solutions += 1

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .bordered import LOSS, SINGULAR, Bordered, BorderedFactor
 from .factor import Factor
 from .work import Work
 
@@ -34,11 +35,11 @@ class Rows:
 
 
 class CrackSystem:
-    """``matrix`` (n, n) is S; factors and columns of its inverse are made when first asked for, and kept."""
+    """``matrix`` is S; factors and columns of its inverse are made when first asked for, and kept."""
 
-    def __init__(self, matrix: np.ndarray, work: Work | None = None):
+    def __init__(self, matrix: Bordered, work: Work | None = None):
         self.matrix, self._work = matrix, Work() if work is None else work
-        self.n = len(matrix)
+        self.n = matrix.n
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(self.n, -1)
         self._columns = np.empty((self.n, 0))
@@ -77,28 +78,41 @@ class CrackSystem:
         reaction[at] = (right - self.matrix @ w)[at]
         return w, reaction
 
-    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor]:
+    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor]:
         """The unknowns that are not held (indices) and factors of their equations."""
         free, moving = np.flatnonzero(~rows.held), np.flatnonzero(rows.mixed)
-        matrix = self.matrix[np.ix_(free, free)]
+        if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
+            return free, self.open_factor
+        whole = self.matrix.dense
+        matrix = whole[np.ix_(free, free)]
         if len(moving):
             at = np.full(self.n, -1)
             at[free] = np.arange(len(free))
-            matrix[at[moving]] += rows.mixed[moving, None] * self.matrix[np.ix_(moving + rows.per, free)]
+            matrix[at[moving]] += rows.mixed[moving, None] * whole[np.ix_(moving + rows.per, free)]
         diagonal = np.arange(len(free))
         matrix[diagonal, diagonal] -= rows.spring[free]
-        return free, Factor(matrix, "cracks cut a part of the body off")
+        return free, Factor(matrix, SINGULAR)
 
     def rcond(self, closed: np.ndarray) -> float:
         """Reciprocal condition of the matrix solved with when ``closed`` (n,) bool are held."""
         return (self.open_factor or self._free_factor(closed)[1]).rcond
 
     @cached_property
-    def open_factor(self) -> Factor | None:
+    def open_factor(self) -> Factor | BorderedFactor | None:
         """Factors of S with all faces open; None when only closed faces hold a part of the body."""
+        if self.matrix.border is not None:
+            try:
+                self._work.crack_borderings += 1
+                factor = self.matrix.factored()
+                if factor.loss < LOSS and factor.rcond > _SAFE:
+                    return factor
+            except np.linalg.LinAlgError:
+                pass
+            # Only pivoting in the whole matrix tells.
+            self.matrix = self.matrix.whole()
         try:
             self._work.crack_factorisations += 1
-            factor = Factor(self.matrix, "cracks cut a part of the body off")
+            factor = self.matrix.factored()
         except np.linalg.LinAlgError:
             return None
         return factor if factor.rcond > _SAFE else None
@@ -110,8 +124,9 @@ class CrackSystem:
             if len(self._factors) >= _KEPT:
                 self._factors.pop(next(iter(self._factors)))
             free = np.flatnonzero(~closed)
-            matrix = self.matrix if len(free) == len(closed) else self.matrix[np.ix_(free, free)]
-            self._factors[key] = free, Factor(matrix, "cracks cut a part of the body off")
+            whole = self.matrix.dense
+            matrix = whole if len(free) == len(closed) else whole[np.ix_(free, free)]
+            self._factors[key] = free, Factor(matrix, SINGULAR)
             self._work.crack_factorisations += 1
         return self._factors[key]
 

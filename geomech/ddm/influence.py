@@ -301,19 +301,23 @@ def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set
     kept_r, new_r = np.flatnonzero(rows >= 0), np.flatnonzero(rows < 0)
     new_c = np.flatnonzero(columns < 0)
     out = np.empty((row_set.n_unknowns, column_set.n_unknowns), order="F")
-    # Elements mostly keep their order: copying a few slices is several times faster than gathering.
-    wr, wc = 2 * row_set.per, 2 * column_set.per
-    column_runs = list(_runs(columns))
-    for r, was_r, m in _runs(rows):
-        for k, was_k, n in column_runs:
-            out[r * wr : (r + m) * wr, k * wc : (k + n) * wc] = old[
-                was_r * wr : (was_r + m) * wr, was_k * wc : (was_k + n) * wc
-            ]
+    copy_blocks(old, out, rows, columns, 2 * row_set.per, 2 * column_set.per)
     if len(new_r):
         out[row_set.unknowns(new_r)] = compute(new_r, np.arange(column_set.n))
     if len(new_c):
         out[np.ix_(row_set.unknowns(kept_r), column_set.unknowns(new_c))] = compute(kept_r, new_c)
     return out
+
+
+def copy_blocks(old: np.ndarray, out: np.ndarray, rows: np.ndarray, columns: np.ndarray, high: int, wide: int) -> None:
+    """Copy to ``out`` what it has of ``old``: blocks ``high`` × ``wide`` whose old numbers are ``rows`` and ``columns``, or −1."""
+    # Elements mostly keep their order: copying a few slices is several times faster than gathering.
+    column_runs = list(_runs(columns))
+    for r, was_r, m in _runs(rows):
+        for k, was_k, n in column_runs:
+            out[r * high : (r + m) * high, k * wide : (k + n) * wide] = old[
+                was_r * high : (was_r + m) * high, was_k * wide : (was_k + n) * wide
+            ]
 
 
 def _runs(old_numbers: np.ndarray):

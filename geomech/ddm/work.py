@@ -12,6 +12,7 @@ class Work:
     bodies, elements_assembled     geometries, and elements whose influence on others was worked out
     boundary_assemblies, boundary_factorisations     of A_ΓΓ
     crack_factorisations           of the crack unknowns' equations, whole or with nodes held
+    crack_borderings               of these factors by what is new, instead
     back_substitutions             right-hand sides solved for with these
     solutions, contact_solves      loads solved for, and passes of the contact of crack faces in them
     """
@@ -21,6 +22,7 @@ class Work:
     boundary_assemblies: int = 0
     boundary_factorisations: int = 0
     crack_factorisations: int = 0
+    crack_borderings: int = 0
     back_substitutions: int = 0
     solutions: int = 0
     contact_solves: int = 0

@@ -1,0 +1,99 @@
+"""Factors of a growing matrix against those of the whole matrix."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geomech.ddm import Body, BodyLoad
+from geomech.ddm.bordered import Bordered
+from geomech.model import Cracks, DdmSettings, Material
+
+ROCK = Material("rock", 10e9, 0.25)
+PLATE = np.array([[-4.0, -3.0], [4.0, -3.0], [4.0, 3.0], [-4.0, 3.0]])
+LOAD = BodyLoad(sides={0: (0.0, -1e6), 2: (0.0, 1e6)})
+SEGMENT_ARRAYS = ("crack", "block", "birth_cycle", "aperture", "law")
+SETTINGS = DdmSettings(elements_per_crack=8)
+
+
+def network(steps: int, turn: float = 0.0) -> Cracks:
+    """Two slanted cracks, one of them grown by ``steps`` at its right tip, the last of which is bent by ``turn``."""
+    at, line = np.array([-1.0, -0.4]), []
+    for k in range(steps):
+        heading = 0.9 + 0.05 * k + (turn if k == steps - 1 else 0.0)
+        at = at + 0.15 * np.array([math.cos(heading), math.sin(heading)])
+        line.append(at)
+    first = np.array([[-2.5, -1.0], [-1.0, -0.4], *line])
+    lines = [first, np.array([[1.5, 0.2], [3.5, -0.6]])]
+    birth = np.r_[0, np.arange(1, steps + 1), 0]
+    cracks = Cracks.from_polylines(lines, aperture=math.inf)
+    return replace(cracks, birth_cycle=birth)
+
+
+def factors(body: Body) -> np.ndarray:
+    tips = body.solve(LOAD).tips
+    return np.stack([tips["k_i"], tips["k_ii"]])
+
+
+def test_factors_solve_both_ways_and_multiply():
+    """Every step is tried, bent, and taken again, as growth does: elements come and go. Round-off alone is allowed."""
+    rng = np.random.default_rng(3)
+    body = Body([PLATE], network(0), ROCK, SETTINGS)
+    factors(body)
+    for steps in range(1, 7):
+        for turn in (0.0, 0.3, 0.1, 0.0):
+            body = Body([PLATE], network(steps, turn), ROCK, SETTINGS, previous=body)
+        alone = Body([PLATE], network(steps), ROCK, SETTINGS)
+        whole = alone.crack_system.matrix.dense
+        matrix = body.crack_system.matrix
+        assert matrix.border is not None
+        np.testing.assert_allclose(matrix.dense, whole, rtol=0, atol=1e-13 * np.abs(whole).max())
+        for shape in ((len(whole),), (len(whole), 3)):
+            right = rng.normal(size=shape)
+            np.testing.assert_allclose(matrix @ right, whole @ right, rtol=0, atol=1e-12 * np.abs(whole @ right).max())
+            for transposed in (False, True):
+                expected = np.linalg.solve(whole.T if transposed else whole, right)
+                found = body.crack_system.open_factor.solve(right, transposed)
+                np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+        k = factors(alone)
+        assert np.abs(factors(body) - k).max() < 1e-12 * np.abs(k).max()
+
+
+def test_a_long_run_is_factored_anew_now_and_then_only():
+    body = Body([PLATE], network(0), ROCK, SETTINGS)
+    factors(body)
+    for steps in range(1, 21):
+        body = Body([PLATE], network(steps), ROCK, SETTINGS, previous=body, work=body.work)
+        k = factors(body)
+    alone = factors(Body([PLATE], network(20), ROCK, SETTINGS))
+    assert np.abs(k - alone).max() < 1e-11 * np.abs(alone).max()
+    assert body.work.crack_factorisations <= 6
+    assert body.work.crack_borderings >= 18
+
+
+def test_what_does_not_pivot_well_is_factored_anew(monkeypatch):
+    from geomech.ddm import crack_system
+
+    monkeypatch.setattr(crack_system, "LOSS", 0.0)
+    body = Body([PLATE], network(0), ROCK, SETTINGS)
+    factors(body)
+    body = Body([PLATE], network(1), ROCK, SETTINGS, previous=body)
+    assert body.crack_system.matrix.border is not None
+    k, alone = factors(body), factors(Body([PLATE], network(1), ROCK, SETTINGS))
+    assert body.crack_system.matrix.border is None
+    assert np.abs(k - alone).max() < 1e-12 * np.abs(alone).max()
+
+
+def test_cracks_that_grow_together_round_a_piece_are_seen():
+    """What comes off makes the border's part singular, not the base."""
+    u = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    open_ = Cracks.from_polylines([u], aperture=math.inf)
+    body = Body([PLATE], open_, ROCK, SETTINGS)
+    factors(body)
+    of_segments = {name: np.repeat(getattr(open_, name)[:1], 4) for name in SEGMENT_ARRAYS}
+    closed = replace(open_, segments=np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), **of_segments)
+    loose = Body([PLATE], closed, ROCK, SETTINGS, previous=body)
+    assert isinstance(loose.crack_system.matrix, Bordered)
+    with pytest.raises(np.linalg.LinAlgError, match="cut a part"):
+        loose.solve(LOAD)
