@@ -3,7 +3,8 @@
 A vertex meets the interior of an edge when its corner points away from the edge. Where two corners meet, the lines
 through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
 entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
-within the other's edge. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
+within the other's edge; where each lies within the other's, the two corners are the ends of a short common face, and both
+stand for the line. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
 smaller penetration carries the contact; each is stored as the other's *partner*.
 """
 
@@ -16,6 +17,8 @@ from numba import njit
 _ANGLE = 0.05
 # Two entrance lines nearer in direction than this are the same line.
 _PARALLEL = 0.0025
+# Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
+_ENDS = 1e-4
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
 
@@ -116,7 +119,9 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
     count = 0
     pick_vertex = np.empty(4, np.int64)
     pick_edge = np.empty(4, np.int64)
-    pick = np.empty((4, 5))  # normal that pushes block i (2), gap, distance outside the edge, edge length
+    rows = np.empty(4, np.int64)
+    pick = np.empty((4, 6))  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside
+    twin = np.empty(4, np.int64)  # the other end of the same face
     for p in range(n_blocks):
         for q in range(p + 1, n_blocks):
             a, b = min(order[p], order[q]), max(order[p], order[q])
@@ -152,11 +157,18 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
                             continue
                         nx, ny = sign * nx, sign * ny
                         outside = max(0.0, -along, along - length)
+                        inside = min(along, length - along)
                         same = -1
                         for k in range(n_lines):
                             if pick[k, 0] * nx + pick[k, 1] * ny > 1.0 - _PARALLEL:
                                 same = k
-                        if same >= 0:
+                        if same >= 0 and twin[same] >= 0:
+                            continue
+                        if same >= 0 and min(inside, pick[same, 5]) > _ENDS * max(length, pick[same, 4]):
+                            k = n_lines
+                            n_lines += 1
+                            twin[k], twin[same] = same, k
+                        elif same >= 0:
                             near = 1e-9 * max(length, pick[same, 4])
                             better = outside < pick[same, 3] - near
                             if abs(outside - pick[same, 3]) <= near:
@@ -170,8 +182,10 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
                         else:
                             k = n_lines
                             n_lines += 1
+                            twin[k] = -1
                         pick_vertex[k], pick_edge[k] = vertex, edge
                         pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
+                        pick[k, 5] = inside
                     widest = -np.inf
                     for k in range(n_lines):
                         widest = max(widest, pick[k, 2])
@@ -179,16 +193,17 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
                         continue
                     if count + 4 > table.shape[0]:
                         return -1
-                    before = -1
                     for k in range(n_lines):
+                        rows[k] = -1
                         if pick[k, 2] < -window:
                             continue
                         row = _add(table, count, first, pick_vertex[k], pick_edge[k])
                         count = max(count, row + 1)
-                        if before >= 0:
-                            _join_partners(table, row, before)
-                            _join_partners(table, before, row)
-                        before = row
+                        for m in range(k):
+                            if rows[m] >= 0 and twin[k] != m:
+                                _join_partners(table, row, rows[m])
+                                _join_partners(table, rows[m], row)
+                        rows[k] = row
             # 2. Corner to edge, and corner into a re-entrant corner.
             for role in range(2):
                 i, j = (a, b) if role == 0 else (b, a)

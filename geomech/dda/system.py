@@ -253,11 +253,19 @@ class BlockSystem:
             "elastic_energy": elastic,
             "contact_energy": 0.5
             * float((closed * (new_gap**2 * found.springs.normal + settled.shear_force**2 / springs.shear)).sum()),
-            "worst_penetration": float(max(0.0, -new_gap.min())) if len(found) else 0.0,
+            "worst_penetration": _deepest(closed, found.gap, new_gap),
             "max_displacement_ratio": largest / self.half_height,
             "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),
         }
         return StepResult(new_state, dt, rows, forces, acceleration, statistics), largest
+
+
+def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them.
+
+    An open one whose vertex is behind its edge's line has a partner line that is not crossed: nothing penetrates there.
+    """
+    return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0
 
 
 def _unbalanced(matrix, right, vectors, found: ContactSet, order, settled: Settled) -> float:

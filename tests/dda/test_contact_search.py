@@ -107,3 +107,15 @@ def test_many_blocks_agree_with_testing_every_pair():
                 alone.add((int(new[0]), int(new[1])))
     assert len(alone) >= 15
     assert pairs(together) == alone
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.03, -0.03])
+def test_a_short_common_face_is_held_at_both_ends(tilt):
+    # Nearer to each other than the window, the corners of the overlap are met as corners; each still bears on its own.
+    c, s = np.cos(tilt), np.sin(tilt)
+    upper = (rectangle(0, 0, 1, 1) @ np.array([[c, s], [-s, c]])) + [0.96, 1.0]
+    table, geometry, _ = search([rectangle(0, 0, 1, 1), upper])
+    assert {(2, 4), (4, 2)} <= pairs(table)
+    ends = [k for k, pair in enumerate(table[:, :2].tolist()) if pair in ([2, 4], [4, 2])]
+    # The line beside the corners is crossed by both; the ends do not wait for each other.
+    assert not np.isin(table[ends, 2:], ends).any()
