@@ -48,12 +48,7 @@ def boundary_loads(
 ) -> dict[int, BoundaryLoad]:
     """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on that
     geometry the forces are in equilibrium."""
-    now = result.state.time
-    gravity = problem.loads.gravity.at(now)
-    acting: dict[int, list[tuple[int, np.ndarray]]] = {}
-    for load in problem.loads.edge_tractions:
-        for edge in blocks.edges_named(load.edge_name):
-            acting.setdefault(int(blocks.vertex_block[edge]), []).append((int(edge), load.history.at(now)))
+    forces = result.forces
     return {
         b: boundary_load(
             b,
@@ -62,10 +57,10 @@ def boundary_loads(
             motion,
             float(state.rotation[b]),
             result.contacts,
-            acting.get(b, []),
-            [(p.at, p.history.at(now)) for p in problem.loads.point_loads if p.block == b],
+            forces.edges[forces.edges["block"] == b],
+            forces.points[forces.points["block"] == b],
             problem.materials[blocks.material[b]].density,
-            gravity,
+            forces.inertia.gravity,
             result.acceleration[b],
             problem.dda.dynamic_factor * float(state.velocity[b, 2]),
         )
@@ -86,6 +81,8 @@ def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict, histo
                 body_force=loads[b].body_force,
                 body_force_gradient=loads[b].body_force_gradient,
                 about=loads[b].about,
+                points=loads[b].points,
+                forces=loads[b].forces,
             ),
             warm=warm.get(b),
             history=history.get(b),

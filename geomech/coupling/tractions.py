@@ -30,6 +30,9 @@ FACE_ANGLE = np.radians(10.0)
 #: A face that ends within this part of its edge's length of the edge's end ends there.
 SNAP = 1e-9
 
+#: A point load nearer to an edge than this part of its length stands on it.
+ON_EDGE = 1e-6
+
 #: A lone contact spreads over this part of its edge (of the corner's shorter edge).
 LONE_SPREAD = 1.0 / 20.0
 
@@ -39,6 +42,7 @@ class BoundaryLoad:
     """Load of one block's elastic body, reference frame.
 
     segments (m, 2, 2) pieces of the outline, directed along it; tractions (m, 2, 2) at their two ends, linear between;
+    points and forces (k, 2) what acts inside the rock, None without;
     body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
     resultant that inertia had to balance beyond the solver's own acceleration, relative to the forces' size.
     """
@@ -49,6 +53,8 @@ class BoundaryLoad:
     body_force_gradient: np.ndarray
     about: np.ndarray
     imbalance: float
+    points: np.ndarray | None = None
+    forces: np.ndarray | None = None
 
 
 def linear_pressure(length: float, force: float, moment: float) -> tuple[float, float, float, float]:
@@ -77,8 +83,8 @@ def boundary_load(
     motion: Motion,
     rotation: float,
     contacts: np.ndarray,
-    edge_tractions: list[tuple[int, np.ndarray]],
-    point_loads: list[tuple[np.ndarray, np.ndarray]],
+    edge_forces: np.ndarray,
+    point_forces: np.ndarray,
     density: float = 0.0,
     gravity: np.ndarray | None = None,
     acceleration: np.ndarray | None = None,
@@ -87,8 +93,8 @@ def boundary_load(
     """The load of ``block``.
 
     ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
-    that geometry (any block's); ``edge_tractions`` (edge, traction per reference length) of this block;
-    ``point_loads`` (reference point, force); ``acceleration`` (6,) and ``spin`` (rad/s) the block's own.
+    that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
+    ``acceleration`` (6,) and ``spin`` (rad/s) the block's own.
     """
     c, s = math.cos(rotation), math.sin(rotation)
     pieces = _Pieces()
@@ -101,16 +107,13 @@ def boundary_load(
         else:
             _add_edge_force(pieces, blocks, touch.edge, np.array(touch.point), np.array(touch.force))
     turn_back = np.array([[c, s], [-s, c]])
-    for edge, traction in edge_tractions:
-        a, b = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
-        t = turn_back @ traction
-        pieces.add(a, b, t, t)
-    for point, force in point_loads:
-        _add_point_load(
-            pieces, blocks, block, np.asarray(point, dtype=float), turn_back @ np.asarray(force, dtype=float)
-        )
+    for row in edge_forces:
+        _add_edge_piece(pieces, blocks, vertices, row, turn_back)
+    for row in point_forces:
+        _add_point_load(pieces, blocks, block, row["at"].copy(), turn_back @ row["force"])
     segments, tractions = pieces.arrays()
-    return _balanced(block, blocks, segments, tractions, density, gravity, acceleration, spin, turn_back)
+    inside = pieces.inside()
+    return _balanced(block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back)
 
 
 class _Pieces:
@@ -119,6 +122,7 @@ class _Pieces:
     def __init__(self) -> None:
         self.segments: list[tuple] = []
         self.tractions: list[tuple] = []
+        self.points: list[tuple[np.ndarray, np.ndarray]] = []
 
     def add(self, a, b, t_a, t_b) -> None:
         if any(t_a) or any(t_b):
@@ -127,6 +131,10 @@ class _Pieces:
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.segments).reshape(-1, 2, 2), np.array(self.tractions).reshape(-1, 2, 2)
+
+    def inside(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Points (k, 2) inside the rock and the forces (k, 2) on them; None without."""
+        return tuple(np.array(part) for part in zip(*self.points)) if self.points else None
 
 
 class _Touch(NamedTuple):
@@ -290,18 +298,39 @@ def _add_edge_force(pieces, blocks, edge: int, point: np.ndarray, force: np.ndar
     pieces.add(start + (place - half) * along, start + (place + half) * along, t, t)
 
 
+def _add_edge_piece(pieces: _Pieces, blocks: Blocks, vertices: np.ndarray, row: np.void, turn_back: np.ndarray) -> None:
+    """A piece of an edge (EDGE_FORCE row, on the current ``vertices``) with its traction, which is linear there too: the
+    block's motion is affine. Its ends stay bit for bit at the edge's where they are there."""
+    first, last = int(row["edge"]), int(blocks.next_vertex[row["edge"]])
+    now = vertices[last] - vertices[first]
+    a, b = blocks.vertices[first], blocks.vertices[last]
+    length = np.hypot(*now)
+    stretch = length / np.hypot(*(b - a))
+    s0, s1 = ((row[end] - vertices[first]) @ now / length**2 for end in ("start", "end"))
+    start = a if s0 < SNAP else a + s0 * (b - a)
+    end = b if s1 > 1 - SNAP else a + s1 * (b - a)
+    t_start, t_end = row["traction"] @ turn_back.T * stretch
+    pieces.add(start, end, t_start, t_end)
+
+
 def _add_point_load(pieces, blocks, block: int, point: np.ndarray, force: np.ndarray) -> None:
-    """A point load enters on the edge nearest to it, where the scene puts such loads."""
+    """A point load on an edge is spread a little along it; one inside the rock stays one."""
     first, last = blocks.vertex_start[block], blocks.vertex_start[block + 1]
     edges = np.arange(first, last)
     start, end = blocks.vertices[edges], blocks.vertices[blocks.next_vertex[edges]]
     along = end - start
     place = np.clip(np.sum((point - start) * along, axis=1) / np.sum(along**2, axis=1), 0, 1)
-    nearest = int(np.argmin(np.hypot(*(start + place[:, None] * along - point).T)))
-    _add_edge_force(pieces, blocks, int(edges[nearest]), point, force)
+    distance = np.hypot(*(start + place[:, None] * along - point).T)
+    nearest = int(np.argmin(distance))
+    if distance[nearest] <= ON_EDGE * np.hypot(*along[nearest]):
+        _add_edge_force(pieces, blocks, int(edges[nearest]), point, force)
+    elif np.any(force):
+        pieces.points.append((point, force))
 
 
-def _balanced(block, blocks, segments, tractions, density, gravity, acceleration, spin, turn_back) -> BoundaryLoad:
+def _balanced(
+    block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back
+) -> BoundaryLoad:
     area, centroid, second = blocks.area_moments(block)
     (xx, xy), (_, yy) = second.tolist()
     (c, s), _ = turn_back.tolist()
@@ -315,6 +344,11 @@ def _balanced(block, blocks, segments, tractions, density, gravity, acceleration
         bxy = -density * (s * c * (eyy - exx) + 0.5 * (c * c - s * s) * shear)
         carried, angular = turn_back @ (density * (g - (ax, ay))), density * angular
     force, moment, size = resultants(segments, tractions, centroid)
+    if inside is not None:
+        arm, (fx, fy) = (inside[0] - centroid).T, inside[1].T
+        force = force + inside[1].sum(axis=0)
+        moment += float(np.sum(arm[0] * fy - arm[1] * fx))
+        size += float(np.abs(inside[1]).sum())
     # ∫ (x b_y − y b_x) dA of b = B x
     moment += bxy * xx + byy * xy - bxx * xy - bxy * yy
     body_force, torque = -force / area, moment / (xx + yy)
@@ -323,4 +357,4 @@ def _balanced(block, blocks, segments, tractions, density, gravity, acceleration
     if size > 0:
         missed = math.hypot(*(body_force - carried)) * area + abs(torque - angular) * (xx + yy) / math.sqrt(area)
         imbalance = missed / size
-    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance)
+    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, *(inside or (None, None)))

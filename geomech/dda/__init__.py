@@ -9,7 +9,8 @@
 """
 
 from .basis import displacement_matrix
-from .loads import EDGE_FORCE, POINT_FORCE, AppliedForces
+from .force_rows import EDGE_FORCE, POINT_FORCE
+from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
 from .system import BlockSystem, run

@@ -7,23 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..model import Blocks, Loads
+from ..model import Blocks, EdgeTraction, LinearProfile, Loads, WaterTable
 from .basis import material_weights
-
-#: One row a point load: where it acts (current coordinates, m) and its force (N).
-POINT_FORCE = np.dtype([("block", np.int64), ("point", np.float64, 2), ("force", np.float64, 2)])
-
-#: One row a loaded edge: its ends (current coordinates, m), uniform traction per current length (Pa), total force (N).
-EDGE_FORCE = np.dtype(
-    [
-        ("block", np.int64),
-        ("edge", np.int64),
-        ("start", np.float64, 2),
-        ("end", np.float64, 2),
-        ("traction", np.float64, 2),
-        ("force", np.float64, 2),
-    ]
-)
+from .force_rows import EDGE_FORCE, POINT_FORCE
+from .water import pressed_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +42,7 @@ class AppliedForces:
     """All that acts on the blocks of one step besides contacts, on the geometry on which equilibrium was assembled.
 
     points                POINT_FORCE rows
-    edges                 EDGE_FORCE rows; the force acts through the edge's middle
+    edges                 EDGE_FORCE rows
     centroid              (n_blocks, 2)     m
     area                  (n_blocks,)       m²
     body_force            (n_blocks, 2)     ρ(g − a) at the centroid, N/m³
@@ -87,22 +74,26 @@ class LoadMap:
 
     def __init__(self, blocks: Blocks) -> None:
         self.blocks = blocks
-        self._edges: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+        self._edges: dict[tuple[str, LinearProfile | None], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._points: dict[tuple[int, tuple[float, float]], np.ndarray] = {}
+        self._wet: tuple[WaterTable, np.ndarray] | None = None
 
-    def edges(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges called ``name``, their reference lengths, and EDGE_FORCE rows for them that know no more than block and
-        edge. Raises ValueError when there are none."""
-        if name not in self._edges:
+    def edges(self, load: EdgeTraction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Edges that ``load`` acts on, (n, 2) reference lengths times its profile at their two ends, and EDGE_FORCE rows for
+        them that know no more than block and edge. Raises ValueError when there are none."""
+        name, key = load.edge_name, (load.edge_name, load.profile)
+        if key not in self._edges:
             edges = self.blocks.edges_named(name)
             if len(edges) == 0:
                 known = ", ".join(repr(n) for n in self.blocks.edge_names if n) or "none"
                 raise ValueError(f"a traction acts on edges named {name!r}, but no edge has that name (names: {known})")
-            along = self.blocks.vertices[self.blocks.next_vertex[edges]] - self.blocks.vertices[edges]
+            ends = np.stack([self.blocks.vertices[edges], self.blocks.vertices[self.blocks.next_vertex[edges]]], axis=1)
+            along = ends[:, 1] - ends[:, 0]
+            factor = np.ones((len(edges), 2)) if load.profile is None else load.profile.at(ends)
             rows = np.zeros(len(edges), EDGE_FORCE)
             rows["block"], rows["edge"] = self.blocks.vertex_block[edges], edges
-            self._edges[name] = edges, np.hypot(along[:, 0], along[:, 1]), rows
-        return self._edges[name]
+            self._edges[key] = edges, np.hypot(along[:, 0], along[:, 1])[:, None] * factor, rows
+        return self._edges[key]
 
     def point(self, block: int, at: tuple[float, float], vertices: np.ndarray) -> np.ndarray:
         """(2,) where the material point ``at`` (reference coordinates) of ``block`` is now."""
@@ -112,33 +103,69 @@ class LoadMap:
             self._points[key] = material_weights(self.blocks.vertices[first:last], np.asarray(at, dtype=float))
         return self._points[key] @ vertices[first:last]
 
-    def rows(self, loads: Loads, time: float, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """POINT_FORCE and EDGE_FORCE rows of ``loads`` at ``time`` on the current ``vertices``."""
+    def rows(
+        self, loads: Loads, time: float, vertices: np.ndarray, rotation: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """POINT_FORCE and EDGE_FORCE rows of ``loads`` at ``time`` on the current ``vertices`` of blocks that have turned by
+        ``rotation`` (n_blocks,) rad."""
         points = np.zeros(len(loads.point_loads), POINT_FORCE)
         for row, load in zip(points, loads.point_loads, strict=True):
-            row["block"], row["force"] = load.block, load.history.at(time)
+            force = load.history.at(time)
+            row["block"], row["at"] = load.block, load.at
+            row["force"] = _turned(force, rotation[load.block]) if load.follower else force
             row["point"] = self.point(load.block, load.at, vertices)
         pieces = []
         for load in loads.edge_tractions:
-            edges, length, rows = self.edges(load.edge_name)
+            edges, length, rows = self.edges(load)
             piece = rows.copy()
             piece["start"], piece["end"] = vertices[edges], vertices[self.blocks.next_vertex[edges]]
-            piece["force"] = length[:, None] * load.history.at(time)
+            value = load.history.at(time)
+            value = _turned(value, rotation[piece["block"]]) if load.follower else value[None]
+            total = length[:, :, None] * value[:, None, :]
             along = piece["end"] - piece["start"]
-            piece["traction"] = piece["force"] / np.hypot(along[:, 0], along[:, 1])[:, None]
+            piece["traction"] = total / np.hypot(along[:, 0], along[:, 1])[:, None, None]
+            piece["force"] = 0.5 * (total[:, 0] + total[:, 1])
             pieces.append(piece)
+        if loads.water is not None:
+            edges = self._wet_edges(loads.water)
+            pieces.append(
+                pressed_edges(loads.water, time, edges, self.blocks.vertex_block, vertices, self.blocks.next_vertex)
+            )
         return points, np.concatenate(pieces) if pieces else np.empty(0, EDGE_FORCE)
+
+    def _wet_edges(self, water: WaterTable) -> np.ndarray:
+        """The edges of moving blocks that water may reach."""
+        if self._wet is None or self._wet[0] is not water:
+            known = self.blocks.edge_names
+            for name in water.dry:
+                if name not in known:
+                    raise ValueError(f"the water table leaves edges named {name!r} dry, but no edge has that name")
+            dry = np.isin(self.blocks.edge_name, [known.index(name) for name in water.dry])
+            self._wet = water, np.flatnonzero(~dry & ~self.blocks.fixed[self.blocks.vertex_block])
+        return self._wet[1]
+
+
+def _turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """(..., 2) ``vector`` (2,) turned by ``angle`` (...)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]], axis=-1)
 
 
 def generalised(points: np.ndarray, edges: np.ndarray, centroid: np.ndarray) -> np.ndarray:
-    """(n_blocks, 6) Σ Tᵀ F of POINT_FORCE and EDGE_FORCE rows; N and N m."""
+    """(n_blocks, 6) ∫ Tᵀ t ds and Σ Tᵀ F of EDGE_FORCE and POINT_FORCE rows; N and N m."""
     out = np.zeros((len(centroid), 6))
-    for block, at, force in (
-        (points["block"], points["point"], points["force"]),
-        (edges["block"], 0.5 * (edges["start"] + edges["end"]), edges["force"]),
-    ):
-        if len(block):
-            x, y = (at - centroid[block]).T
-            fx, fy = force.T
-            np.add.at(out, block, np.stack([fx, fy, x * fy - y * fx, x * fx, y * fy, 0.5 * (y * fx + x * fy)], axis=1))
+    acting = [(points["block"], points["point"], points["force"])] if len(points) else []
+    if len(edges):
+        # ∫ t and ∫ x ⊗ t of a linear traction are those of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at its ends.
+        along, (t0, t1) = edges["end"] - edges["start"], np.moveaxis(edges["traction"], 1, 0)
+        sixth = np.hypot(along[:, 0], along[:, 1])[:, None] / 6
+        acting += [
+            (edges["block"], edges["start"], sixth * (2 * t0 + t1)),
+            (edges["block"], edges["end"], sixth * (t0 + 2 * t1)),
+        ]
+    for block, at, force in acting:
+        x, y = (at - centroid[block]).T
+        fx, fy = force.T
+        rows = np.stack([fx, fy, x * fy - y * fx, x * fx, y * fy, 0.5 * (y * fx + x * fy)], axis=1)
+        np.add.at(out, block, rows)
     return out

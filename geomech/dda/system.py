@@ -174,7 +174,7 @@ class BlockSystem:
         time = state.time + dt
         acting = time if load_time is None else load_time
         gravity = loads.gravity.at(acting)
-        points, edges = self._load_map.rows(loads, acting, vertices)
+        points, edges = self._load_map.rows(loads, acting, vertices, state.rotation)
         centroid = np.ascontiguousarray(moments[:, 1:3])
         load = generalised(points, edges, centroid)
         given = crack is not None

@@ -2,8 +2,9 @@
 
 from .blocks import Blocks
 from .cracks import Cracks
+from .history import History, Wave, baseline_corrected, read_record
 from .joint import JointLaw
-from .loads import EdgeTraction, History, Loads, PointLoad
+from .loads import EdgeTraction, LinearProfile, Loads, PointLoad, WaterTable
 from .material import Material
 from .motion import Motion
 from .problem import DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
@@ -26,6 +27,7 @@ __all__ = [
     "GrowthSettings",
     "History",
     "JointLaw",
+    "LinearProfile",
     "Loads",
     "Material",
     "Motion",
@@ -33,5 +35,9 @@ __all__ = [
     "Problem",
     "RunSettings",
     "State",
+    "WaterTable",
+    "Wave",
+    "baseline_corrected",
     "counted",
+    "read_record",
 ]

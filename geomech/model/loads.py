@@ -6,57 +6,87 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .history import History
+
 
 @dataclass(frozen=True, eq=False)
-class History:
-    """A piecewise linear function of time, held constant beyond its ends except where ``rate`` lets it run on.
+class LinearProfile:
+    """A factor that runs linearly from ``factors[0]`` at ``start`` to ``factors[1]`` at ``end`` (reference coordinates, m),
+    and on beyond them; across the line between them it is constant."""
 
-    ``times`` (n,) s, ascending; ``values`` (n, k); ``rate`` (k,) per second after the last time.
-    """
+    start: tuple[float, float]
+    end: tuple[float, float]
+    factors: tuple[float, float]
 
-    times: np.ndarray
-    values: np.ndarray
-    rate: np.ndarray | None = None
+    def __post_init__(self) -> None:
+        values = np.array([*self.start, *self.end, *self.factors], dtype=float)
+        if not np.isfinite(values).all():
+            raise ValueError(f"a linear profile is not finite: {self}")
+        if self.start[0] == self.end[0] and self.start[1] == self.end[1]:
+            raise ValueError(f"a linear profile needs two different points, got {self.start} twice")
 
-    @classmethod
-    def constant(cls, value) -> History:
-        return cls(np.zeros(1), np.atleast_2d(np.asarray(value, dtype=float)))
-
-    @classmethod
-    def ramp(cls, rate, start: float = 0.0) -> History:
-        """Zero until ``start``, then growing at ``rate`` per second for ever."""
-        rate = np.atleast_1d(np.asarray(rate, dtype=float))
-        return cls(np.array([start]), np.zeros((1, len(rate))), rate)
-
-    def at(self, time: float) -> np.ndarray:
-        """(k,) the value at ``time``."""
-        if len(self.times) == 1:
-            value = np.array(self.values[0], dtype=float)
-        else:
-            value = np.array([np.interp(time, self.times, column) for column in self.values.T])
-        if self.rate is not None and time > self.times[-1]:
-            value = value + self.rate * (time - self.times[-1])
-        return value
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """(...,) the factor at ``points`` (..., 2)."""
+        start, along = np.asarray(self.start, dtype=float), np.subtract(self.end, self.start).astype(float)
+        share = (points - start) @ along / (along @ along)
+        return self.factors[0] + share * (self.factors[1] - self.factors[0])
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeTraction:
     """A traction (N/m², x and y components, per unit of *reference* length) on every edge called ``edge_name``.
 
-    It keeps its direction and, because it is counted per reference length, its total force as the block deforms.
+    It keeps its direction and, because it is counted per reference length, its total force as the block deforms. With
+    ``follower`` it turns with the block instead, as the pressure of a fluid or a jack that stands on it. ``profile``
+    multiplies it along the edges; any linear distribution is the sum of two such tractions.
     """
 
     edge_name: str
     history: History
+    follower: bool = False
+    profile: LinearProfile | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class PointLoad:
-    """A force (N per metre of thickness) on ``block`` at the material point ``at`` (reference coordinates)."""
+    """A force (N per metre of thickness) on ``block`` at the material point ``at`` (reference coordinates); with ``follower``
+    it turns with the block."""
 
     block: int
     at: tuple[float, float]
     history: History
+    follower: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class WaterTable:
+    """Water that stands in all joints, cracks between blocks and on all outer faces below a line.
+
+    ``points`` (n, 2) m, x ascending: the line, level beyond its ends; under it the pressure is ``unit_weight`` (N/m³) times
+    the depth below it, above it there is none. ``level`` (m) raises the whole line with time. An inclined line is a
+    piezometric one: the pressure on a joint under it is what that line says. The pressure acts on both faces of a joint,
+    so that contact forces are effective ones and a submerged block is lifted by the weight of the water it displaces.
+    ``dry`` names edges that no water reaches (lined or drained).
+
+    Blocks carry their own (saturated) density; their stress is the total one.
+    """
+
+    points: np.ndarray
+    unit_weight: float = 9810.0
+    level: History | None = None
+    dry: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        points = np.asarray(self.points, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 2 or not len(points) or not np.isfinite(points).all():
+            raise ValueError(f"a water table needs finite points (n, 2), got an array of shape {points.shape}")
+        if (np.diff(points[:, 0]) <= 0).any():
+            at = int(np.argmax(np.diff(points[:, 0]) <= 0))
+            raise ValueError(
+                f"the points of a water table must ascend in x: {points[at + 1, 0]:g} m follows {points[at, 0]:g} m"
+            )
+        if not (np.isfinite(self.unit_weight) and self.unit_weight > 0):
+            raise ValueError(f"the unit weight of water must be positive, got {self.unit_weight!r} N/m³")
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,3 +96,4 @@ class Loads:
     gravity: History = field(default_factory=lambda: History.constant([0.0, 0.0]))
     edge_tractions: tuple[EdgeTraction, ...] = ()
     point_loads: tuple[PointLoad, ...] = ()
+    water: WaterTable | None = None

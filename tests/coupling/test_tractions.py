@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from geomech.coupling.tractions import boundary_load, linear_pressure
+from geomech.dda import EDGE_FORCE, POINT_FORCE
 from geomech.ddm.loads import resultants
 from geomech.model import CONTACT, SLIP, Blocks, Motion
 from geomech.model.polygon import area_moments
 
+#: No edge forces and no point forces.
+NOTHING = np.empty(0, EDGE_FORCE), np.empty(0, POINT_FORCE)
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
@@ -36,7 +39,7 @@ def two_squares(offset=0.0):
 def load_of(block, blocks, contacts, **options):
     contacts = np.array(contacts, CONTACT)
     motion = Motion.of(blocks, blocks.vertices)
-    return boundary_load(block, blocks, blocks.vertices, motion, 0.0, contacts, [], [], **options)
+    return boundary_load(block, blocks, blocks.vertices, motion, 0.0, contacts, *NOTHING, **options)
 
 
 def vertex_at(blocks, block, point):
@@ -145,7 +148,7 @@ def test_turned_block_sees_its_forces_in_its_own_frame():
     turned = np.array(upright, CONTACT)
     turned["point"], turned["normal"] = points @ turn.T, [turn @ [0, 1]] * 2
     motion = Motion.of(blocks, turned_vertices)
-    there = boundary_load(0, blocks, turned_vertices, motion, angle, turned, [], [])
+    there = boundary_load(0, blocks, turned_vertices, motion, angle, turned, *NOTHING)
     here = load_of(0, blocks, upright)
     assert there.segments == pytest.approx(here.segments, abs=1e-13)
     assert there.tractions == pytest.approx(here.tractions, abs=1e-13)

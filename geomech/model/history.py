@@ -1,0 +1,296 @@
+"""Functions of time: piecewise linear, ramps, sinusoids, records from a file, with their exact integrals."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+#: What a column of a record may be given in, and how many SI units one of them is. Standard gravity is 9.80665 m/s² (ISO
+#: 80000-3), 1 gal = 1 cm/s².
+UNITS = {
+    "s": 1.0,
+    "ms": 1e-3,
+    "min": 60.0,
+    "h": 3600.0,
+    "d": 86400.0,
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "m/s": 1.0,
+    "cm/s": 1e-2,
+    "mm/s": 1e-3,
+    "m/s2": 1.0,
+    "cm/s2": 1e-2,
+    "mm/s2": 1e-3,
+    "gal": 1e-2,
+    "g": 9.80665,
+    "pa": 1.0,
+    "kpa": 1e3,
+    "mpa": 1e6,
+    "gpa": 1e9,
+    "n": 1.0,
+    "kn": 1e3,
+    "mn": 1e6,
+    "n/m": 1.0,
+    "kn/m": 1e3,
+    "mn/m": 1e6,
+    "rad": 1.0,
+    "deg": math.pi / 180,
+    "-": 1.0,
+    "": 1.0,
+}
+_TIMES = ("s", "ms", "min", "h", "d", "")
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """``amplitude`` (k,) · sin(2π ``frequency`` (t − ``start``) + ``phase``) from ``start`` to ``end`` (s), zero elsewhere;
+    frequency in Hz, phase in rad."""
+
+    amplitude: np.ndarray
+    frequency: float
+    phase: float = 0.0
+    start: float = 0.0
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.frequency) and self.frequency > 0):
+            raise ValueError(f"a sinusoid needs a positive frequency, got {self.frequency!r} Hz")
+        if not self.end > self.start:
+            raise ValueError(f"a sinusoid must end after it starts, got {self.start!r} to {self.end!r} s")
+
+    def at(self, time: float) -> np.ndarray:
+        if not self.start <= time <= self.end:
+            return np.zeros_like(self.amplitude)
+        return self.amplitude * math.sin(2 * math.pi * self.frequency * (time - self.start) + self.phase)
+
+    def integrals(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """∫ and ∬ of the wave from −∞ to ``time``."""
+        omega, phase = 2 * math.pi * self.frequency, self.phase
+        x = min(max(time - self.start, 0.0), self.end - self.start)
+        once = (math.cos(phase) - math.cos(omega * x + phase)) / omega
+        twice = (x * math.cos(phase) - (math.sin(omega * x + phase) - math.sin(phase)) / omega) / omega
+        twice += once * max(time - self.end, 0.0)
+        return self.amplitude * once, self.amplitude * twice
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """A piecewise linear function of time, held constant beyond its ends except where ``rate`` lets it run on, and a
+    ``wave`` on top of it.
+
+    ``times`` (n,) s, ascending; ``values`` (n, k); ``rate`` (k,) per second after the last time. Raises ValueError for
+    times that do not ascend, and for values that are not finite or not as many.
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    rate: np.ndarray | None = None
+    wave: Wave | None = None
+
+    def __post_init__(self) -> None:
+        times, values = np.asarray(self.times, dtype=float), np.asarray(self.values, dtype=float)
+        if times.ndim != 1 or values.ndim != 2 or len(times) != len(values) or not len(times):
+            raise ValueError(f"a history needs times (n,) and values (n, k), got {times.shape} and {values.shape}")
+        if not (np.isfinite(times).all() and np.isfinite(values).all()):
+            raise ValueError("a history has times or values that are not finite")
+        if (np.diff(times) <= 0).any():
+            at = int(np.argmax(np.diff(times) <= 0))
+            raise ValueError(f"the times of a history must ascend: {times[at + 1]:g} s follows {times[at]:g} s")
+
+    @classmethod
+    def constant(cls, value) -> History:
+        return cls(np.zeros(1), np.atleast_2d(np.asarray(value, dtype=float)))
+
+    @classmethod
+    def ramp(cls, rate, start: float = 0.0) -> History:
+        """Zero until ``start``, then growing at ``rate`` per second for ever."""
+        rate = np.atleast_1d(np.asarray(rate, dtype=float))
+        return cls(np.array([start]), np.zeros((1, len(rate))), rate)
+
+    @classmethod
+    def sinusoid(
+        cls, amplitude, frequency: float, *, phase: float = 0.0, start: float = 0.0, end: float = math.inf, mean=None
+    ) -> History:
+        """``mean`` (zero) and from ``start`` to ``end`` ``amplitude`` · sin(2π ``frequency`` (t − start) + ``phase``)."""
+        amplitude = np.atleast_1d(np.asarray(amplitude, dtype=float))
+        base = cls.constant(np.zeros(len(amplitude)) if mean is None else mean)
+        return replace(base, wave=Wave(amplitude, frequency, phase, start, end))
+
+    @classmethod
+    def table(cls, times, values) -> History:
+        """Piecewise linear through ``values`` (n, k) or (n,) at ``times`` (n,) s."""
+        values = np.asarray(values, dtype=float)
+        return cls(np.asarray(times, dtype=float), values[:, None] if values.ndim == 1 else values)
+
+    @classmethod
+    def from_file(cls, path: str | Path, columns: int | None = None, scale=1.0) -> History:
+        """The record in the text file ``path``: time, then one or more values in a line (`read_record`), times ``scale``.
+
+        ``columns``: how many values there must be. A one-column record is made a vector by a ``scale`` (k,).
+        """
+        times, values = read_record(path)
+        if columns is not None and values.shape[1] != columns:
+            raise ValueError(
+                f"{path}: {values.shape[1]} column(s) of values beside the time, but {columns} are wanted here"
+            )
+        return cls(times, values * np.asarray(scale, dtype=float))
+
+    def at(self, time: float) -> np.ndarray:
+        """(k,) the value at ``time``."""
+        if len(self.times) == 1:
+            value = np.array(self.values[0], dtype=float)
+        else:
+            value = np.array([np.interp(time, self.times, column) for column in self.values.T])
+        if self.rate is not None and time > self.times[-1]:
+            value = value + self.rate * (time - self.times[-1])
+        if self.wave is not None:
+            value = value + self.wave.at(time)
+        return value
+
+    def scaled(self, factor) -> History:
+        """``factor`` (a number, or (k,) one a component) times this history."""
+        wave = self.wave
+        return History(
+            self.times,
+            np.asarray(self.values, dtype=float) * factor,
+            None if self.rate is None else np.asarray(self.rate, dtype=float) * factor,
+            None if wave is None else replace(wave, amplitude=wave.amplitude * factor),
+        )
+
+    def integral(self, time: float) -> np.ndarray:
+        """(k,) ∫ from 0 to ``time``: the velocity from rest of an acceleration. Exact."""
+        return self._integrals(time)[0] - self._at_zero[0]
+
+    def double_integral(self, time: float) -> np.ndarray:
+        """(k,) ∬ from 0 to ``time``: the displacement from rest of an acceleration. Exact."""
+        return self._integrals(time)[1] - self._at_zero[1] - self._at_zero[0] * time
+
+    @cached_property
+    def _at_zero(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._integrals(0.0)
+
+    @cached_property
+    def _sums(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, k) ∫ and ∬ from the first time to each."""
+        dt = np.diff(self.times)[:, None]
+        v0, v1 = self.values[:-1], self.values[1:]
+        zero = np.zeros((1, self.values.shape[1]))
+        once = np.concatenate([zero, np.cumsum(0.5 * dt * (v0 + v1), axis=0)])
+        twice = np.concatenate([zero, np.cumsum(once[:-1] * dt + dt**2 * (2 * v0 + v1) / 6, axis=0)])
+        return once, twice
+
+    def _integrals(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """∫ and ∬ from the first time."""
+        once, twice = self._sums
+        n = int(np.searchsorted(self.times, time, side="right")) - 1
+        start = max(n, 0)
+        x = time - self.times[start]
+        slope = np.zeros(self.values.shape[1])
+        if n == len(self.times) - 1:
+            slope = slope if self.rate is None else np.asarray(self.rate, dtype=float)
+        elif n >= 0:
+            slope = (self.values[n + 1] - self.values[n]) / (self.times[n + 1] - self.times[n])
+        v = self.values[start]
+        first = once[start] + v * x + slope * x**2 / 2
+        second = twice[start] + once[start] * x + v * x**2 / 2 + slope * x**3 / 6
+        if self.wave is not None:
+            a, b = self.wave.integrals(time)
+            first, second = first + a, second + b
+        return first, second
+
+
+def baseline_corrected(acceleration: History, degree: int = 1) -> History:
+    """The record less the polynomial of ``degree`` in time whose velocity fits the record's best (least squares), so that
+    the base comes to rest and does not drift away: degree 0 takes a constant acceleration off, 1 a linear one.
+
+    Raises ValueError for a record of fewer times than coefficients, or one that runs on for ever.
+    """
+    times = np.asarray(acceleration.times, dtype=float)
+    if acceleration.rate is not None or acceleration.wave is not None:
+        raise ValueError("a baseline can be taken off a record, not off a ramp or a sinusoid")
+    if len(times) < degree + 2:
+        raise ValueError(f"a baseline of degree {degree} needs {degree + 2} times or more, the record has {len(times)}")
+    start, span = times[0], times[-1] - times[0]
+    s = (times - start) / span
+    velocity, _ = acceleration._sums
+    # Velocity of s^k is span s^(k+1)/(k+1).
+    basis = np.stack([span * s ** (k + 1) / (k + 1) for k in range(degree + 1)], axis=1)
+    coefficients = np.linalg.lstsq(basis, velocity, rcond=None)[0]
+    return History(times, acceleration.values - np.stack([s**k for k in range(degree + 1)], axis=1) @ coefficients)
+
+
+def read_record(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+    """(times (n,) s, values (n, k)) of a text file in SI units: time and one or more values in a line, parted by commas,
+    semicolons, tabs or blanks.
+
+    Empty lines and what follows a ``#`` are skipped. The first line may be a header that names the columns, each with its
+    unit in brackets or parentheses: ``time [s], acceleration [g]``; without it, SI units hold. Raises ValueError naming
+    file and line for a unit that is not known, columns that are missing or too many, what is not a number, and times that
+    do not ascend; FileNotFoundError when there is no such file.
+    """
+    path = Path(path)
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    factors: list[float] | None = None
+    for number, raw in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), start=1):
+        line = raw.partition("#")[0].strip()
+        if not line:
+            continue
+        if factors is None and not rows and re.match(r"[A-Za-z(\[]", line) and not _is_number(line.split()[0]):
+            factors = _header(path, number, line)
+            continue
+        cells = [cell for cell in re.split(r"[,;\s]+", line) if cell]
+        wanted = len(rows[0]) if rows else len(factors) if factors else max(len(cells), 2)
+        if len(cells) != wanted:
+            raise ValueError(
+                f"{path}:{number}: {len(cells)} column(s), expected {wanted}: a time and {wanted - 1} value(s)"
+            )
+        row = []
+        for cell in cells:
+            if not _is_number(cell):
+                raise ValueError(f"{path}:{number}: {cell!r} is not a finite number")
+            row.append(float(cell))
+        if rows and row[0] <= rows[-1][0]:
+            raise ValueError(
+                f"{path}:{number}: time {row[0]:g} does not come after {rows[-1][0]:g} in line {lines[-1]}"
+            )
+        rows.append(row)
+        lines.append(number)
+    if not rows:
+        raise ValueError(f"{path}: there is no line of numbers: a time and its values")
+    table = np.array(rows) * (1.0 if factors is None else np.array(factors))
+    return table[:, 0], table[:, 1:]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _header(path: Path, number: int, line: str) -> list[float]:
+    """SI units in one of each column's, from a line such as ``time (s); acceleration (cm/s²)``."""
+    columns = (
+        re.split(r"[,;\t]+", line) if re.search(r"[,;\t]", line) else re.findall(r"\S+(?:\s*[\[(][^\])]*[\])])?", line)
+    )
+    factors = []
+    for k, column in enumerate(c.strip() for c in columns):
+        found = re.search(r"[\[(]([^\])]*)[\])]", column)
+        unit = (found.group(1) if found else "").strip().lower().replace("²", "2").replace("^", "").replace("**", "")
+        known = _TIMES if k == 0 else tuple(UNITS)
+        if unit not in known:
+            raise ValueError(
+                f"{path}:{number}: column {k + 1} is in {found.group(1)!r}, which is not known; "
+                f"{'times are' if k == 0 else 'units are'} {', '.join(u for u in known if u)}"
+            )
+        factors.append(UNITS[unit])
+    if len(factors) < 2:
+        raise ValueError(f"{path}:{number}: {len(factors)} column(s) in the header, expected a time and its values")
+    return factors
