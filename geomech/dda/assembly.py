@@ -235,12 +235,14 @@ def assemble_contacts(
     normal,
     shear,
     friction,
+    sliding,
+    lift,
     shear0,
 ):
     """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric.
 
-    Normal force N = −kₙ(g + n·Δu). Stick: S = S₀ − kₛ t·Δu. Slip: S = ± μ N, with N the unknown one, which makes
-    the matrix unsymmetric but friction exact in one solution.
+    Normal force N = −kₙ(g + n·Δu − κ t·Δu), with the lift κ by sliding. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c),
+    with N the unknown one, which makes the matrix unsymmetric but friction exact in one solution.
     """
     data[:] = 0.0
     n = matrix.shape[0]
@@ -253,10 +255,11 @@ def assemble_contacts(
     for c in range(block.shape[0]):
         if state[c] == OPEN:
             continue
-        slope = 0.0
+        slope, given = 0.0, shear0[c]
         if state[c] == SLIP:
             slope = direction[c] * friction[c]
-            symmetric = symmetric and slope == 0.0
+            given = direction[c] * sliding[c]
+            symmetric = symmetric and slope == 0.0 and lift[c] == 0.0
         for side in range(2):
             i = order[block[c]] if side == 0 else order[other[c]]
             if i < 0:
@@ -265,8 +268,7 @@ def assemble_contacts(
                 along, across = vectors[c, 0, 6 * side + a], vectors[c, 1, 6 * side + a]
                 push = along + slope * across
                 right[6 * i + a] -= normal[c] * gap[c] * push
-                if state[c] == STICK:
-                    right[6 * i + a] += shear0[c] * across
+                right[6 * i + a] += given * across
                 for target in range(2):
                     j = order[block[c]] if target == 0 else order[other[c]]
                     if j < 0:
@@ -279,9 +281,10 @@ def assemble_contacts(
                         base = lower[c]
                     at = base + a * stride[i]
                     for m in range(6):
-                        value = normal[c] * push * vectors[c, 0, 6 * target + m]
+                        aside = vectors[c, 1, 6 * target + m]
+                        value = normal[c] * push * (vectors[c, 0, 6 * target + m] - lift[c] * aside)
                         if state[c] == STICK:
-                            value += shear[c] * across * vectors[c, 1, 6 * target + m]
+                            value += shear[c] * across * aside
                         data[at + m] += value
     return symmetric
 

@@ -120,7 +120,9 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
     pick_vertex = np.empty(4, np.int64)
     pick_edge = np.empty(4, np.int64)
     rows = np.empty(4, np.int64)
-    pick = np.empty((4, 6))  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside
+    pick = np.empty(
+        (4, 6)
+    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside
     twin = np.empty(4, np.int64)  # the other end of the same face
     for p in range(n_blocks):
         for q in range(p + 1, n_blocks):

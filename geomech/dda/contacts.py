@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import CONTACT, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import PENALTY_RATIO, JointTable, Springs, contact_springs
+from .curved_joints import CurvedJoints
+
+if TYPE_CHECKING:
+    from .open_close import Settled
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
+#: Contacts whose normals are nearer in direction than this (cosine) are on one line.
+_ALIGNED = 0.99
 _UNKNOWN = -2
 _NEVER = -1
 
@@ -25,7 +33,9 @@ class ContactSet:
     partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
     geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2)
     springs              stiffness and strengths
-    state, direction, bonded, shear, slip   what was carried over: state and sense of sliding to try first, bond, N, m
+    state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
+    normal, shear, slip        forces N and sliding m
+    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart
     """
 
     vertex: np.ndarray
@@ -39,41 +49,35 @@ class ContactSet:
     state: np.ndarray
     direction: np.ndarray
     bonded: np.ndarray
+    normal: np.ndarray
     shear: np.ndarray
     slip: np.ndarray
+    wear: np.ndarray
+    lift: np.ndarray
 
-    @property
+    @cached_property
     def gap(self) -> np.ndarray:
-        """(n,) m, negative where the vertex penetrates."""
-        return self.geometry[:, 3]
+        """(n,) m from where the faces meet, negative where the vertex penetrates."""
+        return self.geometry[:, 3] - self.lift
 
     def __len__(self) -> int:
         return len(self.vertex)
 
-    def rows(
-        self,
-        state: np.ndarray,
-        bonded: np.ndarray,
-        normal_force: np.ndarray,
-        shear_force: np.ndarray,
-        gap: np.ndarray,
-        sliding: np.ndarray,
-    ) -> np.ndarray:
-        """CONTACT rows of the finished step, on the geometry on which it was assembled; all arguments (n,)."""
+    def rows(self, settled: Settled) -> np.ndarray:
+        """CONTACT rows of the finished step, on the geometry on which it was assembled."""
         rows = np.zeros(len(self), CONTACT)
         for name in ("vertex", "edge", "block", "other", "law"):
             rows[name] = getattr(self, name)
-        rows["state"], rows["bonded"] = state, bonded
+        for name in ("state", "bonded", "gap", "normal_force", "shear_force"):
+            rows[name] = getattr(settled, name)
         rows["position"], rows["normal"], rows["point"] = (
             self.geometry[:, 0],
             self.geometry[:, 1:3],
             self.geometry[:, 5:7],
         )
-        rows["gap"], rows["length"] = gap, self.geometry[:, 4]
-        rows["normal_force"], rows["shear_force"] = normal_force, shear_force
-        # Sliding is what the spring did not take up elastically.
-        stretch = (self.shear - shear_force) / self.springs.shear
-        rows["slip"] = self.slip + np.where(state == SLIP, sliding - stretch, 0.0)
+        rows["length"] = self.geometry[:, 4]
+        rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
+        rows["lift"] = np.maximum(self.lift + settled.lifted, 0.0)
         return rows
 
 
@@ -110,6 +114,9 @@ class ContactFinder:
     def find(self, state: State, vertices: np.ndarray, window: float) -> ContactSet:
         """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it."""
         old = state.contacts
+        if len(old):
+            # Faces that slid apart press at a distance.
+            window += max(0.0, float(old["lift"].max()))
         keys = old["vertex"] * len(vertices) + old["edge"]
         rank = np.argsort(keys, kind="stable")
         table = find_contacts(vertices, self._next, self._previous, self._start, self._fixed, window, keys[rank])
@@ -127,9 +134,9 @@ class ContactFinder:
             partner = renumber[table[:, 2:]]
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
-        contact_state, direction, bonded, shear, slip = self._remembered(
-            old, parent, state.time, geometry, partner, springs
-        )
+        remembered = self._remembered(old, parent, state.time, geometry, partner, springs)
+        if self._table.curved.any():
+            self._pass_on_wear(old, parent, block, other, geometry, remembered)
         return ContactSet(
             vertex=table[:, 0].copy(),
             edge=table[:, 1].copy(),
@@ -139,11 +146,7 @@ class ContactFinder:
             partner=np.ascontiguousarray(partner),
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
-            state=contact_state,
-            direction=direction,
-            bonded=bonded,
-            shear=shear,
-            slip=slip,
+            **remembered,
         )
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
@@ -155,16 +158,16 @@ class ContactFinder:
         )
 
     def _remembered(self, old, parent, time, geometry, partner, springs):
-        """What contacts keep of their rows ``parent`` (−1: new) in ``old``: state, direction, bonded, shear force, slip."""
+        """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
         n = len(parent)
-        contact_state = np.zeros(n, np.int64)
-        shear, slip = np.zeros(n), np.zeros(n)
-        bonded = np.zeros(n, np.int64)
+        contact_state, bonded = np.zeros(n, np.int64), np.zeros(n, np.int64)
+        normal, shear, slip, wear, lift = np.zeros((5, n))
         known = parent >= 0
         if known.any():
             rows = old[parent[known]]
-            contact_state[known], shear[known], slip[known] = rows["state"], rows["shear_force"], rows["slip"]
-            bonded[known] = rows["bonded"]
+            contact_state[known], bonded[known] = rows["state"], rows["bonded"]
+            normal[known], shear[known] = rows["normal_force"], rows["shear_force"]
+            slip[known], wear[known], lift[known] = rows["slip"], rows["wear"], rows["lift"]
         if not known.all():
             # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
             fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
@@ -173,10 +176,33 @@ class ContactFinder:
             contact_state[fresh & (partner < 0).all(axis=1)] = STICK
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
         direction = np.where(contact_state == SLIP, np.sign(shear), 0.0)
-        rough = (springs.friction > 0) | (bonded > 0)
+        rough = (springs.peak > 0) | (bonded > 0)
         contact_state[(contact_state == SLIP) & rough & (direction == 0)] = STICK
         contact_state[(contact_state == STICK) & ~rough] = SLIP
-        return contact_state, direction, bonded, shear, slip
+        return {
+            "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
+            "slip": slip, "wear": wear, "lift": lift,
+        }  # fmt: skip
+
+    def _pass_on_wear(self, old, parent, block, other, geometry, remembered) -> None:
+        """New contacts on a joint that has slid are as worn, and as far lifted, as the nearest old one of that joint: the
+        same two blocks, along the same line."""
+        pair, old_pair = np.minimum(block, other), np.minimum(old["block"], old["other"])
+        mate, old_mate = np.maximum(block, other), np.maximum(old["block"], old["other"])
+        slid = old["wear"] > 0
+        for c in np.flatnonzero(parent < 0) if slid.any() else ():
+            aligned = np.abs(old["normal"] @ geometry[c, 1:3]) > _ALIGNED
+            same = np.flatnonzero(slid & aligned & (old_pair == pair[c]) & (old_mate == mate[c]))
+            if len(same):
+                row = old[same[np.argmin(np.linalg.norm(old["point"][same] - geometry[c, 5:7], axis=1))]]
+                for name in ("slip", "wear", "lift"):
+                    remembered[name][c] = row[name]
+
+    def curved(self, found: ContactSet) -> CurvedJoints | None:
+        """The contacts of ``found`` whose laws are no straight lines; None where there are none."""
+        if not (self._table.curved.any() and self._table.curved[found.law].any()):
+            return None
+        return CurvedJoints(self._table, found)
 
     def _laws(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
         a, b = self._edge_name[edge], self._edge_name[mate]

@@ -2,10 +2,11 @@
 
 A set of states makes the step linear; its solution is checked against them. A closed contact must not pull beyond its
 tensile strength, an open one must not penetrate, a sticking one must hold less than its strength μN + cℓ, and a sliding
-one would carry more than μN if it stuck (the return mapping of an elastic-plastic spring, under which exactly one of the
+one would carry more than it does if it stuck (the return mapping of an elastic-plastic spring, under which exactly one of the
 states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves cases in which none does). Every contact that fails is switched and the step solved again. If a combination of
 states returns, the sliding contacts stick again and only the worst contact of each block is switched, and if one still
 returns, only the first (the least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
+Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .contact_springs import Springs
 from .contacts import ContactSet
+from .curved_joints import CurvedJoints
 
 #: After this many iterations only the worst contacts of each block are switched: opened all at once, the contacts of a block
 #: let it fly, to be closed all at once in the next iteration.
@@ -27,7 +29,11 @@ _ALL_AT_ONCE = 4
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`."""
+    """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`.
+
+    ``gap`` is counted from where the faces meet, ``slip`` is what the shear spring did not take up of the motion along the
+    edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration.
+    """
 
     unknowns: np.ndarray
     state: np.ndarray
@@ -36,7 +42,9 @@ class Settled:
     normal_force: np.ndarray
     shear_force: np.ndarray
     gap: np.ndarray
-    sliding: np.ndarray
+    slip: np.ndarray
+    lifted: np.ndarray
+    springs: Springs
     iterations: int
 
 
@@ -62,44 +70,52 @@ def _move(unknowns, block, other, order, vectors, c, k):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def check_states(
-    unknowns,
-    block,
-    other,
-    order,
-    vectors,
-    partner,
-    state,
-    direction,
-    bonded,
-    gap0,
-    normal,
-    shear,
-    friction,
-    cohesion,
-    tension,
-    shear0,
-    slack,
+def contact_forces(
+    unknowns, block, other, order, vectors, state, direction, gap0, normal, shear, friction, sliding, lift, shear0
 ):
-    """Forces of the present states and the states they call for.
-
-    Returns (forces (n, 4): N, S, new gap, sliding in the step; new state; new direction; new bonded; violation (n,) N, 0
-    where the state stands). ``slack`` (m) is the round-off of coordinates: gaps below it decide nothing; slip, which is counted
-    from the step's start, is known a thousand times better.
-    """
+    """(n, 4): normal force, shear force, new gap and motion along the edge in the step, in the present states."""
     n = block.shape[0]
     forces = np.zeros((n, 4))
-    new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
-    violation = np.zeros(n)
     for c in range(n):
-        forces[c, 2] = gap0[c] + _move(unknowns, block, other, order, vectors, c, 0)
         forces[c, 3] = _move(unknowns, block, other, order, vectors, c, 1)
+        forces[c, 2] = gap0[c] + _move(unknowns, block, other, order, vectors, c, 0) - lift[c] * forces[c, 3]
         if state[c] != OPEN:
             forces[c, 0] = -normal[c] * forces[c, 2]
             if state[c] == STICK:
                 forces[c, 1] = shear0[c] - shear[c] * forces[c, 3]
             else:
-                forces[c, 1] = direction[c] * friction[c] * forces[c, 0]
+                forces[c, 1] = direction[c] * (friction[c] * forces[c, 0] + sliding[c])
+    return forces
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def check_states(
+    forces,
+    partner,
+    state,
+    direction,
+    bonded,
+    normal,
+    shear,
+    friction,
+    sliding,
+    peak,
+    hold,
+    cohesion,
+    tension,
+    keeps,
+    shear0,
+    slack,
+):
+    """The states that the ``forces`` (n, 4) of `contact_forces` call for.
+
+    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). ``slack`` (m) is the
+    round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a thousand
+    times better.
+    """
+    n = state.shape[0]
+    new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
+    violation = np.zeros(n)
     for c in range(n):
         gap, slide = forces[c, 2], forces[c, 3]
         if state[c] == OPEN:
@@ -118,12 +134,12 @@ def check_states(
                 # The state to try is that of the springs under the motion at hand: sticking where it would have to slide,
                 # a contact may pull, open, close again and never come to sliding.
                 trial = shear0[c] - shear[c] * slide
-                if abs(trial) > violation[c] * friction[c] and bonded[c] == 0:
+                if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
                     new_state[c], new_direction[c] = SLIP, np.sign(trial)
                 else:
                     new_state[c] = STICK
             continue
-        pull = tension[c] if bonded[c] else 0.0
+        pull = tension[c] if bonded[c] == 1 else 0.0
         out = False
         for k in range(2):
             p = partner[c, k]
@@ -132,20 +148,25 @@ def check_states(
             new_state[c], new_bonded[c] = OPEN, 0
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:
-            strength = max(0.0, friction[c] * forces[c, 0] + (cohesion[c] if bonded[c] else 0.0))
+            strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
             excess = abs(forces[c, 1]) - strength
             if excess > 1e-9 * strength + 1e-3 * shear[c] * slack:
-                new_state[c], new_bonded[c] = SLIP, 0
+                new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
                 new_direction[c] = np.sign(forces[c, 1])
                 violation[c] = excess
-        elif friction[c] > 0.0:
-            strength = max(0.0, friction[c] * forces[c, 0])
+        elif friction[c] > 0.0 or sliding[c] > 0.0:
+            strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
             trial = direction[c] * (shear0[c] - shear[c] * slide)
             if strength - trial > 1e-9 * strength + 1e-3 * shear[c] * slack:
                 # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial
-    return forces, new_state, new_direction, new_bonded, violation
+    return new_state, new_direction, new_bonded, violation
+
+
+def _plastic(forces: np.ndarray, state: np.ndarray, shear_force: np.ndarray, springs: Springs) -> np.ndarray:
+    """(n,) m of slip in the step: the motion of sliding contacts without what their shear springs took up."""
+    return np.where(state == SLIP, forces[:, 3] - (shear_force - forces[:, 1]) / springs.shear, 0.0)
 
 
 def _worst_of_their_blocks(
@@ -169,23 +190,39 @@ def settle(
     gap: np.ndarray,
     slack: float,
     max_iterations: int,
+    curved: CurvedJoints | None = None,
 ) -> Settled:
     """Iterate from the states of ``found`` to consistent ones; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the blocks' own
-    part, ``springs`` and ``gap`` those of this step (dashpots included).
+    part, ``springs`` and ``gap`` those of this step (dashpots included). ``curved`` joints bend them from iteration to
+    iteration.
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
     block, other, partner, shear_force = found.block, found.other, found.partner, found.shear
     state, direction, bonded = found.state, found.direction, found.bonded
+    straight, straight_gap = springs, gap
+    normal_force, slip = found.normal, np.zeros(len(found))
     data = np.empty(pattern.size)
     side = np.empty(6 * pattern.n)
     seen: set[bytes] = set()
     patience = 0
     worst = -1
     for iteration in range(1, max_iterations + 1):
+        if curved is not None:
+            springs, gap = curved.lines(
+                straight,
+                straight_gap,
+                found,
+                state,
+                direction,
+                bonded,
+                normal_force,
+                np.where(state == SLIP, slip, 0.0),
+            )
         symmetric = assembly.assemble_contacts(
             data, side, matrix, right, pattern.stride, pattern.diagonal, pattern.upper, pattern.lower, block, other,
-            pattern.order, vectors, state, direction, gap, springs.normal, springs.shear, springs.friction, shear_force,
+            pattern.order, vectors, state, direction, gap, springs.normal, springs.shear, springs.friction,
+            springs.sliding, springs.lift, shear_force,
         )  # fmt: skip
         try:
             unknowns = assembly.solve(pattern, data, side, symmetric)
@@ -193,23 +230,43 @@ def settle(
             raise Unsettled(str(error)) from error
         if not np.isfinite(unknowns).all():
             raise Unsettled("the step's matrix is singular")
-        forces, new_state, new_direction, new_bonded, violation = check_states(
-            unknowns, block, other, pattern.order, vectors, partner, state, direction, bonded, gap, springs.normal,
-            springs.shear, springs.friction, springs.cohesion, springs.tension, shear_force, slack,
+        forces = contact_forces(
+            unknowns, block, other, pattern.order, vectors, state, direction, gap, springs.normal, springs.shear,
+            springs.friction, springs.sliding, springs.lift, shear_force,
+        )  # fmt: skip
+        normal_force = forces[:, 0]
+        known, missed = springs, None
+        if curved is not None:
+            slip = _plastic(forces, state, shear_force, springs)
+            known, known_gap = curved.lines(straight, straight_gap, found, state, direction, bonded, normal_force, slip)
+            missed = curved.misfit(springs, gap, known, known_gap, state, forces)
+        new_state, new_direction, new_bonded, violation = check_states(
+            forces, partner, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
+            known.peak, known.hold, known.cohesion, known.tension, known.keeps, shear_force, slack,
         )  # fmt: skip
         wrong = violation > 0
-        if not wrong.any():
+        agreed = missed is None or not missed.any()
+        if agreed and not wrong.any():
+            slip = _plastic(forces, state, shear_force, springs)
+            lifted = np.zeros(len(found))
+            if curved is not None:
+                lifted = springs.lift * np.where(springs.lift * direction < 0, slip, forces[:, 3])
             return Settled(
                 unknowns=unknowns.reshape(-1, 6),
                 state=state,
                 direction=direction,
                 bonded=bonded,
-                normal_force=forces[:, 0],
+                normal_force=normal_force,
                 shear_force=forces[:, 1],
-                gap=forces[:, 2],
-                sliding=forces[:, 3],
+                gap=forces[:, 2] + springs.lift * forces[:, 3] - lifted - (gap - found.gap),
+                slip=slip,
+                lifted=lifted,
+                springs=springs,
                 iterations=iteration,
             )
+        if not wrong.any():
+            worst = int(missed.argmax())
+            continue
         worst = int(violation.argmax())
         mark = state.tobytes() + direction.tobytes() + bonded.tobytes()
         if mark in seen and patience < 2:

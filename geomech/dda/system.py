@@ -214,10 +214,13 @@ class BlockSystem:
                 gap,
                 self._slack,
                 self.settings.max_open_close_iterations,
+                self._finder.curved(found),
             )
         else:
             zero = np.zeros(len(found))
-            settled = Settled(np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, 0)
+            settled = Settled(
+                np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
+            )
 
         increment = np.zeros((self.blocks.n_blocks, 6))
         increment[self._moving] = settled.unknowns[order[self._moving]]
@@ -227,12 +230,9 @@ class BlockSystem:
             crack_strain,
         )  # fmt: skip
         kinetic, elastic = energies(velocity, new_stress, self.compliance, density, moments, self._fixed)
-        new_gap = settled.gap - (gap - found.gap)
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
 
-        rows = found.rows(
-            settled.state, settled.bonded, settled.normal_force, settled.shear_force, new_gap, settled.sliding
-        )
+        rows = found.rows(settled)
         inertia = Inertia(density, gravity, acceleration, carried[:, 2], self._fixed)
         forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), inertia)
         new_state = State(
@@ -252,8 +252,8 @@ class BlockSystem:
             "kinetic_energy": kinetic,
             "elastic_energy": elastic,
             "contact_energy": 0.5
-            * float((closed * (new_gap**2 * found.springs.normal + settled.shear_force**2 / springs.shear)).sum()),
-            "worst_penetration": _deepest(closed, found.gap, new_gap),
+            * float((closed * (settled.gap**2 * found.springs.normal + settled.shear_force**2 / springs.shear)).sum()),
+            "worst_penetration": _deepest(closed, found.gap, settled.gap),
             "max_displacement_ratio": largest / self.half_height,
             "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),
         }

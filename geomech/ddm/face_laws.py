@@ -66,7 +66,13 @@ class FaceMemory:
 
 
 def all_smooth(laws: Sequence[JointLaw]) -> bool:
-    """Whether faces under these laws do no more than open and close."""
+    """Whether faces under these laws do no more than open and close. Raises ValueError for laws that faces cannot follow."""
+    for one in laws:
+        if not one.straight:
+            raise ValueError(
+                f"joint {one.name!r}: crack faces know neither residual friction, softening, dilation, roughness nor "
+                "hyperbolic closure; give the crack a joint without them"
+            )
     return not any(one.friction or one.cohesion or one.tensile_strength or one.normal_stiffness for one in laws)
 
 

@@ -3,7 +3,7 @@
 from .blocks import Blocks
 from .cracks import Cracks
 from .history import History, Wave, baseline_corrected, read_record
-from .joint import JointLaw
+from .joint import JointLaw, Roughness
 from .loads import EdgeTraction, LinearProfile, Loads, PointLoad, WaterTable
 from .material import Material
 from .motion import Motion
@@ -33,6 +33,7 @@ __all__ = [
     "Motion",
     "PointLoad",
     "Problem",
+    "Roughness",
     "RunSettings",
     "State",
     "WaterTable",

@@ -28,11 +28,16 @@ CONTACT = np.dtype(
         ("normal", np.float64, 2),  # outward normal of the edge: the way the contact pushes the vertex's block
         ("normal_force", np.float64),  # N/m, positive in compression
         ("shear_force", np.float64),  # N/m, along the edge's direction
-        ("gap", np.float64),  # m, negative when penetrating
+        ("gap", np.float64),  # m, from where the faces meet (beyond ``lift``), negative when penetrating
         ("slip", np.float64),  # m, accumulated sliding along the edge's direction
         ("length", np.float64),  # tributary length, m
         ("law", np.int64),  # index of the joint law
-        ("bonded", np.int64),  # 1 while cohesion and tensile strength hold, 0 once either has failed
+        (
+            "bonded",
+            np.int64,
+        ),  # 1 while cohesion and tensile strength hold, 0 once they are lost, 2 after slip that wears cohesion
+        ("wear", np.float64),  # m, length of the way it has slid, to and fro
+        ("lift", np.float64),  # m, by which sliding has forced the faces apart
     ]
 )
 
