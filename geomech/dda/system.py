@@ -16,6 +16,7 @@ from .held import balanced, hold, with_rigid_motion
 from .loads import AppliedForces, Inertia, LoadMap, generalised
 from .moments import block_moments
 from .open_close import Settled, Unsettled, settle
+from .overlap import refuse_overlap
 from .step import CrackResponse, NotConverged, StepResult
 
 log = logging.getLogger(__name__)
@@ -95,7 +96,7 @@ class BlockSystem:
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun again
         from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
-        ``settings.max_step_cuts`` cuts.
+        ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved.
         """
         dt = self.settings.time_step if dt is None else float(dt)
         if not dt > 0:
@@ -104,6 +105,8 @@ class BlockSystem:
         carried = self.settings.dynamic_factor * state.velocity
         carried[self._fixed] = 0.0
         moments = block_moments(vertices, self._next, self._start)
+        if state.time == 0.0 and len(state.contacts) == 0:
+            refuse_overlap(self.blocks, vertices, moments)
         limit = self._limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
         found = self._finder.find(state, vertices, _WINDOW * limit)

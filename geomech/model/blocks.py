@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..conventions import outward_normal_of
-from .polygon import area_moments, signed_area
+from .polygon import area_moments, crossing_edges, plainly_simple, signed_area, winding_number
 
 #: Edges lie in one line when the tangent of their angle is below this.
 STRAIGHT = 1e-6
@@ -59,29 +59,44 @@ class Blocks:
         """Build from ``polygons[block][loop]`` = (n, 2) vertices without the closing repetition; a bare (n, 2) array
         stands for a block without holes. ``edge_names[block][loop][edge]`` names edges. Loops are turned to the
         house's sense. Raises ValueError naming the block for loops of fewer than three vertices, repeated vertices,
-        non-finite coordinates or no area."""
+        non-finite coordinates, edges that cross, no area, or holes outside the outline."""
         n_blocks = len(polygons)
         names = tuple(names) if names is not None else tuple(f"block {b}" for b in range(n_blocks))
+        loops, block_loop = [], [0]
+        for block in polygons:
+            bare = isinstance(block, np.ndarray) or np.ndim(block[0][0]) == 0
+            loops += [np.asarray(loop, dtype=float) for loop in ([block] if bare else block)]
+            block_loop.append(len(loops))
+        owner = np.repeat(np.arange(n_blocks), np.diff(block_loop))
+        outer = np.zeros(len(loops), bool)
+        outer[block_loop[:-1]] = True
+        labels = None if edge_names is None else [list(label) for block in edge_names for label in block]
+        for k, loop in enumerate(loops):
+            _refuse_shape(loop, None if labels is None else labels[k], names[owner[k]])
+        loop_start = np.concatenate([[0], np.cumsum([len(loop) for loop in loops])]).astype(int)
+        if loops:
+            with np.errstate(invalid="ignore"):
+                simple, turns_left = plainly_simple(np.concatenate(loops), loop_start)
+            for k in np.flatnonzero(~simple):
+                _refuse_crooked(loops[k], names[owner[k]])
+            for k in np.flatnonzero(~outer):
+                _refuse_stray(loops[block_loop[owner[k]]], loops[k], names[owner[k]])
+            for k in np.flatnonzero(turns_left != outer):
+                loops[k] = loops[k][::-1]
+                if labels is not None:
+                    # Reversed, the edge that left vertex i arrives at it, so the labels shift by one.
+                    labels[k] = [*labels[k][-2::-1], labels[k][-1]]
         known: dict[str, int] = {"": 0}
-        vertices, labels, loop_start, block_loop = [], [], [0], [0]
-        for b, loops in enumerate(polygons):
-            bare = isinstance(loops, np.ndarray) or np.ndim(loops[0][0]) == 0
-            loops = [loops] if bare else loops
-            for k, loop in enumerate(loops):
-                loop = np.asarray(loop, dtype=float)
-                label = list(edge_names[b][k]) if edge_names is not None else [""] * len(loop)
-                loop, label = _oriented(loop, label, counter_clockwise=k == 0, name=names[b])
-                vertices.append(loop)
-                labels.append([known.setdefault(name, len(known)) for name in label])
-                loop_start.append(loop_start[-1] + len(loop))
-            block_loop.append(len(loop_start) - 1)
+        edge_name = np.zeros(loop_start[-1], int)
+        if labels is not None:
+            edge_name[:] = [known.setdefault(name, len(known)) for label in labels for name in label]
         return cls(
-            vertices=np.concatenate(vertices) if vertices else np.empty((0, 2)),
-            loop_start=np.array(loop_start),
+            vertices=np.concatenate(loops) if loops else np.empty((0, 2)),
+            loop_start=loop_start,
             block_loop=np.array(block_loop),
             material=np.zeros(n_blocks, int) if material is None else np.asarray(material, dtype=int),
             fixed=np.zeros(n_blocks, bool) if fixed is None else np.asarray(fixed, dtype=bool),
-            edge_name=np.concatenate(labels).astype(int) if labels else np.empty(0, int),
+            edge_name=edge_name,
             edge_names=tuple(known),
             names=names,
             held=np.asarray(held, dtype=bool) if held is not None and np.any(held) else None,
@@ -216,15 +231,18 @@ class Blocks:
         return replace(self, vertices=np.asarray(vertices, dtype=float))
 
 
-def _oriented(loop: np.ndarray, label: list[str], counter_clockwise: bool, name: str) -> tuple[np.ndarray, list[str]]:
+def _refuse_shape(loop: np.ndarray, label: list[str] | None, name: str) -> None:
     if loop.ndim != 2 or loop.shape[1] != 2 or len(loop) < 3:
         raise ValueError(f"{name}: an outline needs at least three vertices (x, y), got an array of shape {loop.shape}")
+    if label is not None and len(label) != len(loop):
+        raise ValueError(f"{name}: {len(loop)} edges but {len(label)} edge names")
+
+
+def _refuse_crooked(loop: np.ndarray, name: str) -> None:
     if not np.isfinite(loop).all():
         raise ValueError(
             f"{name}: vertex {int(np.flatnonzero(~np.isfinite(loop).all(axis=1))[0])} is not a finite point"
         )
-    if len(label) != len(loop):
-        raise ValueError(f"{name}: {len(loop)} edges but {len(label)} edge names")
     span = np.ptp(loop, axis=0).max()
     step = np.roll(loop, -1, axis=0) - loop
     short = np.hypot(step[:, 0], step[:, 1]) <= 1e-12 * span
@@ -233,10 +251,20 @@ def _oriented(loop: np.ndarray, label: list[str], counter_clockwise: bool, name:
         raise ValueError(
             f"{name}: vertices {at} and {(at + 1) % len(loop)} coincide at ({loop[at, 0]:g}, {loop[at, 1]:g})"
         )
-    area = signed_area(loop)
-    if abs(area) <= 1e-14 * span**2:
+    if np.abs(np.linalg.svd(loop - loop.mean(axis=0), compute_uv=False)[1]) <= 1e-14 * span:
         raise ValueError(f"{name}: the outline encloses no area")
-    if (area > 0) != counter_clockwise:
-        # Reversed, the edge that left vertex i arrives at it, so the labels shift by one.
-        loop, label = loop[::-1], [*label[-2::-1], label[-1]]
-    return loop, label
+    crossing = crossing_edges(loop)
+    if crossing is not None:
+        i, j = crossing
+        raise ValueError(
+            f"{name}: the edges from vertex {i} ({loop[i, 0]:g}, {loop[i, 1]:g}) and from vertex {j} "
+            f"({loop[j, 0]:g}, {loop[j, 1]:g}) of the outline cross or touch"
+        )
+    if abs(signed_area(loop)) <= 1e-14 * span**2:
+        raise ValueError(f"{name}: the outline encloses no area")
+
+
+def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
+    for x, y in hole:
+        if abs(winding_number([outline], np.array([x, y]))) < 0.25:
+            raise ValueError(f"{name}: a hole reaches out of the outline at ({x:g}, {y:g})")

@@ -48,3 +48,58 @@ def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
         b = np.roll(a, -1, axis=0)
         total += np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.sum(a * b, axis=1)).sum()
     return total / (2 * np.pi)
+
+
+def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which of many loops are convex, once round, with finite and distinct vertices, and which turn counter-clockwise.
+
+    ``vertices`` (n, 2) of all loops, loop k from ``start[k]`` to ``start[k + 1]``. Two (n_loops,) arrays of bools; what is
+    not plainly simple may be so all the same.
+    """
+    first, count = start[:-1], np.diff(start)
+    following = np.arange(1, len(vertices) + 1)
+    following[start[1:] - 1] = first
+    before = np.empty(len(vertices), int)
+    before[following] = np.arange(len(vertices))
+    own = vertices - np.repeat(vertices[first], count, axis=0)
+    along = own[following] - own
+    turn = along[before]
+    cross = turn[:, 0] * along[:, 1] - turn[:, 1] * along[:, 0]
+    angle = np.arctan2(cross, np.sum(turn * along, axis=1))
+    total = np.add.reduceat(angle, first)
+    size = np.maximum.reduceat(np.abs(own).max(axis=1), first)
+    short = np.minimum.reduceat(np.hypot(along[:, 0], along[:, 1]), first) <= 1e-12 * size
+    area = np.add.reduceat(own[:, 0] * own[following, 1] - own[:, 1] * own[following, 0], first)
+    one_way = np.minimum.reduceat(angle * np.repeat(np.sign(total), count), first) >= 0
+    # Comparisons with what is not finite are False.
+    good = one_way & (np.abs(np.abs(total) - 2 * np.pi) < 1) & ~short & (np.abs(area) > 1e-12 * size**2)
+    return good, area > 0
+
+
+def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
+    """Two edges of ``loop`` (n, 2) that cross or touch away from a shared corner, the first found; None for a simple polygon.
+
+    Edge k leaves vertex k.
+    """
+    n = len(loop)
+    p = loop - loop[0]
+    along = np.roll(p, -1, axis=0) - p
+    # Ends of every edge j from the line of every edge i: they lie on different sides where i and j cross.
+    arm = p[None, :] - p[:, None]
+    side = along[:, None, 0] * arm[..., 1] - along[:, None, 1] * arm[..., 0]
+    span = np.hypot(along[:, 0], along[:, 1])
+    side = np.where(np.abs(side) <= 1e-12 * span[:, None] * np.ptp(p, axis=0).max(), 0.0, np.sign(side))
+    start, end = side, np.roll(side, -1, axis=1)
+    meet = (start * end <= 0) & (start * end <= 0).T
+    flat = (start == 0) & (end == 0)
+    for i, j in np.argwhere(meet & np.triu(np.ones((n, n), bool), 1)):
+        ahead, behind = (i + 1) % n == j, (j + 1) % n == i
+        if flat[i, j] and flat[j, i]:
+            # In one line: they must share a stretch, or neighbours fold back on themselves.
+            s = np.sort((np.stack([p[j], p[j] + along[j]]) - p[i]) @ along[i]) / span[i] ** 2
+            shared = min(1.0, s[1]) - max(0.0, s[0])
+            if shared > 1e-9 or (shared >= -1e-12 and not (ahead or behind)):
+                return int(i), int(j)
+        elif not (ahead or behind):
+            return int(i), int(j)
+    return None
