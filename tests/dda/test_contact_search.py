@@ -114,7 +114,7 @@ def test_a_short_common_face_is_held_at_both_ends(tilt):
     # Nearer to each other than the window, the corners of the overlap are met as corners; each still bears on its own.
     c, s = np.cos(tilt), np.sin(tilt)
     upper = (rectangle(0, 0, 1, 1) @ np.array([[c, s], [-s, c]])) + [0.96, 1.0]
-    table, geometry, _ = search([rectangle(0, 0, 1, 1), upper])
+    table, _, _ = search([rectangle(0, 0, 1, 1), upper])
     assert {(2, 4), (4, 2)} <= pairs(table)
     ends = [k for k, pair in enumerate(table[:, :2].tolist()) if pair in ([2, 4], [4, 2])]
     # The line beside the corners is crossed by both; the ends do not wait for each other.

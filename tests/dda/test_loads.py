@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import rectangle
 
 from geomech import dda
 from geomech.dda.loads import LoadMap, generalised
@@ -19,6 +18,11 @@ from geomech.model import (
     State,
     WaterTable,
 )
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
+
 
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)
 
