@@ -111,6 +111,7 @@ def split_blocks(
         rotation=state.rotation[parent].copy(),
         crack_strain=crack_strain,
         contacts=_contacts(state.contacts, pieces),
+        acceleration=None,
     )
     lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
     return Split(children_blocks, after, rest, parent, lost)

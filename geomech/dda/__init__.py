@@ -14,6 +14,7 @@ from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
 from .system import BlockSystem, run
+from .time_integration import TimeScheme, rayleigh_coefficients
 
 __all__ = [
     "EDGE_FORCE",
@@ -23,9 +24,11 @@ __all__ = [
     "CrackResponse",
     "NotConverged",
     "StepResult",
+    "TimeScheme",
     "block_moments",
     "contact_resultants",
     "displacement_matrix",
     "mass_matrix",
+    "rayleigh_coefficients",
     "run",
 ]

@@ -1,4 +1,4 @@
-"""The 6×6-block system of a step: inertia, elasticity, body forces, contact springs, and its solution.
+"""The 6×6-block system of a step: the blocks' own equations, contact springs, and its solution.
 
 Unknowns are (u0, v0, h r0, h εx, h εy, h γxy) with h = √area, so that all six are lengths and the matrix stays well
 scaled. Free blocks only: a fixed block has no unknowns.
@@ -16,8 +16,6 @@ from .multifrontal import BlockSolver
 
 #: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60
-#: Spring, relative to E', that holds the rigid motion of a block without mass; its force is as small beside the load.
-GROUND_RATIO = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,107 +78,6 @@ def sparse_pattern(
         size=36 * len(kept.keys),
         solver=kept,
     )
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _invert(first, second, out):
-    """(3, 3) inverse of the sum of two symmetric positive matrices, by cofactors."""
-    a, b, c = first[0, 0] + second[0, 0], first[0, 1] + second[0, 1], first[0, 2] + second[0, 2]
-    d, e, f = first[1, 1] + second[1, 1], first[1, 2] + second[1, 2], first[2, 2] + second[2, 2]
-    out[0, 0], out[0, 1], out[0, 2] = d * f - e * e, c * e - b * f, b * e - c * d
-    out[1, 1], out[1, 2], out[2, 2] = a * f - c * c, b * c - a * e, a * d - b * b
-    out[1, 0], out[2, 0], out[2, 1] = out[0, 1], out[0, 2], out[1, 2]
-    determinant = a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
-    for k in range(3):
-        for m in range(3):
-            out[k, m] /= determinant
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def assemble_blocks(
-    order,
-    moments,
-    density,
-    stiffness,
-    compliance,
-    carried,
-    stress,
-    crack_strain,
-    crack_given,
-    crack_compliance,
-    crack_offset,
-    gravity,
-    load,
-    dt,
-    damping,
-    n,
-):
-    """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
-
-    2M/dt² d = 2M v/dt + …  (Shi's time integration, d = v dt + a dt²/2), ∫ Tᵀρg, the strain rows' share ρω²∫xx, ∫yy,
-    ∫xy of a spinning block, a viscous stress ∝ C Δε/dt that gives a block's own vibration (taken as that of a square,
-    ω² = 12 C₁₁/(ρ h²)) the part ``damping`` of critical damping, the elastic rows A σ' with σ' = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), and
-    the generalised forces ``load`` (n_blocks, 6) of whatever else acts.
-    """
-    n_blocks = order.shape[0]
-    matrix = np.zeros((n, 6, 6))
-    right = np.zeros((n, 6))
-    tangent = np.empty((n_blocks, 3, 3))
-    stress0 = np.empty((n_blocks, 3))
-    strain = np.empty(3)
-    mass = np.empty((6, 6))
-    for b in range(n_blocks):
-        soft = False
-        if crack_given:
-            for k in range(3):
-                for m in range(3):
-                    soft = soft or crack_compliance[b, k, m] != 0.0
-        if soft:
-            _invert(compliance[b], crack_compliance[b], tangent[b])
-        else:
-            tangent[b] = stiffness[b]
-        for k in range(3):
-            strain[k] = crack_strain[b, k] - crack_offset[b, k] if crack_given else 0.0
-            for m in range(3):
-                strain[k] += compliance[b, k, m] * stress[b, m]
-        for k in range(3):
-            stress0[b, k] = 0.0
-            for m in range(3):
-                stress0[b, k] += tangent[b, k, m] * strain[m]
-        row = order[b]
-        if row < 0:
-            continue
-        area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
-        h = np.sqrt(area)
-        rho = density[b]
-        mass[:] = 0.0
-        mass[0, 0] = mass[1, 1] = area
-        mass[2, 2] = (xx + yy) / area
-        mass[3, 3], mass[4, 4], mass[5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area
-        mass[2, 3] = mass[3, 2] = -xy / area
-        mass[2, 4] = mass[4, 2] = xy / area
-        mass[2, 5] = mass[5, 2] = 0.5 * (xx - yy) / area
-        mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
-        for k in range(6):
-            for m in range(6):
-                matrix[row, k, m] = 2.0 * rho * mass[k, m] / (dt * dt)
-                right[row, k] += 2.0 * rho * mass[k, m] * (carried[b, m] * (1.0 if m < 2 else h)) / dt
-        if rho == 0.0:
-            for k in range(3):
-                matrix[row, k, k] += GROUND_RATIO * stiffness[b, 0, 0]
-        viscous = 1.0 + 2.0 * damping * np.sqrt(rho * area / (12.0 * stiffness[b, 0, 0])) / dt
-        for k in range(3):
-            for m in range(3):
-                matrix[row, 3 + k, 3 + m] += viscous * tangent[b, k, m]
-            right[row, 3 + k] -= area * stress0[b, k] / h
-        right[row, 0] += rho * area * gravity[0] + load[b, 0]
-        right[row, 1] += rho * area * gravity[1] + load[b, 1]
-        spin = rho * carried[b, 2] * carried[b, 2]
-        right[row, 2] += load[b, 2] / h
-        right[row, 3] += (load[b, 3] + spin * xx) / h
-        right[row, 4] += (load[b, 4] + spin * yy) / h
-        right[row, 5] += (load[b, 5] + spin * xy) / h
-    return matrix, right, tangent, stress0
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)

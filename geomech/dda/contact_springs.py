@@ -113,17 +113,32 @@ def contact_springs(
     )
 
 
-def with_dashpots(
-    springs: Springs, gap: np.ndarray, mass: np.ndarray, damping: float, dt: float
+def over_a_step(
+    springs: Springs,
+    gap: np.ndarray,
+    joined: np.ndarray,
+    mass: np.ndarray,
+    weight: float | np.ndarray,
+    damping: float,
+    dt: float,
 ) -> tuple[Springs, np.ndarray]:
-    """Springs and starting gap (n,) m under which N = −kₙ g − c ġ, with ``damping`` = c / (2 √(kₙ m)) and ġ the mean over a
-    step of ``dt``; ``mass`` (n,) kg of the lighter free block.
+    """Springs and starting gap (n,) m whose forces are those that act over a step of ``dt``: ``weight`` θ times that of its
+    end and 1 − θ times that of its start, N = −kₙ (θ g₁ + (1−θ) g₀) − c ġ and S = S₀ − θ kₛ Δs.
 
-    The approach counts only from touching on, so that the dashpot does not act across an open gap. A step much longer than
-    the contact's period leaves the spring as it was.
+    c = ``damping`` · 2 √(kₙ m), ġ the mean over the step, ``mass`` (n,) kg of the lighter free block. What is open at the
+    start has no force there, unless ``joined`` (n,) by a bond, and approach counts for the dashpot only from touching on:
+    neither acts across an open gap. A step much longer than the contact's period leaves the spring as it was.
     """
-    if damping == 0.0:
+    if damping == 0.0 and np.all(weight == 1.0):
         return springs, gap
     drag = 2.0 * damping * np.sqrt(springs.normal * mass) / dt
-    stiffer = springs.normal + drag
-    return replace(springs, normal=stiffer), gap - drag / stiffer * np.minimum(gap, 0.0)
+    normal = weight * springs.normal + drag
+    start = np.where(joined, gap, np.minimum(gap, 0.0))
+    met = springs.normal * (weight * gap + (1.0 - weight) * start) + drag * np.maximum(gap, 0.0)
+    return replace(springs, normal=normal, shear=weight * springs.shear), met / normal
+
+
+def end_of_step(start: np.ndarray, over: np.ndarray, sticking: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
+    """(n,) N shear force at the end of a step from that at its ``start`` and the one that acted ``over`` it; sliding contacts
+    keep the latter."""
+    return over if np.all(weight == 1.0) else np.where(sticking, start + (over - start) / weight, over)

@@ -41,7 +41,7 @@ class StepResult:
     dt             s, the time it advanced (less than asked if the step was cut)
     contacts       CONTACT rows on the geometry on which equilibrium was assembled, with the converged forces
     forces         whatever else acted, on the same geometry
-    acceleration   (n_blocks, 6) of the unknowns during the step
+    acceleration   (n_blocks, 6) mean of the unknowns over the step, with what mass-proportional damping adds
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
                    worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
                    motion over the largest force in them)

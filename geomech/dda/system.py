@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..model import OPEN, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
-from .basis import advance, energies
-from .contact_springs import with_dashpots
+from .basis import energies
+from .contact_springs import end_of_step, over_a_step
 from .contacts import ContactFinder, ContactSet
 from .held import balanced, hold, with_rigid_motion
 from .loads import AppliedForces, Inertia, LoadMap, generalised
@@ -18,6 +18,7 @@ from .moments import block_moments
 from .open_close import Settled, Unsettled, settle
 from .overlap import refuse_overlap
 from .step import CrackResponse, NotConverged, StepResult
+from .time_integration import TimeScheme, advance, assemble_blocks
 
 log = logging.getLogger(__name__)
 
@@ -53,6 +54,7 @@ class BlockSystem:
         self.materials = tuple(materials)
         self.joints = tuple(joints) or (JointLaw("frictionless"),)
         self.settings = settings or DdaSettings()
+        self.scheme = TimeScheme.of(self.settings)
         self._load_map = LoadMap(blocks)
 
         of = np.asarray(blocks.material, dtype=int)
@@ -65,6 +67,7 @@ class BlockSystem:
         self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
         self._moving = np.flatnonzero(~self._fixed)
+        self._turns = ~self._fixed if blocks.held is None else ~(self._fixed | blocks.held[:, 2])
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
@@ -91,8 +94,8 @@ class BlockSystem:
         crack: CrackResponse | None = None,
         load_time: float | None = None,
     ) -> StepResult:
-        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the end of the step, or at
-        ``load_time`` however short the step becomes.
+        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme weighs
+        them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun again
         from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
@@ -174,8 +177,9 @@ class BlockSystem:
     def _attempt(
         self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
     ) -> tuple[StepResult, float]:
+        scheme = self.scheme
         time = state.time + dt
-        acting = time if load_time is None else load_time
+        acting = state.time + scheme.weight * dt if load_time is None else load_time
         gravity = loads.gravity.at(acting)
         points, edges = self._load_map.rows(loads, acting, vertices, state.rotation)
         centroid = np.ascontiguousarray(moments[:, 1:3])
@@ -183,21 +187,28 @@ class BlockSystem:
         given = crack is not None
         # Mass stays, whatever the strain does to the area.
         density = self._mass / moments[:, 0]
-        static = self.settings.dynamic_factor == 0.0
+        static = scheme.static
         compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
         offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
-        damping = 0.0 if static else self.settings.damping
-        springs, gap = found.springs, np.ascontiguousarray(found.gap)
-        if damping:
-            mass = np.where(self._fixed, np.inf, self._mass)
-            springs, gap = with_dashpots(springs, gap, np.minimum(mass[found.block], mass[found.other]), damping, dt)
+        curved = self._finder.curved(found)
+        weight = scheme.weight
+        if weight != 1.0 and curved is not None:
+            # The lines of a law that is curved are those of the end of the step.
+            weight = np.full(len(found), weight)
+            weight[curved.rows] = 1.0
+        mass = np.where(self._fixed, np.inf, self._mass)
+        springs, gap = over_a_step(
+            found.springs, np.ascontiguousarray(found.gap), (found.state != OPEN) & (found.bonded > 0),
+            np.minimum(mass[found.block], mass[found.other]), weight, scheme.block_damping, dt,
+        )  # fmt: skip
         n_free = len(self._moving)
         pattern = self._pattern(found.block, found.other, moments) if n_free else None
         order = self._free if pattern is None else pattern.order
-        matrix, right, tangent, stress0 = assembly.assemble_blocks(
+        matrix, right, tangent, stress0 = assemble_blocks(
             order, moments, density, self._stiffness, self.compliance, carried, stress, crack_strain, given,
-            compliance, offset, gravity, load, dt, damping, n_free,
+            compliance, offset, gravity, load, dt, scheme.weight, scheme.block_damping, scheme.mass_damping,
+            scheme.stiffness_damping, n_free,
         )  # fmt: skip
         vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
         held = self.blocks.held
@@ -217,7 +228,7 @@ class BlockSystem:
                 gap,
                 self._slack,
                 self.settings.max_open_close_iterations,
-                self._finder.curved(found),
+                curved,
             )
         else:
             zero = np.zeros(len(found))
@@ -230,12 +241,20 @@ class BlockSystem:
         increment[:, 2:] /= np.sqrt(moments[:, :1])
         new_vertices, velocity, new_stress, new_crack, largest = advance(
             increment, carried, dt, static, vertices, self._start, moments, tangent, stress0, compliance, offset, given,
-            crack_strain,
+            crack_strain, self._turns,
         )  # fmt: skip
-        kinetic, elastic = energies(velocity, new_stress, self.compliance, density, moments, self._fixed)
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
+        velocity, kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
+        kinetic, elastic = energies(velocity, new_stress, self.compliance, density, moments, self._fixed)
+        end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, weight)
 
         rows = found.rows(settled)
+        if scheme.mass_damping:
+            acceleration = acceleration + scheme.mass_damping / dt * increment
+        memory = rows
+        if scheme.weight != 1.0:
+            memory = rows.copy()
+            memory["shear_force"] = end_shear
         inertia = Inertia(density, gravity, acceleration, carried[:, 2], self._fixed)
         forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), inertia)
         new_state = State(
@@ -245,7 +264,8 @@ class BlockSystem:
             stress=new_stress,
             rotation=state.rotation + increment[:, 2],
             crack_strain=new_crack,
-            contacts=self._finder.carried(new_vertices, rows),
+            contacts=self._finder.carried(new_vertices, memory),
+            acceleration=kept,
         )
         closed = settled.state != OPEN
         statistics = {
@@ -255,7 +275,7 @@ class BlockSystem:
             "kinetic_energy": kinetic,
             "elastic_energy": elastic,
             "contact_energy": 0.5
-            * float((closed * (settled.gap**2 * found.springs.normal + settled.shear_force**2 / springs.shear)).sum()),
+            * float((closed * (settled.gap**2 * found.springs.normal + end_shear**2 / found.springs.shear)).sum()),
             "worst_penetration": _deepest(closed, found.gap, settled.gap),
             "max_displacement_ratio": largest / self.half_height,
             "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),

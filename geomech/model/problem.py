@@ -19,14 +19,19 @@ class DdaSettings:
 
     ``normal_penalty`` and ``shear_penalty`` are contact spring stiffnesses, N/m per metre of thickness (Pa); None
     picks them from the blocks' stiffness. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
-    static, 1 fully dynamic. ``damping`` is the fraction of critical damping of a block's own lowest vibration (dynamic
-    steps only). ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
+    static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1) is Shi's, (¼, ½) the trapezoidal rule, which
+    has no dissipation; in between it has some; 2β ≥ γ ≥ ½. ``damping`` is the fraction of critical damping of a block's own lowest vibration (dynamic
+    steps only); ``rayleigh_mass`` 1/s and ``rayleigh_stiffness`` s damp blocks by α M + β K besides (`dda.rayleigh_coefficients`
+    finds them). ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
     height of the domain.
     """
 
     time_step: float = 1.0
     dynamic_factor: float = 0.0
+    newmark: tuple[float, float] = (0.5, 1.0)
     damping: float = 0.05
+    rayleigh_mass: float = 0.0
+    rayleigh_stiffness: float = 0.0
     max_displacement_ratio: float = 0.001
     normal_penalty: float | None = None
     shear_penalty: float | None = None

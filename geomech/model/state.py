@@ -70,6 +70,7 @@ class State:
     rotation      (n_blocks,)       accumulated rotation, rad
     crack_strain  (n_blocks, 3)     mean strain that the block's cracks carry, current axes
     contacts      CONTACT rows      open ones that are near included
+    acceleration  (n_blocks, 6)     of the unknowns, as a time scheme that needs it has left it; None: begin anew
     """
 
     time: float
@@ -79,6 +80,7 @@ class State:
     rotation: np.ndarray
     crack_strain: np.ndarray
     contacts: np.ndarray
+    acceleration: np.ndarray | None = None
 
     @classmethod
     def at_rest(cls, blocks: Blocks) -> State:

@@ -41,6 +41,27 @@ def shi_amplification(omega_dt: float) -> np.ndarray:
     return np.array([[2.0, 2.0], [-2.0 * o, 2.0 - o]]) / (2.0 + o)
 
 
+def newmark_amplification(omega_dt: float, beta: float, gamma: float) -> np.ndarray:
+    """(3, 3) what a step of Newmark's (1959) scheme does to (x, v dt, a dt²) of an undamped oscillator, Ω = ω dt.
+
+    x₁ = x + v dt + ((½−β) a + β a₁) dt², v₁ = v + ((1−γ) a + γ a₁) dt, a₁ = −ω² x₁ (Hughes 1987, §9.1).
+    """
+    new = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [omega_dt**2, 0.0, 1.0]])
+    old = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [0.0, 0.0, 0.0]])
+    return np.linalg.solve(new, old)
+
+
+def apparent_oscillation(amplification: np.ndarray) -> tuple[float, float]:
+    """(fraction of critical damping, frequency · dt) that a scheme's ``amplification`` gives an undamped oscillator.
+
+    From its complex pair λ = exp(−ξ̄ω̄dt ± iω̄_d dt) with ω̄_d = ω̄ √(1−ξ̄²) (Hughes 1987, §9.1).
+    """
+    pair = np.linalg.eigvals(amplification)
+    largest = complex(pair[np.argmax(pair.imag)])
+    decay, turn = -math.log(abs(largest)), math.atan2(largest.imag, largest.real)
+    return decay / math.hypot(decay, turn), turn
+
+
 def square_block_frequency(side: float, youngs_modulus: float, density: float) -> float:
     """ω (rad/s) of the stretching of a free first-order square block with ν = 0: ω² = E A/(ρ ∫x²) = 12 E/(ρ w²)."""
     return math.sqrt(12 * youngs_modulus / density) / side

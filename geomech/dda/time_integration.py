@@ -1,0 +1,295 @@
+"""Time integration of the blocks' own motion: Newmark's family of schemes, damping, and the state after a step.
+
+All forces, contacts included, act over a step with the weight θ = 2β at its end and 1 − θ at its start, and the unknown
+d is the displacement over the step (Newmark 1959, with d = v dt + ā dt²/2 and ā = (1−θ) a₀ + θ a₁):
+
+    2M/dt² d = 2M v/dt + F(t₀ + θ dt) − A σ₀ − θ A C Δε − D d/dt + contacts
+    v₁ = 2 d/dt − v₀ + κ dt (a₀ − ā),   κ = (θ − γ)/θ,   a₁ = (ā − (1−θ) a₀)/θ
+
+β = ½, γ = 1 is Shi's (1988) scheme, β = ¼, γ = ½ the trapezoidal rule. Where γ = 2β, between the two, no acceleration has
+to be kept, and the energy of a step with constant loads changes by −(θ−½) dᵀK d − dᵀD d/dt exactly (K: all linear springs,
+blocks' own included): it never grows. A contact counts at the start of a step only if it was closed there, and not at all
+if its weighted force would pull; met or left within a step it loses energy besides, after the idea of Kane, Repetto, Ortiz
+& Marsden (1999), that what comes and goes must act implicitly.
+Damping forces follow the mean velocity d/dt of the step: they take dᵀD d/dt > 0 at any step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..conventions import rotate_stress
+from ..model import DdaSettings
+
+#: Spring, relative to E', that holds the rigid motion of a block without mass; its force is as small beside the load.
+GROUND_RATIO = 1e-11
+
+
+@dataclass(frozen=True)
+class TimeScheme:
+    """Newmark's (1959) β and γ, as ``weight`` θ = 2β of the forces at the end of a step and ``memory`` κ = (2β−γ)/(2β) of
+    the acceleration at its start. ``static``: nothing is carried from step to step, and all forces stand at its end.
+    ``mass_damping`` 1/s and ``stiffness_damping`` s are Rayleigh's, ``block_damping`` the fraction of critical damping of
+    each block's own vibration (and of its contacts'). Raises ValueError for what is not unconditionally stable."""
+
+    weight: float = 1.0
+    memory: float = 0.0
+    static: bool = False
+    block_damping: float = 0.0
+    mass_damping: float = 0.0
+    stiffness_damping: float = 0.0
+
+    @classmethod
+    def of(cls, settings: DdaSettings) -> TimeScheme:
+        beta, gamma = settings.newmark
+        if not (2 * beta >= gamma >= 0.5):
+            raise ValueError(
+                f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: it takes 2β ≥ γ ≥ ½ "
+                "(trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
+            )
+        if not 0 <= settings.dynamic_factor <= 1:
+            raise ValueError(f"the dynamic factor is from 0 (static) to 1 (dynamic), got {settings.dynamic_factor!r}")
+        for name in ("damping", "rayleigh_mass", "rayleigh_stiffness"):
+            if not (0 <= getattr(settings, name) < np.inf):
+                raise ValueError(f"{name} must not be negative, got {getattr(settings, name)!r}")
+        if settings.dynamic_factor == 0.0:
+            return cls(static=True)
+        return cls(
+            weight=2 * beta,
+            memory=(2 * beta - gamma) / (2 * beta),
+            block_damping=settings.damping,
+            mass_damping=settings.rayleigh_mass,
+            stiffness_damping=settings.rayleigh_stiffness,
+        )
+
+    def corrected(
+        self, velocity: np.ndarray, before: np.ndarray | None, mean: np.ndarray, turn: np.ndarray, dt: float
+    ) -> tuple[np.ndarray, np.ndarray | None]:
+        """Velocity with what the acceleration ``before`` the step (None: that of the step) has to say, and the acceleration
+        after it; None where the scheme keeps none. All (n_blocks, 6); ``mean`` ā on the axes before the step, ``turn``
+        (n_blocks,) rad the rotation over it, which ``velocity`` has made already."""
+        if self.memory == 0.0:
+            return velocity, None
+        before = mean if before is None else before
+        change = _turned(before - mean, turn)
+        return velocity + self.memory * dt * change, _turned(mean - (1 - self.weight) * before, turn) / self.weight
+
+
+def _turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Rates (n, 6) of the unknowns with their strains on axes turned by ``angle`` (n,): the material turns."""
+    out = rates.copy()
+    half = np.array([1.0, 1.0, 0.5])
+    out[:, 3:] = rotate_stress(rates[:, 3:] * half, angle) / half
+    return out
+
+
+def rayleigh_coefficients(fractions: tuple[float, float], frequencies: tuple[float, float]) -> tuple[float, float]:
+    """(α 1/s, β s) of the damping α M + β K that has ``fractions`` ξ of critical at two ``frequencies`` (Hz):
+    ξ = ½ (α/ω + β ω) (Rayleigh 1877; Clough & Penzien 1975, eq. 13-13). Raises ValueError if no α, β ≥ 0 do."""
+    (x, y), (p, q) = fractions, 2 * np.pi * np.asarray(frequencies, dtype=float)
+    if not (p > 0 and q > 0 and p != q and x >= 0 and y >= 0):
+        raise ValueError(f"Rayleigh damping needs two frequencies and fractions, got {frequencies!r} Hz, {fractions!r}")
+    alpha, beta = 2 * p * q * (q * x - p * y) / (q * q - p * p), 2 * (q * y - p * x) / (q * q - p * p)
+    if min(alpha, beta) < -1e-12 * max(alpha * q, beta / q, 1e-300):
+        raise ValueError(
+            f"fractions {x:g} and {y:g} of critical damping at {frequencies[0]:g} and {frequencies[1]:g} Hz need a negative "
+            "coefficient, which would drive the blocks; bring the fractions closer together"
+        )
+    return max(float(alpha), 0.0), max(float(beta), 0.0)
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _invert(first, second, out):
+    """(3, 3) inverse of the sum of two symmetric positive matrices, by cofactors."""
+    a, b, c = first[0, 0] + second[0, 0], first[0, 1] + second[0, 1], first[0, 2] + second[0, 2]
+    d, e, f = first[1, 1] + second[1, 1], first[1, 2] + second[1, 2], first[2, 2] + second[2, 2]
+    out[0, 0], out[0, 1], out[0, 2] = d * f - e * e, c * e - b * f, b * e - c * d
+    out[1, 1], out[1, 2], out[2, 2] = a * f - c * c, b * c - a * e, a * d - b * b
+    out[1, 0], out[2, 0], out[2, 1] = out[0, 1], out[0, 2], out[1, 2]
+    determinant = a * out[0, 0] + b * out[0, 1] + c * out[0, 2]
+    for k in range(3):
+        for m in range(3):
+            out[k, m] /= determinant
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def assemble_blocks(
+    order,
+    moments,
+    density,
+    stiffness,
+    compliance,
+    carried,
+    stress,
+    crack_strain,
+    crack_given,
+    crack_compliance,
+    crack_offset,
+    gravity,
+    load,
+    dt,
+    weight,
+    block_damping,
+    mass_damping,
+    stiffness_damping,
+    n,
+):
+    """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
+
+    Inertia and elasticity as in the head of this file, with ``weight`` θ and σ₁ = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack
+    strain); ∫ Tᵀρg; the strain rows' share ρω²∫xx, ∫yy, ∫xy of a spinning block; the generalised forces ``load`` (n_blocks, 6)
+    of whatever else acts; and damping: a viscous stress ∝ C Δε/dt that gives a block's own vibration (taken as that of a
+    square, ω² = 12 C₁₁/(ρ h²)) the part ``block_damping`` of critical damping, and Rayleigh's two.
+    """
+    inertia = 2.0 / (dt * dt) + mass_damping / dt
+    n_blocks = order.shape[0]
+    matrix = np.zeros((n, 6, 6))
+    right = np.zeros((n, 6))
+    tangent = np.empty((n_blocks, 3, 3))
+    stress0 = np.empty((n_blocks, 3))
+    strain = np.empty(3)
+    mass = np.empty((6, 6))
+    for b in range(n_blocks):
+        soft = False
+        if crack_given:
+            for k in range(3):
+                for m in range(3):
+                    soft = soft or crack_compliance[b, k, m] != 0.0
+        if soft:
+            _invert(compliance[b], crack_compliance[b], tangent[b])
+        else:
+            tangent[b] = stiffness[b]
+        for k in range(3):
+            strain[k] = crack_strain[b, k] - crack_offset[b, k] if crack_given else 0.0
+            for m in range(3):
+                strain[k] += compliance[b, k, m] * stress[b, m]
+        for k in range(3):
+            stress0[b, k] = 0.0
+            for m in range(3):
+                stress0[b, k] += tangent[b, k, m] * strain[m]
+        row = order[b]
+        if row < 0:
+            continue
+        area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
+        h = np.sqrt(area)
+        rho = density[b]
+        mass[:] = 0.0
+        mass[0, 0] = mass[1, 1] = area
+        mass[2, 2] = (xx + yy) / area
+        mass[3, 3], mass[4, 4], mass[5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area
+        mass[2, 3] = mass[3, 2] = -xy / area
+        mass[2, 4] = mass[4, 2] = xy / area
+        mass[2, 5] = mass[5, 2] = 0.5 * (xx - yy) / area
+        mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
+        for k in range(6):
+            for m in range(6):
+                matrix[row, k, m] = inertia * rho * mass[k, m]
+                right[row, k] += 2.0 * rho * mass[k, m] * (carried[b, m] * (1.0 if m < 2 else h)) / dt
+        if rho == 0.0:
+            for k in range(3):
+                matrix[row, k, k] += GROUND_RATIO * stiffness[b, 0, 0]
+        drag = stiffness_damping + 2.0 * block_damping * np.sqrt(rho * area / (12.0 * stiffness[b, 0, 0]))
+        elastic = weight + drag / dt
+        for k in range(3):
+            for m in range(3):
+                matrix[row, 3 + k, 3 + m] += elastic * tangent[b, k, m]
+            right[row, 3 + k] -= area * stress0[b, k] / h
+        right[row, 0] += rho * area * gravity[0] + load[b, 0]
+        right[row, 1] += rho * area * gravity[1] + load[b, 1]
+        spin = rho * carried[b, 2] * carried[b, 2]
+        right[row, 2] += load[b, 2] / h
+        right[row, 3] += (load[b, 3] + spin * xx) / h
+        right[row, 4] += (load[b, 4] + spin * yy) / h
+        right[row, 5] += (load[b, 5] + spin * xy) / h
+    return matrix, right, tangent, stress0
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def advance(
+    increment,
+    carried,
+    dt,
+    static,
+    vertices,
+    vertex_start,
+    moments,
+    tangent,
+    stress0,
+    compliance,
+    offset,
+    crack_given,
+    crack_strain,
+    turns,
+):
+    """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids.
+
+    Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so a spinning block does not swell;
+    stress, strain rates and crack strain are turned by the same R. Stress before turning is ``tangent`` Δε + ``stress0``.
+    Velocity is 2d/dt − v, or the mean rate d/dt in a ``static`` step, which carries none. A block that stretches as it
+    spins turns faster or slower: what ``turns`` (n_blocks,) keeps its angular momentum.
+    Returns vertices, velocity, stress, crack strain, largest vertex displacement.
+    """
+    n_blocks = increment.shape[0]
+    new_vertices = np.empty_like(vertices)
+    velocity = np.empty((n_blocks, 6))
+    new_stress = np.empty((n_blocks, 3))
+    new_crack = np.empty((n_blocks, 3))
+    largest = 0.0
+    tensor = np.empty(3)
+    for b in range(n_blocks):
+        r = increment[b, 2]
+        c, s = np.cos(r), np.sin(r)
+        ex, ey, g = increment[b, 3], increment[b, 4], 0.5 * increment[b, 5]
+        # R(I+ε) − I, formed without cancellation: cos r − 1 = −2 sin²(r/2).
+        h = np.sin(0.5 * r)
+        cm = -2.0 * h * h
+        axx, axy = cm + c * ex - s * g, -s + c * g - s * ey
+        ayx, ayy = s + s * ex + c * g, cm + s * g + c * ey
+        for i in range(vertex_start[b], vertex_start[b + 1]):
+            x, y = vertices[i, 0] - moments[b, 1], vertices[i, 1] - moments[b, 2]
+            ux = increment[b, 0] + axx * x + axy * y
+            uy = increment[b, 1] + ayx * x + ayy * y
+            new_vertices[i, 0] = vertices[i, 0] + ux
+            new_vertices[i, 1] = vertices[i, 1] + uy
+            largest = max(largest, ux * ux + uy * uy)
+        for k in range(6):
+            if static:
+                velocity[b, k] = increment[b, k] / dt
+            else:
+                velocity[b, k] = 2.0 * increment[b, k] / dt - carried[b, k]
+        # Engineering shear rate: halve, turn, double.
+        a, d, e = velocity[b, 3], velocity[b, 4], 0.5 * velocity[b, 5]
+        spin, xx, yy, xy = velocity[b, 2], moments[b, 3], moments[b, 4], moments[b, 5]
+        momentum = (xx + yy) * spin + xy * (d - a) + (xx - yy) * e
+        velocity[b, 3] = c * c * a + s * s * d - 2 * s * c * e
+        velocity[b, 4] = s * s * a + c * c * d + 2 * s * c * e
+        velocity[b, 5] = 2.0 * (s * c * (a - d) + (c * c - s * s) * e)
+        if turns[b] and not static:
+            # Second moments of the mass, F S Fᵀ with F = R(I + ε).
+            fxx, fyy = 1.0 + axx, 1.0 + ayy
+            sxx = fxx * fxx * xx + 2.0 * fxx * axy * xy + axy * axy * yy
+            syy = ayx * ayx * xx + 2.0 * ayx * fyy * xy + fyy * fyy * yy
+            sxy = fxx * ayx * xx + (fxx * fyy + axy * ayx) * xy + axy * fyy * yy
+            own = sxy * (velocity[b, 4] - velocity[b, 3]) + 0.5 * (sxx - syy) * velocity[b, 5]
+            velocity[b, 2] = (momentum - own) / (sxx + syy)
+        for k in range(3):
+            tensor[k] = stress0[b, k]
+            for m in range(3):
+                tensor[k] += tangent[b, k, m] * increment[b, 3 + m]
+        a, d, e = tensor[0], tensor[1], tensor[2]
+        new_stress[b, 0] = c * c * a + s * s * d - 2 * s * c * e
+        new_stress[b, 1] = s * s * a + c * c * d + 2 * s * c * e
+        new_stress[b, 2] = s * c * (a - d) + (c * c - s * s) * e
+        for k in range(3):
+            if crack_given:
+                tensor[k] = offset[b, k] + compliance[b, k, 0] * a + compliance[b, k, 1] * d + compliance[b, k, 2] * e
+            else:
+                tensor[k] = crack_strain[b, k]
+        a, d, e = tensor[0], tensor[1], 0.5 * tensor[2]
+        new_crack[b, 0] = c * c * a + s * s * d - 2 * s * c * e
+        new_crack[b, 1] = s * s * a + c * c * d + 2 * s * c * e
+        new_crack[b, 2] = 2.0 * (s * c * (a - d) + (c * c - s * s) * e)
+    return new_vertices, velocity, new_stress, new_crack, np.sqrt(largest)
