@@ -70,9 +70,7 @@ class Bordered:
     def __init__(self, elements: ElementSet, base: Base, border: Border | None = None):
         self.elements, self.base, self.border = elements, base, border
         self.n = elements.n_unknowns
-        # Columns of X for what was added, and for elements gone from the base: their numbers and columns.
-        self._for_added: np.ndarray | None = None
-        self._for_gone = np.empty(0, int), np.empty((base.elements.n_unknowns, 0))
+        self._known: Eliminated | None = None
 
     def grown(
         self, elements: ElementSet, was: np.ndarray, compute: Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -102,10 +100,8 @@ class Bordered:
         right[places, old:], down[old:, places] = columns[numbers], rows[:, numbers]
         corner[:, old:], corner[old:, :old] = columns[here], rows[:, here[:old]]
         out = Bordered(elements, self.base, Border(at, added, right, down, corner))
-        if self._for_added is not None:
-            # Nothing may have been solved since the last of them came.
-            out._for_added = self._for_added[:, stays[stays < self._for_added.shape[1]]]
-        out._for_gone = self._for_gone
+        if self._known is not None:
+            out._known = self._known.taken(stays)
         return out
 
     def _start(self) -> Border:
@@ -185,44 +181,71 @@ class Bordered:
         """Factors of S. Raises LinAlgError when it is singular."""
         if self.border is None:
             return self.base.factor
-        border, base = self.border, self.base
-        if self._for_added is None:
-            self._for_added = base.factor.solve(np.asfortranarray(border.right))
-        known = self._for_added.shape[1]
-        if known < border.right.shape[1]:
-            more = base.factor.solve(np.asfortranarray(border.right[:, known:]))
-            self._for_added = np.concatenate([self._for_added, more], axis=1)
-        numbers, columns = self._for_gone
-        gone = np.setdiff1d(base.elements.unknowns(np.flatnonzero(border.at < 0)), numbers)
-        if len(gone):
-            unit = np.zeros((base.elements.n_unknowns, len(gone)), order="F")
+        known = Eliminated.nothing(self.base) if self._known is None else self._known
+        self._known = known.extended(self.base, self.border)
+        return BorderedFactor(self, self._known)
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated:
+    """X and D X so far: ``x`` (n_base, k) for the first of the added unknowns and ``dx`` (k, k) from them to themselves;
+    ``gone`` (g,) unknowns of the base, their ``lost`` (n_base, g) columns of X and ``dlost`` (k, g)."""
+
+    x: np.ndarray
+    dx: np.ndarray
+    gone: np.ndarray
+    lost: np.ndarray
+    dlost: np.ndarray
+
+    @classmethod
+    def nothing(cls, base: Base) -> Eliminated:
+        n = base.elements.n_unknowns
+        return cls(np.empty((n, 0)), np.empty((0, 0)), np.empty(0, int), np.empty((n, 0)), np.empty((0, 0)))
+
+    def taken(self, stays: np.ndarray) -> Eliminated:
+        """Of the added unknowns those that stay (ascending); nothing may have been solved since the last of them came."""
+        at = stays[stays < len(self.dx)]
+        return Eliminated(self.x[:, at], self.dx[np.ix_(at, at)], self.gone, self.lost, self.dlost[at])
+
+    def extended(self, base: Base, border: Border) -> Eliminated:
+        """All that ``border`` has."""
+        factor, down, k = base.factor, border.down, len(self.dx)
+        x, dx = self.x, self.dx
+        if k < len(down):
+            x = np.empty(border.right.shape, order="F")
+            x[:, :k], x[:, k:] = self.x, factor.solve(border.right[:, k:])
+            dx = np.empty((len(down), len(down)), order="F")
+            dx[:k, :k], dx[:k, k:], dx[k:] = self.dx, down[:k] @ x[:, k:], down[k:] @ x
+        now = base.elements.unknowns(np.flatnonzero(border.at < 0))
+        gone, lost = self.gone, self.lost
+        dlost = np.concatenate([self.dlost, down[k:] @ lost])
+        new = np.setdiff1d(now, gone)
+        if len(new):
+            unit = np.zeros((base.elements.n_unknowns, len(new)), order="F")
             # Tractions of the size of the equations that are given up, so that λ is of the size of jumps.
-            unit[gone, np.arange(len(gone))] = np.ldexp(1.0, np.frexp(base.matrix[gone, gone])[1])
-            columns = np.concatenate([columns, base.factor.solve(unit)], axis=1)
-            self._for_gone = np.concatenate([numbers, gone]), columns
-        return BorderedFactor(self, self._for_added, *self._for_gone)
+            unit[new, np.arange(len(new))] = np.ldexp(1.0, np.frexp(base.matrix[new, new])[1])
+            columns = factor.solve(unit)
+            gone, lost = np.concatenate([gone, new]), np.concatenate([lost, columns], axis=1)
+            dlost = np.concatenate([dlost, down @ columns], axis=1)
+        return Eliminated(x, dx, gone, lost, dlost)
 
 
 class BorderedFactor:
-    """Factors of the `Bordered` matrix ``of``; see `Factor`.
+    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worse one of the base's and T's, ``loss`` that of
+    accuracy, as the module has it."""
 
-    ``x`` (n_base, m) is S_BB⁻¹ S_BN, ``gone`` (g,) the base's unknowns that are no more and ``for_gone`` (n_base, g) their part
-    of X. ``rcond`` is the worse one of the base's and T's, ``loss`` that of accuracy, as the module has it.
-    """
-
-    def __init__(self, of: Bordered, x: np.ndarray, gone: np.ndarray, for_gone: np.ndarray):
+    def __init__(self, of: Bordered, done: Eliminated):
         border, self._base = of.border, of.base.factor
         self.n, (self._inner, self._places, self._outer) = of.n, of._places
-        self._down, self._gone = border.down, gone
-        self._x = np.concatenate([x, for_gone], axis=1) if len(gone) else x
-        n_added, n = len(self._outer), len(self._outer) + len(gone)
+        self._down, self._done = border.down, done
+        m, n = len(done.dx), len(done.dx) + len(done.gone)
         t = np.empty((n, n), order="F")
-        t[:n_added], t[n_added:] = -(border.down @ self._x), -self._x[gone]
-        t[:n_added, :n_added] += border.corner
+        t[:m, :m], t[:m, m:] = border.corner - done.dx, -done.dlost
+        t[m:, :m], t[m:, m:] = -done.x[done.gone], -done.lost[done.gone]
         self._t = Factor(t, SINGULAR)
         self.rcond = min(self._base.rcond, self._t.rcond)
-        size = np.abs(border.down).sum(axis=1) / np.abs(t[:n_added]).sum(axis=1)
-        across = np.abs(self._x).sum(axis=1)
+        size = np.abs(border.down).sum(axis=1) / np.abs(t[:m]).sum(axis=1)
+        across = np.abs(done.x).sum(axis=1) + np.abs(done.lost).sum(axis=1)
         self.loss = float(size.max(initial=1.0) * across.max(initial=1.0)) / self._t.rcond
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
@@ -232,16 +255,19 @@ class BorderedFactor:
         on_base[self._places] = right[self._inner]
         out, rest = np.empty_like(right), np.zeros((self._t.n, *shape), order="F")
         rest[:n_added] = right[self._outer]
+        done = self._done
         if transposed:
-            w = self._t.solve(rest - self._x.T @ on_base, transposed=True)
+            rest[:n_added] -= done.x.T @ on_base
+            rest[n_added:] -= done.lost.T @ on_base
+            w = self._t.solve(rest, transposed=True)
             on_base -= self._down.T @ w[:n_added]
-            on_base[self._gone] -= w[n_added:]
+            on_base[done.gone] -= w[n_added:]
             first = self._base.solve(on_base, transposed=True)
         else:
             first = self._base.solve(on_base)
             rest[:n_added] -= self._down @ first
-            rest[n_added:] = -first[self._gone]
+            rest[n_added:] = -first[done.gone]
             w = self._t.solve(rest)
-            first -= self._x @ w
+            first -= done.x @ w[:n_added] + done.lost @ w[n_added:]
         out[self._inner], out[self._outer] = first[self._places], w[:n_added]
         return out

@@ -220,45 +220,57 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     share = np.where(drawn, length / np.maximum(total[cracks.crack], 1e-300), 0.0)
     count = np.maximum(1, np.rint(settings.elements_per_crack * share).astype(int))
     layers = _node_layers(cracks, length / count, grading, edges)
-    tip = np.zeros(len(cracks.nodes), bool)
-    tip[cracks.tips] = True
-    start, end, kind, source = [], [], [], []
-    for s in range(n):
-        i, j = cracks.segments[s]
-        m = int(count[s])
-        at_start, at_end = int(layers[s, 0]), int(layers[s, 1])
+    inner: list[float] = []
+    pieces = np.ones(n, int)
+    for s in np.flatnonzero((count > 1) | layers.any(axis=1)).tolist():
+        m, (at_start, at_end) = int(count[s]), layers[s].tolist()
         if m == 1 and at_start and at_end:
             m = 2
-        a, b = cracks.nodes[i], cracks.nodes[j]
+        a, b = cracks.nodes[cracks.segments[s]]
         part = m / length[s]
         fine = grading.fractions(at_start, grading.finest(a, length[s], extent) * part) + list(range(1, m))
         fine += [m - f for f in grading.fractions(at_end, grading.finest(b, length[s], extent) * part)][::-1]
-        f = np.array([q / m for q in fine])[:, None]
-        line = np.concatenate([a[None], (1 - f) * a + f * b, b[None]])
-        kinds = np.full(len(line) - 1, shapes.ORDINARY)
-        if tip[i]:
-            kinds[0] = shapes.TIP_START
-        if tip[j]:
-            kinds[-1] = shapes.TIP_BOTH if len(kinds) == 1 and tip[i] else shapes.TIP_END
-        start.append(line[:-1])
-        end.append(line[1:])
-        kind.append(kinds)
-        source.append(np.full(len(kinds), s))
-    return np.concatenate(start), np.concatenate(end), np.concatenate(kind), np.concatenate(source)
+        inner += [q / m for q in fine]
+        pieces[s] += len(fine)
+    return (*_cut(cracks, pieces, np.array(inner)[:, None]), np.repeat(np.arange(n), pieces))
+
+
+def _cut(cracks: Cracks, pieces: np.ndarray, inner: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Start, end and kind of the elements of all segments, ``pieces`` (n_segments,) of each; ``inner`` (m, 1) are the fractions
+    of the segments, one after the other, where they are cut."""
+    total = int(pieces.sum())
+    last = np.cumsum(pieces) - 1
+    first = last - pieces + 1
+    a, b = cracks.nodes[cracks.segments[:, 0]], cracks.nodes[cracks.segments[:, 1]]
+    at = np.repeat(np.arange(len(pieces)), pieces - 1)
+    points = (1 - inner) * a[at] + inner * b[at]
+    start, end, kind = np.empty((total, 2)), np.empty((total, 2)), np.full(total, shapes.ORDINARY)
+    follows, goes_on = np.ones(total, bool), np.ones(total, bool)
+    follows[first] = goes_on[last] = False
+    start[first], start[follows], end[last], end[goes_on] = a, points, b, points
+    tip = np.zeros(len(cracks.nodes), bool)
+    tip[cracks.tips] = True
+    from_tip, to_tip = tip[cracks.segments].T
+    kind[first[from_tip]] = shapes.TIP_START
+    kind[last[to_tip]] = shapes.TIP_END
+    kind[first[from_tip & to_tip & (pieces == 1)]] = shapes.TIP_BOTH
+    return start, end, kind
 
 
 def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
     """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
     layers = np.zeros((cracks.n_segments, 2), int)
     ends: list[list[tuple[int, int]]] = [[] for _ in range(len(cracks.nodes))]
-    for s, (i, j) in enumerate(cracks.segments):
+    for s, (i, j) in enumerate(cracks.segments.tolist()):
         ends[i].append((s, 0))
         ends[j].append((s, 1))
-    direction = (cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]) / cracks.lengths[:, None]
+    step = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
+    heading = np.arctan2(step[:, 1], step[:, 0]).tolist()
+    surface, crack, size = cracks.surface.tolist(), cracks.crack.tolist(), size.tolist()
     for node, here in enumerate(ends):
-        if not here or (len(here) == 1 and not cracks.surface[node]):
+        if not here or (len(here) == 1 and not surface[node]):
             continue
-        if len(here) != 2 or cracks.surface[node] or cracks.crack[here[0][0]] != cracks.crack[here[1][0]]:
+        if len(here) != 2 or surface[node] or crack[here[0][0]] != crack[here[1][0]]:
             deep = _layers_at(cracks, node, edges, grading)
             for at in here:
                 layers[at] = deep
@@ -266,10 +278,11 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
                 continue
         else:
             (s, e), (r, f) = here
-            # Both directions away from the node: straight on means opposite.
-            u, v = direction[s] * (1 - 2 * e), direction[r] * (1 - 2 * f)
-            turn = math.pi - abs(math.atan2(u[0] * v[1] - u[1] * v[0], float(u @ v)))
-            layers[s, e] = layers[r, f] = grading.at_kink(turn, KINK < turn and _forgotten(cracks, ends, here))
+            # Straight on means that one arrives where the other leaves.
+            turn = abs(math.remainder(heading[s] - heading[r] + (math.pi if e == f else 0.0), 2 * math.pi))
+            deep = grading.at_kink(turn, KINK < turn and _forgotten(cracks, ends, here))
+            if deep:
+                layers[s, e] = layers[r, f] = deep
         least = min(size[s] for s, _ in here)
         for at in here:
             if size[at[0]] > JUMP * least:

@@ -104,20 +104,20 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
         return
     if len(edges):
         mouth = cracks.surface[cracks.segments]
-        ends = segments.reshape(-1, 2)
-        distance = _to_segments(ends, edges).reshape(n, 2)
-        rock = inside(loops, ends).reshape(n, 2)
-        for s in new:
+        ends = segments[new].reshape(-1, 2)
+        distance = _to_segments(ends, edges).reshape(-1, 2)
+        rock = inside(loops, ends).reshape(-1, 2)
+        for k, s in enumerate(new):
             for e in (0, 1):
                 x, y = segments[s, e]
                 if mouth[s, e]:
-                    if distance[s, e] > 1e-7 * span:
+                    if distance[k, e] > 1e-7 * span:
                         raise ValueError(
-                            f"{name(s)}: its mouth ({x:g}, {y:g}) is {distance[s, e]:.3g} m off the boundary"
+                            f"{name(s)}: its mouth ({x:g}, {y:g}) is {distance[k, e]:.3g} m off the boundary"
                         )
-                elif distance[s, e] <= _SMALL * span:
+                elif distance[k, e] <= _SMALL * span:
                     raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies on the boundary but is not marked as a mouth")
-                elif not rock[s, e]:
+                elif not rock[k, e]:
                     raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies outside the rock")
         i, j = _boxes_meet(segments[new], edges, _SMALL * span)
         one, other = segments[new[i]], edges[j]
