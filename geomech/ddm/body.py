@@ -194,8 +194,6 @@ class Body:
             matrix = Bordered(c, Base(c, whole))
         else:
             matrix = known.grown(c, c_old, schur)
-            if matrix.worn:
-                matrix = matrix.renewed()
         self.crack_system = CrackSystem(matrix, self.work)
 
     def _imposed(self, applied: Applied) -> np.ndarray:

@@ -21,12 +21,14 @@ from functools import cached_property
 
 import numpy as np
 
-from . import shapes
 from .factor import Factor
 from .influence import ElementSet, copy_blocks
 
-#: Columns of the border, as a part of those of the base, from which all is factored anew: the sum is least about there.
-WIDEST = 0.25
+#: A border as wide as this part of its base, and this many unknowns, becomes part of the base of another one; what is done
+#: over and over with a border (copies, T) then stays small.
+WIDEST, WIDE = 0.125, 80
+#: Borders upon borders, at which all is factored anew: every one takes its share of a solution's time.
+DEEPEST = 5
 #: Fewer unknowns are factored in less time than a border takes.
 SMALLEST = 200
 #: Loss of accuracy, ‖D‖ ‖X‖ / ‖T‖ over the reciprocal condition of T, from which all is factored anew: K then still
@@ -37,14 +39,20 @@ SINGULAR = "cracks cut a part of the body off"
 
 
 class Base:
-    """``matrix`` (n, n) between crack ``elements`` and its factors, made when first asked for."""
+    """``matrix`` (n, n) between crack ``elements``, which may be bordered itself, and its factors, made when first asked
+    for."""
 
-    def __init__(self, elements: ElementSet, matrix: np.ndarray):
+    def __init__(self, elements: ElementSet, matrix: np.ndarray | Bordered):
         self.elements, self.matrix = elements, matrix
+        self.depth: int = matrix.depth if isinstance(matrix, Bordered) else 0
 
     @cached_property
-    def factor(self) -> Factor:
-        return Factor(self.matrix, SINGULAR)
+    def factor(self) -> Factor | BorderedFactor:
+        return self.matrix.factored() if isinstance(self.matrix, Bordered) else Factor(self.matrix, SINGULAR)
+
+    @cached_property
+    def dense(self) -> np.ndarray:
+        return self.matrix.dense if isinstance(self.matrix, Bordered) else self.matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +71,11 @@ class Border:
     down: np.ndarray
     corner: np.ndarray
 
+    @classmethod
+    def none(cls, elements: ElementSet) -> Border:
+        n = elements.n_unknowns
+        return cls(np.arange(elements.n), np.empty(0, int), np.empty((n, 0)), np.empty((0, n)), np.empty((0, 0)))
+
 
 class Bordered:
     """S between crack ``elements``, as a ``base`` and a ``border`` (None: it is the base's own matrix)."""
@@ -70,6 +83,7 @@ class Bordered:
     def __init__(self, elements: ElementSet, base: Base, border: Border | None = None):
         self.elements, self.base, self.border = elements, base, border
         self.n = elements.n_unknowns
+        self.depth = base.depth + (border is not None)
         self._known: Eliminated | None = None
 
     def grown(
@@ -77,10 +91,31 @@ class Bordered:
     ) -> Bordered:
         """S between ``elements``, of which ``was`` (n,) are the numbers here, −1 where new; ``compute(rows, columns)``
         makes blocks of it between elements."""
-        every, new = np.arange(elements.n), np.flatnonzero(was < 0)
-        if not len(new) and elements.n == self.elements.n and np.array_equal(was, every):
+        kept = was >= 0
+        if kept.all() and np.array_equal(was, np.arange(self.elements.n)):
             return self
-        border = self._start() if self.border is None else self.border
+        if not self._wide:
+            return self._changed(elements, was, compute)
+        if self.depth == DEEPEST:
+            inner, now = Bordered(self.elements, Base(self.elements, self.dense)), was
+        else:
+            staying = self.elements.take(was[kept])
+            base = Base(staying, self._changed(staying, was[kept], compute))
+            inner, now = Bordered(staying, base), np.where(kept, np.cumsum(kept) - 1, -1)
+        return inner._changed(elements, now, compute)
+
+    @property
+    def _wide(self) -> bool:
+        if self.border is None:
+            return False
+        border, width = self.border, 2 * self.elements.per
+        unknowns = width * (len(border.added) + int((border.at < 0).sum()))
+        return unknowns > max(WIDEST * self.base.elements.n_unknowns, WIDE)
+
+    def _changed(self, elements: ElementSet, was: np.ndarray, compute) -> Bordered:
+        """As `grown`, on the same base."""
+        border = Border.none(self.elements) if self.border is None else self.border
+        new = np.flatnonzero(was < 0)
         now = np.full(self.elements.n, -1)
         now[was[was >= 0]] = np.flatnonzero(was >= 0)
         at = np.where(border.at >= 0, now[border.at], -1)
@@ -88,68 +123,34 @@ class Bordered:
         added = np.concatenate([now[border.added[survives]], new])
         stays = np.flatnonzero(np.repeat(survives, 2 * elements.per))
         old, n, n_base = len(stays), elements.per * 2 * len(added), self.base.elements.n_unknowns
-        columns, rows = compute(every, new), compute(new, every)
-        places, numbers = self.base.elements.unknowns(np.flatnonzero(at >= 0)), elements.unknowns(at[at >= 0])
-        here = elements.unknowns(added)
-        right, down, corner = np.zeros((n_base, n), order="F"), np.zeros((n, n_base)), np.empty((n, n), order="F")
-        right[:, :old], down[:old], corner[:old, :old] = (
-            border.right[:, stays],
-            border.down[stays],
-            border.corner[np.ix_(stays, stays)],
-        )
-        right[places, old:], down[old:, places] = columns[numbers], rows[:, numbers]
-        corner[:, old:], corner[old:, :old] = columns[here], rows[:, here[:old]]
+        right, down, corner = np.empty((n_base, n), order="F"), np.empty((n, n_base)), np.empty((n, n), order="F")
+        right[:, :old], down[:old] = border.right[:, stays], border.down[stays]
+        corner[:old, :old] = border.corner[np.ix_(stays, stays)]
+        if len(new):
+            every = np.arange(elements.n)
+            columns, rows = compute(every, new), compute(new, every)
+            places, numbers = self.base.elements.unknowns(np.flatnonzero(at >= 0)), elements.unknowns(at[at >= 0])
+            here = elements.unknowns(added)
+            right[:, old:] = down[old:] = 0.0
+            right[places, old:], down[old:, places] = columns[numbers], rows[:, numbers]
+            corner[:, old:], corner[old:, :old] = columns[here], rows[:, here[:old]]
         out = Bordered(elements, self.base, Border(at, added, right, down, corner))
         if self._known is not None:
             out._known = self._known.taken(stays)
         return out
-
-    def _start(self) -> Border:
-        n = self.n
-        return Border(
-            np.arange(self.elements.n), np.empty(0, int), np.empty((n, 0)), np.empty((0, n)), np.empty((0, 0))
-        )
-
-    @property
-    def worn(self) -> bool:
-        """Whether factors of all would by now have cost less."""
-        if self.border is None:
-            return False
-        n, width = self.base.elements.n_unknowns, 2 * self.elements.per
-        return width * (len(self.border.added) + int((self.border.at < 0).sum())) > WIDEST * n
-
-    def whole(self) -> Bordered:
-        """The same without border."""
-        return Bordered(self.elements, Base(self.elements, self.dense))
-
-    def renewed(self) -> Bordered:
-        """The same with a border of nothing but fresh tips, which go with the next increment."""
-        border, added = self.border, self.border.added
-        fresh = np.zeros(self.elements.n, bool)
-        fresh[added] = self.elements.kind[added] != shapes.ORDINARY
-        if not fresh.any():
-            return self.whole()
-        kept, added = np.flatnonzero(~fresh), np.flatnonzero(fresh)
-        order = np.concatenate([kept, added])
-        sorted_, width = np.empty((self.n, self.n), order="F"), 2 * self.elements.per
-        copy_blocks(self.dense, sorted_, order, order, width, width)
-        m = width * len(kept)
-        base = Base(self.elements.take(kept), np.asfortranarray(sorted_[:m, :m]))
-        border = Border(kept, added, sorted_[:m, m:], np.ascontiguousarray(sorted_[m:, :m]), sorted_[m:, m:])
-        return Bordered(self.elements, base, border)
 
     @cached_property
     def dense(self) -> np.ndarray:
         """(n, n) S, column-major."""
         border = self.border
         if border is None:
-            return self.base.matrix
+            return self.base.dense
         in_base, in_border = np.full(self.elements.n, -1), np.full(self.elements.n, -1)
         kept = border.at >= 0
         in_base[border.at[kept]] = np.flatnonzero(kept)
         in_border[border.added] = np.arange(len(border.added))
         out, width = np.empty((self.n, self.n), order="F"), 2 * self.elements.per
-        copy_blocks(self.base.matrix, out, in_base, in_base, width, width)
+        copy_blocks(self.base.dense, out, in_base, in_base, width, width)
         copy_blocks(border.right, out, in_base, in_border, width, width)
         copy_blocks(border.down, out, in_border, in_base, width, width)
         copy_blocks(border.corner, out, in_border, in_border, width, width)
@@ -223,7 +224,8 @@ class Eliminated:
         if len(new):
             unit = np.zeros((base.elements.n_unknowns, len(new)), order="F")
             # Tractions of the size of the equations that are given up, so that λ is of the size of jumps.
-            unit[new, np.arange(len(new))] = np.ldexp(1.0, np.frexp(base.matrix[new, new])[1])
+            length = np.repeat(base.elements.length, 2 * base.elements.per)[new]
+            unit[new, np.arange(len(new))] = np.ldexp(1.0, -np.frexp(length)[1])
             columns = factor.solve(unit)
             gone, lost = np.concatenate([gone, new]), np.concatenate([lost, columns], axis=1)
             dlost = np.concatenate([dlost, down @ columns], axis=1)
@@ -231,8 +233,8 @@ class Eliminated:
 
 
 class BorderedFactor:
-    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worse one of the base's and T's, ``loss`` that of
-    accuracy, as the module has it."""
+    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worst one of T and those of
+    the base, ``loss`` that of accuracy, as the module has it."""
 
     def __init__(self, of: Bordered, done: Eliminated):
         border, self._base = of.border, of.base.factor
@@ -246,7 +248,7 @@ class BorderedFactor:
         self.rcond = min(self._base.rcond, self._t.rcond)
         size = np.abs(border.down).sum(axis=1) / np.abs(t[:m]).sum(axis=1)
         across = np.abs(done.x).sum(axis=1) + np.abs(done.lost).sum(axis=1)
-        self.loss = float(size.max(initial=1.0) * across.max(initial=1.0)) / self._t.rcond
+        self.growth = float(size.max(initial=1.0) * across.max(initial=1.0)) * getattr(self._base, "growth", 1.0)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .bordered import LOSS, SINGULAR, Bordered, BorderedFactor
+from .bordered import LOSS, SINGULAR, Base, Bordered, BorderedFactor
 from .factor import Factor
 from .work import Work
 
@@ -104,12 +104,12 @@ class CrackSystem:
             try:
                 self._work.crack_borderings += 1
                 factor = self.matrix.factored()
-                if factor.loss < LOSS and factor.rcond > _SAFE:
+                if factor.growth < LOSS * factor.rcond:
                     return factor
             except np.linalg.LinAlgError:
                 pass
             # Only pivoting in the whole matrix tells.
-            self.matrix = self.matrix.whole()
+            self.matrix = Bordered(self.matrix.elements, Base(self.matrix.elements, self.matrix.dense))
         try:
             self._work.crack_factorisations += 1
             factor = self.matrix.factored()
