@@ -98,7 +98,7 @@ class Body:
                 raise ValueError("supports need a body with an outline")
             self.support_segments = place(self.supports, edges, self._extent)
             marked = marks(self.supports, self.support_segments, self.loops, settings.grading_layers)
-        self.mesh: Mesh = mesh(self.loops, cracks, settings, marked)
+        self.mesh: Mesh = mesh(self.loops, cracks, settings, marked, previous.mesh if same else None)
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
         if self.outlined:

@@ -26,9 +26,9 @@ from .influence import ElementSet, copy_blocks
 
 #: A border as wide as this part of its base, and this many unknowns, becomes part of the base of another one; what is done
 #: over and over with a border (copies, T) then stays small.
-WIDEST, WIDE = 0.125, 80
+WIDEST, WIDE = 0.25, 80
 #: Borders upon borders, at which all is factored anew: every one takes its share of a solution's time.
-DEEPEST = 5
+DEEPEST = 3
 #: Fewer unknowns are factored in less time than a border takes.
 SMALLEST = 200
 #: Loss of accuracy, ‖D‖ ‖X‖ / ‖T‖ over the reciprocal condition of T, from which all is factored anew: K then still

@@ -38,12 +38,14 @@ SLIVER = 0.08
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """``boundary`` elements (source: edge) and ``cracks`` elements (source: segment); ``edges`` (m, 2, 2) the outline
-    and ``edge_loop`` (m,) the loop of each."""
+    and ``edge_loop`` (m,) the loop of each. ``sides`` are the boundary's elements before any are halved, and what of the
+    cracks they depend on."""
 
     boundary: ElementSet
     cracks: ElementSet
     edges: np.ndarray
     edge_loop: np.ndarray
+    sides: tuple[tuple, tuple[np.ndarray, ...]]
 
 
 def outline_edges(loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -55,15 +57,29 @@ def outline_edges(loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def mesh(
-    loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings, marks: Sequence[tuple[np.ndarray, int]] = ()
+    loops: list[np.ndarray],
+    cracks: Cracks,
+    settings: DdmSettings,
+    marks: Sequence[tuple[np.ndarray, int]] = (),
+    known: Mesh | None = None,
 ) -> Mesh:
     """Elements of a body with outline ``loops`` (counter-clockwise, holes clockwise; holes alone or [] for the
-    infinite plane). ``marks``: further points (2,) of the boundary that are to be nodes, with graded layers at each."""
-    edges, edge_loop = outline_edges(loops)
+    infinite plane). ``marks``: further points (2,) of the boundary that are to be nodes, with graded layers at each.
+    ``known``: a mesh of the same, but for the cracks."""
+    edges, edge_loop = outline_edges(loops) if known is None else (known.edges, known.edge_loop)
     points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
     extent = np.ptp(points, axis=0).max() if len(points) else 0.0
     grading = Grading.of(settings)
-    boundary = _boundary(loops, edges, cracks, settings, grading, extent, marks)
+    mouths = [
+        (cracks.nodes[k], _layers_at(cracks, k, edges, grading))
+        for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))
+    ]
+    key = float(extent), tuple((*point, deep) for point, deep in mouths)
+    if known is not None and known.sides[0] == key:
+        sides = known.sides
+    else:
+        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, marks)
+    boundary = sides[1]
     crack = _cracks(cracks, settings, grading, extent, edges)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
@@ -83,25 +99,21 @@ def mesh(
         ),
         edges,
         edge_loop,
+        sides,
     )  # fmt: skip
 
 
-def _boundary(loops, edges, cracks, settings, grading, extent, marks):
+def _boundary(loops, edges, mouths, settings, grading, extent, marks):
     if not len(edges):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
     spans = [math.sqrt(abs(signed_area(loop))) for loop in loops]
     if signed_area(loops[0]) > 0:
         spans = spans[:1] * len(loops)
-    mouths = [
-        (cracks.nodes[k], _layers_at(cracks, k, edges, grading))
-        for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))
-    ]
-    mouths += marks
     angles = np.concatenate([interior_angles(loop) for loop in loops])
     corner = [grading.at_corner(angle) for angle in angles]
     if grading.target is not None:
-        for point, deep in mouths:
+        for point, deep in [*mouths, *marks]:
             for k in np.flatnonzero(np.hypot(*(edges[:, 0] - point).T) <= 1e-7 * max(spans)):
                 corner[k] = deep
     for point, deep in marks:
@@ -122,7 +134,7 @@ def _boundary(loops, edges, cracks, settings, grading, extent, marks):
                 grading,
                 extent,
             )
-            lines.append(_with_mouths(edges[edge], fractions, mouths, grading, span, extent))
+            lines.append(_with_mouths(edges[edge], fractions, [*mouths, *marks], grading, span, extent))
         for i in np.flatnonzero(np.abs(angles[first[k] : first[k + 1]] - np.pi) < STRAIGHT):
             before, after = first[k] + (i - 1) % n_edges, first[k] + i
             lines[before], lines[after] = _evened(lines[before], lines[after], grading.ratio)
