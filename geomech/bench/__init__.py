@@ -11,6 +11,7 @@ TOPICS = {
     "ddm": "geomech.bench.work_precision",
     "kernels": "geomech.bench.kernels",
     "many": "geomech.bench.many_cracks",
+    "stability": "geomech.bench.stability",
     "startup": "geomech.bench.startup",
 }
 
