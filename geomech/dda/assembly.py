@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from ..model import OPEN, SLIP, STICK
-from .multifrontal import BlockSolver
+from .block_solver import BlockSolver
 
 #: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60

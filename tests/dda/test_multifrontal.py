@@ -6,8 +6,8 @@ from scipy.sparse import bsr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 
-from geomech.dda import multifrontal
-from geomech.dda.multifrontal import BlockSolver
+from geomech.dda import dissection, multifrontal
+from geomech.dda.block_solver import BlockSolver
 
 
 def springs_between(n, seed, islands=False):
@@ -91,7 +91,7 @@ def test_singular_matrix_is_refused():
 
 def test_every_block_is_eliminated_once_and_reaches_upwards_only():
     points, rows, columns, _ = springs_between(500, seed=7)
-    tree = multifrontal.plan(points, rows, columns)
+    tree = dissection.plan(points, rows, columns)
     assert np.array_equal(np.sort(tree.rank), np.arange(500))
     for f, parent in enumerate(tree.parent):
         reached = tree.boundary[tree.reach[f] : tree.reach[f + 1]]
@@ -99,4 +99,4 @@ def test_every_block_is_eliminated_once_and_reaches_upwards_only():
         assert parent == -1 or parent > f
         assert len(reached) == 0 or parent >= 0
     # A plane graph of n blocks falls apart at separators of √n blocks or so; the fill stays within a few n log n.
-    assert tree.x[-1] / 36 < 2.5 * 500 * np.log2(500)
+    assert np.diff(tree.pivots) @ np.diff(tree.reach) < 2.5 * 500 * np.log2(500)

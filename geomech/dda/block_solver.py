@@ -1,0 +1,156 @@
+"""Solutions of one 6×6-block system after another, each with no more work than its difference from the last asks for.
+
+A factorisation outlives its matrix: where a few springs have changed since, or blocks have hardly moved, it preconditions
+GMRES (Saad & Schultz 1986), which then needs a solution or two for every spring that changed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .multifrontal import Factors
+
+_jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+
+#: The largest residual of a solution, relative to the largest right-hand side, …
+RESIDUAL = 1e-12
+#: … or to the largest Σ|A||x| of a row, below which it is round-off.
+ROUND_OFF = 2e-15
+#: Refinements of a solution at most.
+REFINEMENTS = 3
+#: A kept factorisation is tried when no more 6×6 diagonal blocks than this have changed since by more than ``CHANGED``, …
+FEW = 12
+CHANGED = 1e-3
+#: … and given up after so many solutions: with a fresh one they would cost as much.
+TRIES = 16
+
+
+@_jit
+def multiply(data, pointer, columns, x):
+    """A x for 6×6 blocks stored row by row, and the largest Σ|A||x| of a row."""
+    n = len(pointer) - 1
+    out = np.zeros(6 * n)
+    size = 0.0
+    for i in range(n):
+        for a in range(6):
+            total, absolute = 0.0, 0.0
+            for k in range(pointer[i], pointer[i + 1]):
+                for c in range(6):
+                    term = data[36 * k + 6 * a + c] * x[6 * columns[k] + c]
+                    total += term
+                    absolute += abs(term)
+            out[6 * i + a] = total
+            size = max(size, absolute)
+    return out, size
+
+
+class BlockSolver:
+    """Solves A x = b for one pattern of 6×6 blocks and matrices that change from time to time.
+
+    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both triangles
+    and the diagonal, sorted by row then column. The order of elimination is internal. ``counts`` tells what was done.
+    """
+
+    def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray):
+        self.n = len(points)
+        self.keys = rows * self.n + columns
+        self.pointer, self.columns = np.searchsorted(rows, np.arange(self.n + 1)), columns
+        self._diagonal = np.flatnonzero(rows == columns)
+        self._factors = Factors(points, rows, columns)
+        self._factored: np.ndarray | None = None
+        self.counts = {"factorisations": 0, "substitutions": 0}
+
+    def holds(self, keys: np.ndarray) -> bool:
+        """Whether the pattern has the blocks ``keys`` = row · n + column."""
+        return bool((self.keys[self.entry(keys) % len(self.keys)] == keys).all())
+
+    def entry(self, keys: np.ndarray) -> np.ndarray:
+        """The number of each of the matrix blocks ``keys``."""
+        return np.searchsorted(self.keys, keys)
+
+    def solve(self, data: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row. Raises numpy.linalg.LinAlgError."""
+        if self._near(data):
+            x = self._iterate(data, right)
+            if x is not None:
+                return x
+        self.factor(data)
+        x = self.substitute(right)
+        for _ in range(REFINEMENTS):
+            rest, target = self._residual(data, right, x)
+            if not np.abs(rest).max() > target:
+                break
+            x += self.substitute(rest)
+        return x
+
+    def _residual(self, data: np.ndarray, right: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """b − A x, and how large its largest entry may be."""
+        product, size = multiply(data, self.pointer, self.columns, x)
+        return right - product, max(RESIDUAL * float(np.abs(right).max(initial=0.0)), ROUND_OFF * size)
+
+    def factor(self, data: np.ndarray) -> None:
+        """Factor the matrix of ``data``. Raises numpy.linalg.LinAlgError when it is singular."""
+        self._factored = None
+        self._factors.factor(data)
+        self._factored = self._diagonal_of(data)
+        self.counts["factorisations"] += 1
+
+    def substitute(self, right: np.ndarray) -> np.ndarray:
+        """The solution of the factored system for ``right`` (6n,)."""
+        self.counts["substitutions"] += 1
+        return self._factors.substitute(right)
+
+    def multiply(self, data: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The product with the matrix of ``data``."""
+        return multiply(data, self.pointer, self.columns, x)[0]
+
+    def _diagonal_of(self, data: np.ndarray) -> np.ndarray:
+        """(n, 36) the diagonal blocks of ``data``."""
+        return data[36 * self._diagonal[:, None] + np.arange(36)]
+
+    def _near(self, data: np.ndarray) -> bool:
+        """Whether the kept factorisation is of nearly the same matrix."""
+        if self._factored is None:
+            return False
+        now = self._diagonal_of(data)
+        change = np.abs(now - self._factored).max(axis=1)
+        return int((change > CHANGED * np.abs(now).max(axis=1)).sum()) <= FEW
+
+    def _iterate(self, data: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+        """GMRES with the kept factorisation on the right; None when it takes too long."""
+        x = self.substitute(right)
+        for _ in range(3):
+            rest, target = self._residual(data, right, x)
+            if not np.abs(rest).max() > target:
+                return x
+            step = self._krylov(data, rest, target)
+            if step is None:
+                return None
+            x += step
+        return None
+
+    def _krylov(self, data: np.ndarray, rest: np.ndarray, target: float) -> np.ndarray | None:
+        """The correction that brings ``rest`` down to ``target``, None if it would take more than ``TRIES`` solutions."""
+        size = float(np.linalg.norm(rest))
+        basis, directions = [rest / size], []
+        hessenberg = np.zeros((TRIES + 1, TRIES))
+        first = np.zeros(TRIES + 1)
+        first[0] = size
+        for k in range(TRIES):
+            directions.append(self.substitute(basis[-1]))
+            v = self.multiply(data, directions[-1])
+            for _ in range(2):  # twice is enough for orthogonality to round-off
+                for i, q in enumerate(basis):
+                    share = float(q @ v)
+                    hessenberg[i, k] += share
+                    v -= share * q
+            hessenberg[k + 1, k] = np.linalg.norm(v)
+            part = hessenberg[: k + 2, : k + 1]
+            y, *_ = np.linalg.lstsq(part, first[: k + 2], rcond=None)
+            left = float(np.linalg.norm(first[: k + 2] - part @ y))
+            # Restarted, the next round would bring down what this one leaves; it need not go below a millionth.
+            if left <= max(target, 1e-6 * size) or hessenberg[k + 1, k] == 0.0:
+                return np.column_stack(directions) @ y
+            basis.append(v / hessenberg[k + 1, k])
+        return None

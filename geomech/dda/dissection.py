@@ -1,0 +1,200 @@
+"""The order in which a plane system of blocks is eliminated: nested dissection into fronts (George 1973).
+
+Blocks touch their neighbours in a plane, so a line of blocks parts a system in two halves that know nothing of each
+other, and each half again. Eliminated leaves first and separators last, the matrix fills in as little as it can. A *front*
+holds the rows of its own blocks and of those to which its elimination reaches (Duff & Reid 1983).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Blocks in a leaf of the dissection: smaller ones cost more calls, larger ones more arithmetic (measured on walls).
+LEAF = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """The order of elimination. Fronts stand in postorder, blocks are numbered as they are eliminated.
+
+    rank          (n_blocks,)     the number of each block as given
+    pivots        (n_fronts + 1,) first own block of every front
+    parent        (n_fronts,)     −1 for a root
+    reach         (n_fronts + 1,) first entry of every front in ``boundary``
+    boundary      (…,)            blocks that a front's elimination reaches, ascending
+    seat          (…,)            where each of them stands in the parent's front
+    entries       (n_fronts + 1,) first matrix block of every front in ``entry``
+    entry, row, column            the matrix block, and where it stands in the front
+    stack         (n_fronts,)     where the front leaves its S
+    at            (n_fronts + 1,) first entry of every front's factor
+    pieces        (k, 2)          ranges of fronts that are independent of one another
+    waves         arrays of fronts that need those before, and none of their own
+    """
+
+    rank: np.ndarray
+    pivots: np.ndarray
+    parent: np.ndarray
+    reach: np.ndarray
+    boundary: np.ndarray
+    seat: np.ndarray
+    entries: np.ndarray
+    entry: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    stack: np.ndarray
+    stack_size: int
+    at: np.ndarray
+    pieces: np.ndarray
+    waves: tuple[np.ndarray, ...]
+
+
+def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """The blocks of every front and (n_fronts,) its parent, in postorder; ``points`` (n, 2) lie where the blocks do.
+
+    Halved at the median of the longer side; the separator is the smaller of the two rows of blocks along the cut.
+    """
+    side = np.zeros(len(points), np.int8)
+    fronts: list[np.ndarray] = []
+    parent: list[int] = []
+    # (blocks, None) is still to be divided, (separator, number of children) is a front whose children are done.
+    work: list[tuple[np.ndarray, int | None]] = [(np.arange(len(points)), None)]
+    done: list[int] = []
+    while work:
+        blocks, children = work.pop()
+        if children is None and len(blocks) > LEAF:
+            at = points[blocks]
+            along = at[:, int(np.argmax(np.ptp(at, axis=0)))]
+            half = np.argpartition(along, len(blocks) // 2)
+            first, second = blocks[half[: len(blocks) // 2]], blocks[half[len(blocks) // 2 :]]
+            side[first], side[second] = 1, 2
+            cut_first, cut_second = (
+                _meets(first, 2, side, pointer, neighbour),
+                _meets(second, 1, side, pointer, neighbour),
+            )
+            side[blocks] = 0
+            if cut_first.sum() < cut_second.sum():
+                separator, first = first[cut_first], first[~cut_first]
+            else:
+                separator, second = second[cut_second], second[~cut_second]
+            halves = [half for half in (first, second) if len(half)]
+            work.append((separator, len(halves)))
+            work += [(half, None) for half in halves]
+            continue
+        for _ in range(children or 0):
+            parent[done.pop()] = len(fronts)
+        done.append(len(fronts))
+        fronts.append(blocks)
+        parent.append(-1)
+    return fronts, np.array(parent, dtype=np.int64)
+
+
+def _around(blocks: np.ndarray, pointer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of all neighbours of ``blocks`` in the list of neighbours, and where each block's begin among them."""
+    count = pointer[blocks + 1] - pointer[blocks]
+    first = np.cumsum(count) - count
+    return np.repeat(pointer[blocks] - first, count) + np.arange(count.sum()), first
+
+
+def _meets(blocks: np.ndarray, other: int, side: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> np.ndarray:
+    """(n,) whether each of ``blocks`` has a neighbour on the ``other`` side. Every block is its own neighbour."""
+    at, first = _around(blocks, pointer)
+    return np.logical_or.reduceat(side[neighbour[at]] == other, first)
+
+
+def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
+    """The tree for matrix blocks at (``rows``, ``columns``), both triangles and the diagonal, sorted by row then column."""
+    n = len(points)
+    pointer = np.searchsorted(rows, np.arange(n + 1))
+    fronts, parent = dissect(points, pointer, columns)
+    n_fronts = len(fronts)
+    rank = np.empty(n, np.int64)
+    rank[np.concatenate(fronts)] = np.arange(n)
+    pivots = np.cumsum([0, *map(len, fronts)])
+    reached: list[np.ndarray] = []
+    children: list[list[int]] = [[] for _ in range(n_fronts)]
+    for f, blocks in enumerate(fronts):
+        met = [reached[c] for c in children[f]]
+        if len(blocks):
+            met.append(rank[columns[_around(blocks, pointer)[0]]])
+        met = np.unique(np.concatenate(met))
+        reached.append(met[met >= pivots[f + 1]])
+        if parent[f] >= 0:
+            children[parent[f]].append(f)
+    own, far = np.diff(pivots), np.array([len(r) for r in reached])
+    reach = np.concatenate([[0], np.cumsum(far)])
+    boundary = np.concatenate(reached)
+
+    def seats(f: int, blocks: np.ndarray) -> np.ndarray:
+        """Where ``blocks`` stand in front ``f``: its own first, then its boundary."""
+        mine = blocks < pivots[f + 1]
+        return np.where(mine, blocks - pivots[f], own[f] + np.searchsorted(reached[f], blocks))
+
+    seat = np.full(len(boundary), -1)
+    for f in np.flatnonzero(parent >= 0):
+        seat[reach[f] : reach[f + 1]] = seats(parent[f], reached[f])
+    row, column = rank[rows], rank[columns]
+    # A front without blocks of its own begins where the next one does: the last that begins there owns them.
+    front = np.searchsorted(pivots, np.minimum(row, column), side="right") - 1
+    entry = np.argsort(front, kind="stable")
+    entries = np.searchsorted(front[entry], np.arange(n_fronts + 1))
+    for f in range(n_fronts):
+        here = entry[entries[f] : entries[f + 1]]
+        row[here], column[here] = seats(f, row[here]), seats(f, column[here])
+    pieces, waves = _independent(parent, own, far)
+    stack, stack_size = _stacked(children, far, pieces, waves)
+    return Tree(
+        rank=rank,
+        pivots=pivots,
+        parent=parent,
+        reach=reach,
+        boundary=boundary,
+        seat=seat,
+        entries=entries,
+        entry=entry,
+        row=row[entry],
+        column=column[entry],
+        stack=stack,
+        stack_size=stack_size,
+        at=36 * np.concatenate([[0], np.cumsum(own * (own + 2 * far))]),
+        pieces=pieces,
+        waves=waves,
+    )
+
+
+def _independent(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """Subtrees, as ranges of fronts in postorder, none of which holds more than an eighth of the arithmetic; and the fronts
+    above them, those first whose children are."""
+    cost = own * (own + far) ** 2.0
+    first = np.arange(len(parent))
+    for f, p in enumerate(parent):
+        if p >= 0:
+            cost[p] += cost[f]
+            first[p] = min(first[p], first[f])
+    high = cost > cost[parent < 0].sum() / 8
+    tops = np.flatnonzero(~high & ((parent < 0) | high[parent]))
+    height = np.zeros(len(parent), np.int64)
+    for f in np.flatnonzero(high & (parent >= 0)):
+        height[parent[f]] = max(height[parent[f]], height[f] + 1)
+    above = np.flatnonzero(high)
+    waves = tuple(above[height[above] == k] for k in range(int(height[above].max(initial=-1)) + 1))
+    return np.stack([first[tops], tops + 1], axis=1), waves
+
+
+def _stacked(
+    children: list[list[int]], far: np.ndarray, pieces: np.ndarray, waves: tuple[np.ndarray, ...]
+) -> tuple[np.ndarray, int]:
+    """Where each front leaves its S, and the room that takes: children's are cleared as they are used, except by fronts
+    that are eliminated at the same time."""
+    at = np.zeros(len(far), np.int64)
+    base = 0
+    for fronts in [*(range(a, b) for a, b in pieces), *([f] for wave in waves for f in wave)]:
+        top, used, here = base, base, set(fronts)
+        for f in fronts:
+            top = min([top, *(at[c] for c in children[f] if c in here)])
+            at[f] = top
+            top += 36 * far[f] ** 2
+            used = max(used, top)
+        base = used
+    return at, int(base)
