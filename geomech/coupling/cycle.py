@@ -65,6 +65,7 @@ class Coupling:
         self.compliances: dict[int, tuple] = {}
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
+        self.budget = dda.EnergyBudget()
         self._take_blocks()
 
     # -- the generator -------------------------------------------------------------------------------------------
@@ -116,7 +117,8 @@ class Coupling:
                 tips["grown"] = growth.grown
                 events += self._initiations(tips, result.state)
                 stops = self._stops(events)
-            statistics = {**result.statistics, **mismatch}
+            budget = self.budget.after(result.energy, result.state.time)
+            statistics = {**result.statistics, **budget.statistics(), **mismatch}
             yield self._record(result.state, tips, solutions, events, growth_pass, statistics)
             if growth is None:
                 if not may_grow:
@@ -125,7 +127,7 @@ class Coupling:
                         self.number,
                         growth_pass,
                     )
-                self.state = result.state
+                self.state, self.budget = result.state, budget
                 self.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
                 return stops
             pending = self._take_growth(growth, result, solutions)
@@ -316,6 +318,7 @@ class Coupling:
         parents = enumerate(split.parent.tolist())
         self.history = {child: self.history[parent] for child, parent in parents if parent in self.history}
         self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
+        self.budget = self.budget.cut()
         self._take_blocks()
 
     def _mean_stress(self, solutions: dict):

@@ -9,6 +9,7 @@
 """
 
 from .basis import displacement_matrix
+from .energy import EnergyBudget, StepEnergy
 from .force_rows import EDGE_FORCE, POINT_FORCE
 from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
@@ -22,7 +23,9 @@ __all__ = [
     "AppliedForces",
     "BlockSystem",
     "CrackResponse",
+    "EnergyBudget",
     "NotConverged",
+    "StepEnergy",
     "StepResult",
     "TimeScheme",
     "block_moments",

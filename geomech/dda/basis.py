@@ -1,9 +1,8 @@
-"""First-order displacement of a block, and the energy of its motion and strain."""
+"""First-order displacement of a block: its unknowns, and points that follow them."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 
 def displacement_matrix(points: np.ndarray, centroid: np.ndarray) -> np.ndarray:
@@ -30,22 +29,3 @@ def material_weights(loop_vertices: np.ndarray, point: np.ndarray) -> np.ndarray
     size = np.ptp(loop_vertices, axis=0).max()
     system = np.vstack([np.ones(len(loop_vertices)), ((loop_vertices - origin) / size).T])
     return np.linalg.lstsq(system, np.array([1.0, *((point - origin) / size)]), rcond=None)[0]
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def energies(velocity, stress, compliance, density, moments, fixed):
-    """(kinetic, elastic) energy of all blocks, J/m: ½ ∫ρ|u̇|² of the linear velocity field, ½ A σ·C⁻¹σ."""
-    kinetic = elastic = 0.0
-    for b in range(velocity.shape[0]):
-        area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
-        for k in range(3):
-            for m in range(3):
-                elastic += 0.5 * area * stress[b, k] * compliance[b, k, m] * stress[b, m]
-        if fixed[b]:
-            continue
-        u, v, ex, ey = velocity[b, 0], velocity[b, 1], velocity[b, 3], velocity[b, 4]
-        # u̇ = (u + ex x + p y, v + q x + ey y)
-        p, q = 0.5 * velocity[b, 5] - velocity[b, 2], 0.5 * velocity[b, 5] + velocity[b, 2]
-        square = area * (u * u + v * v) + (ex * ex + q * q) * xx + (p * p + ey * ey) * yy + 2 * (ex * p + q * ey) * xy
-        kinetic += 0.5 * density[b] * square
-    return kinetic, elastic

@@ -198,6 +198,11 @@ class ContactFinder:
                 for name in ("slip", "wear", "lift"):
                     remembered[name][c] = row[name]
 
+    @property
+    def closure(self) -> np.ndarray:
+        """(n_laws,) m: the closure that each law tends to; infinite for a straight spring."""
+        return self._table.closure
+
     def curved(self, found: ContactSet) -> CurvedJoints | None:
         """The contacts of ``found`` whose laws are no straight lines; None where there are none."""
         if not (self._table.curved.any() and self._table.curved[found.law].any()):

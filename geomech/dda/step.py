@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..model import OPEN, State
+from .energy import StepEnergy
 from .loads import AppliedForces
 
 
@@ -42,9 +43,10 @@ class StepResult:
     contacts       CONTACT rows on the geometry on which equilibrium was assembled, with the converged forces
     forces         whatever else acted, on the same geometry
     acceleration   (n_blocks, 6) mean of the unknowns over the step, with what mass-proportional damping adds
+    energy         the terms of the step's energy balance
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
                    worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
-                   motion over the largest force in them)
+                   motion over the largest force in them), unbalanced_ratio (0 at rest, 1 in free flight: see `imbalance`)
     """
 
     state: State
@@ -52,6 +54,7 @@ class StepResult:
     contacts: np.ndarray
     forces: AppliedForces
     acceleration: np.ndarray
+    energy: StepEnergy
     statistics: dict[str, float] = field(default_factory=dict)
 
 

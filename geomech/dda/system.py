@@ -9,10 +9,11 @@ import numpy as np
 
 from ..model import OPEN, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
-from .basis import energies
 from .contact_springs import end_of_step, over_a_step
-from .contacts import ContactFinder, ContactSet
+from .contacts import ContactFinder
+from .energy import StepEnergy, step_energies
 from .held import balanced, hold, with_rigid_motion
+from .imbalance import imbalance
 from .loads import AppliedForces, Inertia, LoadMap, generalised
 from .moments import block_moments
 from .open_close import Settled, Unsettled, settle
@@ -245,8 +246,21 @@ class BlockSystem:
         )  # fmt: skip
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
         velocity, kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
-        kinetic, elastic = energies(velocity, new_stress, self.compliance, density, moments, self._fixed)
         end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, weight)
+        energy = StepEnergy._make(
+            step_energies(
+                increment, state.velocity, carried, velocity, acceleration, dt, gravity, load, scheme.weight,
+                scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, density, moments, self._fixed, stress,
+                tangent, stress0, self.compliance, self._stiffness, found.state, settled.state, found.bonded, settled.bonded,
+                found.gap, settled.gap, settled.lifted, settled.slip, settled.normal_force, found.shear,
+                settled.shear_force, end_shear, found.springs.normal, settled.springs.shear,
+                weight if isinstance(weight, np.ndarray) else np.full(len(found), weight), found.law, self._finder.closure,
+            ).tolist()
+        )  # fmt: skip
+        residual, ratio = imbalance(
+            matrix, right, vectors, found.block, found.other, order, settled.unknowns, settled.normal_force,
+            settled.shear_force, acceleration, density, moments, gravity, load,
+        )  # fmt: skip
 
         rows = found.rows(settled)
         if scheme.mass_damping:
@@ -272,15 +286,15 @@ class BlockSystem:
             "open_close_iterations": settled.iterations,
             "dt": dt,
             "step_cuts": cuts,
-            "kinetic_energy": kinetic,
-            "elastic_energy": elastic,
-            "contact_energy": 0.5
-            * float((closed * (settled.gap**2 * found.springs.normal + end_shear**2 / found.springs.shear)).sum()),
+            "kinetic_energy": energy.kinetic,
+            "elastic_energy": energy.elastic,
+            "contact_energy": energy.contact,
             "worst_penetration": _deepest(closed, found.gap, settled.gap),
             "max_displacement_ratio": largest / self.half_height,
-            "unbalanced": _unbalanced(matrix, right, vectors, found, order, settled),
+            "unbalanced": residual,
+            "unbalanced_ratio": ratio,
         }
-        return StepResult(new_state, dt, rows, forces, acceleration, statistics), largest
+        return StepResult(new_state, dt, rows, forces, acceleration, energy, statistics), largest
 
 
 def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
@@ -289,22 +303,6 @@ def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float
     An open one whose vertex is behind its edge's line has a partner line that is not crossed: nothing penetrates there.
     """
     return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0
-
-
-def _unbalanced(matrix, right, vectors, found: ContactSet, order, settled: Settled) -> float:
-    """Largest residual of the equations of motion, contact forces as reported, over the largest force among them."""
-    if len(right) == 0:
-        return 0.0
-    own = np.einsum("bij,bj->bi", matrix, settled.unknowns)
-    residual = np.vstack([right - own, np.zeros((1, 6))])
-    scale = max(float(np.abs(right).max()), float(np.abs(own).max()))
-    if len(found):
-        push = settled.normal_force[:, None] * vectors[:, 0] + settled.shear_force[:, None] * vectors[:, 1]
-        # Fixed blocks have order −1: their share lands in the spare last row.
-        np.add.at(residual, order[found.block], push[:, :6])
-        np.add.at(residual, order[found.other], push[:, 6:])
-        scale = max(scale, float(np.abs(push).max()))
-    return float(np.abs(residual[:-1]).max()) / scale if scale > 0 else 0.0
 
 
 def run(
