@@ -175,7 +175,7 @@ def test_toppling_slope_limit_friction(youngs_modulus):
     found = limit(lambda f: creep(toppling(f, youngs_modulus), start) < 2e-4, 0.72, 0.9, 9)
     print(f"E = {youngs_modulus:.0e} Pa: limit tan φ = {found:.4f}, published {toppling_slope.LIMIT_FRICTION}")
     # Columns tilt by their elastic give, W/E', and their thrusts grow with it: first order in 1/E.
-    assert found == pytest.approx(toppling_slope.LIMIT_FRICTION, abs=8e-4 + 5e7 / youngs_modulus)
+    assert found == pytest.approx(toppling_slope.LIMIT_FRICTION, abs=1.2e-3 + 5e7 / youngs_modulus)
 
 
 def test_toppling_slope_carries_the_published_forces():
