@@ -1,0 +1,232 @@
+"""Joint laws against published values and closed laws: direct shear under constant load and constant stiffness, sliding
+that weakens, faces that close."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.dda.curved_joints import rough_strength
+from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, Roughness, State
+from geomech.reference import block_motion, joints
+
+YOUNGS_MODULUS, POISSON = 50e9, 0.25
+#: Two penalty springs hold the block on the joint.
+PENALTY = 2 * 40 * YOUNGS_MODULUS / (1 - POISSON**2)
+ANGLE, RESIDUAL = math.radians(40), math.radians(30)
+ROUGH = Roughness(10.0, 50e6)
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
+
+
+def direct_shear(law: JointLaw, pressure=1e6, travel=0.02, n=100, wall=None, back=False):
+    """A 1 m block pressed on a joint and pushed along it by a heavy ram of constant speed, against a frictionless ``wall``
+    (Pa/m) above it if one is given. Per step: shear and normal force N, slip, wear, lift, gap m; mean iterations."""
+    polygons = [rectangle(-1, -0.5, 2, 0), rectangle(0, 0, 1, 0.5), rectangle(-0.5, 0.1, 0, 0.4)]
+    names = [[["", "", "joint", ""]], [["joint", "side", "top", "side"]], [[""] * 4]]
+    laws = [JointLaw("greased"), law]
+    held = [[False] * 6, [False, False] + [True] * 4, [False] + [True] * 5]
+    fixed = [True, False, False]
+    if wall is not None:
+        polygons.append(rectangle(-1, 0.5, 2, 1))
+        names.append([["wall", "", "", ""]])
+        laws.append(JointLaw("wall", normal_stiffness=wall))
+        held.append([False] * 6)
+        fixed.append(True)
+
+    def index(a, b):
+        return 2 if "wall" in (a, b) else int("joint" in (a, b) and "top" not in (a, b))
+
+    blocks = Blocks.from_polygons(
+        polygons, fixed=fixed, edge_names=names, held=held, material=[0, 0, 1] + [0] * (len(polygons) - 3)
+    )
+    materials = [Material(name, YOUNGS_MODULUS, POISSON, density=d) for name, d in (("light", 1.0), ("ram", 1e12))]
+    settings = DdaSettings(
+        dynamic_factor=1.0, damping=0.0, max_displacement_ratio=0.5,
+        normal_penalty=PENALTY / 2, shear_penalty=PENALTY / 2,
+    )  # fmt: skip
+    static = dda.BlockSystem(blocks, materials, laws, index, dataclasses.replace(settings, dynamic_factor=0.0))
+    system = dda.BlockSystem(blocks, materials, laws, index, settings)
+    loads = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.0, -pressure])),))
+    state = static.step(static.step(State.at_rest(blocks), loads, 1e3).state, loads, 1e3).state
+    state.velocity[:] = 0.0
+    state.velocity[2, 0] = travel
+    rows, iterations = [], []
+    for step in range(n):
+        result = system.step(state, loads, 1.0 / n)
+        assert result.statistics["step_cuts"] == 0
+        state = result.state
+        c = result.contacts[result.contacts["law"] == 1]
+        assert c["lift"].std() < 1e-12
+        rows.append(
+            [abs(c["shear_force"].sum()), c["normal_force"].sum()]
+            + [float(np.abs(c[name]).mean()) for name in ("slip", "wear", "lift")]
+            + [float(c["gap"].mean())]
+        )
+        iterations.append(result.statistics["open_close_iterations"])
+    return np.array(rows).T, float(np.mean(iterations))
+
+
+def test_rough_strength_is_the_published_table():
+    # Three decimals are printed.
+    angle, jrc, jcs = joints.ROUGH_JOINT_EXAMPLE
+    pressure, expected, slope, cohesion = joints.ROUGH_JOINT_TABLE.T
+    full, n = 1e6 * pressure, len(pressure)
+    strength, tangent, _ = rough_strength(full, np.full(n, jrc), np.full(n, jcs), np.full(n, angle))
+    # The table's normal stresses are printed to three decimals too: 5e-4 of 0.36 MPa moves the rest by as much again.
+    assert strength / 1e6 == pytest.approx(expected, abs=1.5e-3)
+    assert tangent == pytest.approx(slope, abs=1.5e-3)
+    assert (strength - tangent * full) / 1e6 == pytest.approx(cohesion, abs=1.5e-3)
+    h = 1e-3 * full
+    either = [rough_strength(p, np.full(n, jrc), np.full(n, jcs), np.full(n, angle))[0] for p in (full - h, full + h)]
+    # The first row stands just below the limit of 70°, where the law has a corner.
+    assert tangent[1:] == pytest.approx(((either[1] - either[0]) / (2 * h))[1:], rel=1e-5)
+
+
+def test_rough_strength_is_limited_at_both_ends():
+    one = np.ones(3)
+    strength, slope, dilation = rough_strength(np.array([0.0, 1.0, 1e9]), 20 * one, 1e8 * one, RESIDUAL * one)
+    assert strength[:2] == pytest.approx([0.0, math.tan(math.radians(joints.STEEPEST_ANGLE_DEG))])
+    assert strength[2] == pytest.approx(1e9 * math.tan(RESIDUAL)) and dilation[2] == 0
+    assert slope == pytest.approx(strength / [1.0, 1.0, 1e9], abs=3.0) and slope[1] == pytest.approx(strength[1])
+
+
+def test_roughness_of_long_joints():
+    # Barton & Bandis (1982): JRC 15, JCS 100 MPa of 0.1 m samples on a joint of 1 m.
+    long = Roughness(15.0, 100e6, length=1.0)
+    assert long.jrc_in_place == pytest.approx(15 * 10**-0.3)
+    assert long.jcs_in_place == pytest.approx(100e6 * 10**-0.45)
+    assert long.peak_slip == pytest.approx(1 / 500 * (15 * 10**-0.3) ** 0.33)
+
+
+@pytest.mark.parametrize("softening", [0.0, 5e-3])
+def test_direct_shear_falls_from_peak_to_residual(softening):
+    law = JointLaw(
+        "weakens", ANGLE, cohesion=1e5, residual_friction_angle=RESIDUAL, residual_cohesion=2e4,
+        softening_slip=softening,
+    )  # fmt: skip
+    (shear, normal, slip, _, _, _), iterations = direct_shear(law)
+    left = np.clip(1 - slip / softening, 0, 1) if softening else 0.0
+    expected = (math.tan(RESIDUAL) + (math.tan(ANGLE) - math.tan(RESIDUAL)) * left) * normal + 2e4 + 8e4 * left
+    # The law holds to what open–close iterations agree to.
+    assert shear == pytest.approx(expected, rel=2e-8)
+    assert normal == pytest.approx(np.full(len(normal), 1e6), rel=1e-6)
+    assert iterations < 2
+
+
+@pytest.mark.parametrize("wall", [None, 2e9])
+def test_direct_shear_with_dilation_up_to_a_critical_slip(wall):
+    slope = math.tan(math.radians(10))
+    law = JointLaw("dilates", ANGLE, dilation_angle=math.radians(10), dilation_slip=8e-3)
+    (shear, normal, slip, _, lift, gap), _ = direct_shear(law, wall=wall)
+    assert lift == pytest.approx(slope * np.minimum(slip, 8e-3), rel=1e-7)
+    assert shear == pytest.approx(math.tan(ANGLE) * normal, rel=1e-8)
+    # The wall is pressed by the lift less the closure of the joint's own springs, N/k. The block's inertia, though light,
+    # is a millionth of the load.
+    wall = wall or 0.0
+    assert normal == pytest.approx((1e6 + wall * lift) / (1 + wall / PENALTY), rel=2e-6)
+    assert gap == pytest.approx(-normal / PENALTY, rel=1e-6)
+
+
+def test_direct_shear_of_a_rough_joint_at_constant_load():
+    (shear, normal, slip, _, lift, _), iterations = direct_shear(JointLaw("rough", RESIDUAL, roughness=ROUGH))
+    decay = np.interp(1 + slip / ROUGH.peak_slip, [1, 2, 4, 10, 25, 100], [1, 0.85, 0.7, 0.5, 0.4, 0])
+    expected = [joints.barton_strength(n, 10 * d, 50e6, RESIDUAL) for n, d in zip(normal, decay, strict=True)]
+    assert shear == pytest.approx(np.array(expected), rel=2e-8)
+    assert iterations < 5
+    # Peak at the first slip, dilation as published: half of what roughness adds to the angle.
+    peak = math.tan(0.5 * math.radians(10 * math.log10(50)))
+    assert lift[0] / slip[0] == pytest.approx(peak, rel=0.02)
+
+
+def test_direct_shear_of_a_rough_joint_at_constant_stiffness_converges():
+    # Against the integrated law; the lift of a step is taken at the pressure of its end: first order.
+    wall, errors = 2e9, []
+    stiffness = 1 / (1 / wall + 1 / PENALTY)
+    for n in (25, 50, 100):
+        (_, _, slip, _, lift, _), _ = direct_shear(JointLaw("rough", RESIDUAL, roughness=ROUGH), wall=wall, n=n)
+        exact = joints.lift_at_constant_stiffness(slip, 10.0, 50e6, 1e6, stiffness, ROUGH.peak_slip)
+        errors.append(abs(lift[-1] / exact[-1] - 1))
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    print(f"lift after 20 mm against a wall: errors {errors}, orders {orders}")
+    assert errors[-1] < 5e-3
+    assert (orders > 0.8).all()
+
+
+def test_stiffness_from_the_slip_of_the_peak():
+    rough = Roughness(10.0, 50e6, length=1.0, from_peak_slip=True)
+    (shear, normal, slip, _, _, _), _ = direct_shear(JointLaw("rough", RESIDUAL, roughness=rough))
+    peak = joints.barton_strength(normal[0], rough.jrc_in_place, rough.jcs_in_place, RESIDUAL)
+    moved = 0.02 / 100 * np.arange(1, 101)
+    sticks = moved < 0.99 * rough.peak_slip
+    # The ram loses some of its speed to the penalty spring between it and the block: parts in ten thousand.
+    assert shear[sticks] == pytest.approx(peak * moved[sticks] / rough.peak_slip, rel=1e-3)
+    assert shear.max() == pytest.approx(peak, rel=0.02)
+    assert not slip[sticks].any() and slip[-1] > 0
+
+
+def test_hyperbolic_closure():
+    # σ = kₙ δ/(1 − δ/Vm) (Bandis, Lumsden & Barton 1983), at loads up to ten times kₙ Vm.
+    law = JointLaw("closes", ANGLE, normal_stiffness=1e10, max_closure=1e-4)
+    blocks = Blocks.from_polygons(
+        [rectangle(-1, -0.5, 2, 0), rectangle(0, 0, 1, 0.5)], fixed=[True, False],
+        edge_names=[[[""] * 4], [["", "", "top", ""]]],
+    )  # fmt: skip
+    system = dda.BlockSystem(
+        blocks, [Material("rock", YOUNGS_MODULUS, 0.0)], [law], settings=DdaSettings(max_displacement_ratio=0.5)
+    )
+    for pressure in (1e4, 1e6, 1e7):
+        loads = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.0, -pressure])),))
+        result = system.step(State.at_rest(blocks), loads, 1.0)
+        assert -result.contacts["gap"] == pytest.approx(np.full(2, pressure / (1e10 + pressure / 1e-4)), rel=1e-7)
+        assert result.statistics["open_close_iterations"] <= 8
+
+
+def test_plane_failure_with_residual_strength():
+    # A slab on 35°: held by its peak while (cA + W cos α tan φ) / (W sin α) > 1 (Hoek & Bray 1981); once broken, it slides
+    # at g sin α − g cos α tan φr − cr A/m. The slab is thin, so that its weight stands evenly on both its contacts: the
+    # upper one has 0.7 % less than its half, and fails earlier by a part of that.
+    slope, gravity = math.radians(35), 9.81
+    mass = 2600.0 * 10 * 0.1
+    turn = np.array([[math.cos(slope), math.sin(slope)], [-math.sin(slope), math.cos(slope)]])
+    blocks = Blocks.from_polygons(
+        [rectangle(-20, -1, 20, 0) @ turn, rectangle(4, 0, 14, 0.1) @ turn], fixed=[True, False]
+    )
+    friction, residual = math.radians(32), math.radians(25)
+    drive = mass * gravity * math.sin(slope)
+    resting = mass * gravity * math.cos(slope) * math.tan(friction)
+    fall = Loads(gravity=History.ramp([0.0, -gravity / 100.0]))
+    for safety in (1.01, 0.995):
+        law = JointLaw(
+            "plane", friction, cohesion=(safety * drive - resting) / 10, residual_friction_angle=residual,
+            residual_cohesion=20.0,
+        )  # fmt: skip
+        system = dda.BlockSystem(
+            blocks, [Material("rock", 10e9, 0.0, density=2600.0)], [law],
+            settings=DdaSettings(dynamic_factor=0.0, max_displacement_ratio=0.05),
+        )  # fmt: skip
+        state = State.at_rest(blocks)
+        while state.time < 100.0 and not state.contacts["wear"].any():
+            state = system.step(state, fall, min(1.0, 100.0 - state.time)).state
+        assert bool(state.contacts["wear"].any()) == (safety < 1)
+    # Cohesion does not grow with the weight: half a percent of safety is five percent of weight, and the upper contact as much.
+    assert state.time > 88.0
+    moving = dda.BlockSystem(
+        blocks, [Material("rock", 10e9, 0.0, density=2600.0)], [law],
+        settings=DdaSettings(dynamic_factor=1.0, max_displacement_ratio=0.05),
+    )  # fmt: skip
+    state.velocity[:] = 0.0
+    start, began = state.vertices.copy(), state.time
+    held = Loads(gravity=History.constant([0.0, -gravity]))
+    while state.time < began + 0.5 - 1e-12:
+        state = moving.step(state, held, min(1e-3, began + 0.5 - state.time)).state
+    down = (start - state.vertices)[4:].mean(axis=0) @ [math.cos(slope), math.sin(slope)]
+    expected = 0.5 * (block_motion.incline_acceleration(slope, residual) - 20.0 * 10 / mass) * 0.25
+    # Elastic release of the joint's springs as it breaks: micrometres of a third of a metre.
+    assert down == pytest.approx(expected, rel=1e-4)
