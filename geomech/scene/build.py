@@ -25,6 +25,7 @@ from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
 from .edges import contact_names, joint_names
 from .errors import Check
+from .joints import joint_law
 from .tables import ForceTable, MaterialTable, SceneTables, TractionTable
 
 
@@ -129,16 +130,7 @@ def _joints(tables: SceneTables, drawing: Drawing) -> tuple[tuple[JointLaw, ...]
             tuple(sorted(pair)) for pair in joint.between
         ]:
             joint_of[pair] = len(laws)
-        laws.append(
-            JointLaw(
-                name,
-                friction_angle=math.radians(joint.friction_angle_deg),
-                cohesion=joint.cohesion_pa,
-                tensile_strength=joint.tensile_strength_pa,
-                normal_stiffness=joint.normal_stiffness_pa_per_m,
-                shear_stiffness=joint.shear_stiffness_pa_per_m,
-            )
-        )
+        laws.append(joint_law(name, joint))
     return tuple(laws), joint_of
 
 

@@ -8,6 +8,7 @@ from ..model import Blocks
 from ..shapes import cutting_cracks
 from .edges import check_edges
 from .errors import Check
+from .joints import check_joints
 from .locator import Path
 from .tables import SceneTables
 from .validation import nearest
@@ -23,6 +24,7 @@ def check(c: Check) -> None:
         _zones(c)
         _cracks(c)
     _crack_joints(c)
+    check_joints(c)
     if c.drawing is not None and c.drawing.blocks is not None:
         _whole(c)
         check_edges(c)

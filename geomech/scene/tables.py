@@ -120,14 +120,44 @@ class ZoneTable(Table):
 
 
 class JointTable(Table):
-    friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(0.0, description="friction angle, degrees")
-    cohesion_pa: NotNegative = Field(0.0, description="cohesion, Pa")
-    tensile_strength_pa: NotNegative = Field(0.0, description="tensile strength, Pa")
+    friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
+        0.0, description="friction angle, degrees: that of the peak, with jrc the residual one"
+    )
+    cohesion_pa: NotNegative = Field(0.0, description="cohesion, Pa, until the joint slips or parts")
+    tensile_strength_pa: NotNegative = Field(0.0, description="tensile strength, Pa, until the joint slips or parts")
+    residual_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] | None = Field(
+        None, description="friction angle after slip, degrees (unset: as before)"
+    )
+    residual_cohesion_pa: NotNegative = Field(0.0, description="cohesion after slip, Pa, of faces that have not parted")
+    softening_slip_m: NotNegative = Field(
+        0.0, description="slip over which friction and cohesion fall to their residual values, m (0: at once)"
+    )
+    dilation_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
+        0.0, description="angle at which sliding faces rise on each other, degrees"
+    )
+    dilation_slip_m: Positive | None = Field(
+        None, description="slip from the start after which they rise no more, m (unset: they go on)"
+    )
+    jrc: Annotated[float, Field(gt=0, le=20)] | None = Field(
+        None, description="joint roughness coefficient of Barton and Bandis (unset: straight Coulomb friction)"
+    )
+    jcs_pa: Positive | None = Field(None, description="compressive strength of the joint's wall, Pa, with jrc")
+    joint_length_m: Positive | None = Field(
+        None, description="length to which jrc and jcs_pa are corrected, m: of the joint's blocks (unset: the sample's)"
+    )
+    sample_length_m: Positive = Field(0.1, description="length of the sample that jrc and jcs_pa are of, m")
+    stiffness_from_peak_slip: bool = Field(
+        False, description="true: shear stiffness of a rough joint from its strength and the slip of its peak"
+    )
     normal_stiffness_pa_per_m: Positive | None = Field(
         None, description="normal stiffness, Pa/m (unset: the solver's penalty springs)"
     )
     shear_stiffness_pa_per_m: Positive | None = Field(
         None, description="shear stiffness, Pa/m (unset: the solver's penalty springs)"
+    )
+    max_closure_m: Positive | None = Field(
+        None,
+        description="closure that a joint tends to, m: it stiffens hyperbolically from normal_stiffness_pa_per_m on",
     )
     edges: Names = Field(
         (),
