@@ -66,7 +66,9 @@ def check_joints(c: Check) -> None:
         for given, other in missing.items():
             if getattr(joint, given) is not None and getattr(joint, other) is None:
                 c.refuse(("joints", name, given), f"joint {name!r} has {given} but no {other}", f"add {other}")
-        idle = [key for key in _OF_ROUGHNESS if key in joint.model_fields_set and joint.jrc is None]
+        # A scene written out with all its defaults is right as well.
+        usual = JointTable()
+        idle = [key for key in _OF_ROUGHNESS if joint.jrc is None and getattr(joint, key) != getattr(usual, key)]
         for key in idle:
             c.refuse(("joints", name, key), f"joint {name!r} has {key} but no roughness", "add jrc and jcs_pa")
         if idle or (joint.jrc is None) != (joint.jcs_pa is None):
