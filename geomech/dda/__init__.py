@@ -15,7 +15,7 @@ from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
 from .system import BlockSystem, run
-from .time_integration import TimeScheme, rayleigh_coefficients
+from .time_integration import TimeScheme
 
 __all__ = [
     "EDGE_FORCE",
@@ -32,6 +32,5 @@ __all__ = [
     "contact_resultants",
     "displacement_matrix",
     "mass_matrix",
-    "rayleigh_coefficients",
     "run",
 ]

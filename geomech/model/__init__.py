@@ -2,6 +2,7 @@
 
 from .blocks import Blocks
 from .cracks import Cracks
+from .damping import rayleigh_coefficients
 from .history import History, Wave, baseline_corrected, read_record
 from .joint import JointLaw, Roughness
 from .loads import EdgeTraction, LinearProfile, Loads, PointLoad, WaterTable
@@ -40,5 +41,6 @@ __all__ = [
     "Wave",
     "baseline_corrected",
     "counted",
+    "rayleigh_coefficients",
     "read_record",
 ]

@@ -21,7 +21,7 @@ class DdaSettings:
     picks them from the blocks' stiffness. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
     static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1) is Shi's, (¼, ½) the trapezoidal rule, which
     has no dissipation; in between it has some; 2β ≥ γ ≥ ½. ``damping`` is the fraction of critical damping of a block's own lowest vibration (dynamic
-    steps only); ``rayleigh_mass`` 1/s and ``rayleigh_stiffness`` s damp blocks by α M + β K besides (`dda.rayleigh_coefficients`
+    steps only); ``rayleigh_mass`` 1/s and ``rayleigh_stiffness`` s damp blocks by α M + β K besides (`rayleigh_coefficients`
     finds them). ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
     height of the domain.
     """

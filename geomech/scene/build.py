@@ -20,6 +20,7 @@ from ..model import (
     PointLoad,
     Problem,
     RunSettings,
+    rayleigh_coefficients,
 )
 from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
@@ -168,10 +169,16 @@ def _history(table, value, rate, values) -> History:
 
 def _dda(tables: SceneTables) -> DdaSettings:
     d = tables.dda
+    mass, stiffness = 0.0, 0.0
+    if d.rayleigh_fractions is not None:
+        mass, stiffness = rayleigh_coefficients(d.rayleigh_fractions, d.rayleigh_frequencies_hz)
     return DdaSettings(
         time_step=d.time_step_s,
         dynamic_factor=d.dynamic_factor,
+        newmark=d.newmark,
         damping=d.damping,
+        rayleigh_mass=mass,
+        rayleigh_stiffness=stiffness,
         max_displacement_ratio=d.max_displacement_ratio,
         normal_penalty=d.normal_penalty_pa,
         shear_penalty=d.shear_penalty_pa,

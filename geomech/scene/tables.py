@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
+from ..model import rayleigh_coefficients
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -254,6 +256,19 @@ class DdaTable(Table):
     damping: NotNegative = Field(
         0.05, description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration"
     )
+    newmark: Pair = Field(
+        (0.5, 1.0),
+        description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation; "
+        "2β ≥ γ ≥ 0.5",
+    )
+    rayleigh_fractions: Annotated[tuple[NotNegative, NotNegative], Strict(False)] | None = Field(
+        None,
+        description="Rayleigh damping of dynamic steps: fractions of the critical one at `rayleigh_frequencies_hz`, "
+        "beside `damping`",
+    )
+    rayleigh_frequencies_hz: Annotated[tuple[Positive, Positive], Strict(False)] | None = Field(
+        None, description="the two frequencies of `rayleigh_fractions`, Hz"
+    )
     max_displacement_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
         0.001, description="largest displacement in a step, in units of half the height of the domain"
     )
@@ -267,6 +282,22 @@ class DdaTable(Table):
         30, description="open–close iterations before the time step is cut"
     )
     max_step_cuts: Annotated[int, Field(ge=0)] = Field(12, description="how often a step is cut before the run fails")
+
+    @field_validator("newmark")
+    @classmethod
+    def _stable(cls, value):
+        beta, gamma = value
+        if not 2 * beta >= gamma >= 0.5:
+            raise ValueError(f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: 2β ≥ γ ≥ 0.5")
+        return value
+
+    @model_validator(mode="after")
+    def _damped(self):
+        if (self.rayleigh_fractions is None) != (self.rayleigh_frequencies_hz is None):
+            raise ValueError("Rayleigh damping takes `rayleigh_fractions` and `rayleigh_frequencies_hz` together")
+        if self.rayleigh_fractions is not None:
+            rayleigh_coefficients(self.rayleigh_fractions, self.rayleigh_frequencies_hz)
+        return self
 
 
 class DdmTable(Table):

@@ -11,6 +11,7 @@ import pytest
 import tomli_w
 from scene_texts import GOOD
 
+from geomech.model import rayleigh_coefficients
 from geomech.scene import SceneError, describe_keys, load_scene
 from geomech.scene.keys import keys_of
 from geomech.scene.tables import SceneTables
@@ -122,6 +123,9 @@ start_s = 4.0
 time_step_s = 0.01
 dynamic_factor = 0.9
 damping = 0.1
+newmark = [0.25, 0.5]
+rayleigh_fractions = [0.02, 0.03]
+rayleigh_frequencies_hz = [1, 4]
 max_displacement_ratio = 0.002
 normal_penalty_pa = 1e12
 shear_penalty_pa = 5e11
@@ -173,10 +177,14 @@ def test_every_setting_arrives(scene_file):
     assert p.loads.edge_tractions[0].history.at(2.0).tolist() == [5e3, -1e5]
     force = p.loads.point_loads[0]
     assert force.block == 0 and force.at == (0.5, 0.9) and force.history.at(5.0).tolist() == [0.0, -10.0]
+    mass, stiffness = rayleigh_coefficients((0.02, 0.03), (1.0, 4.0))
     assert vars(p.dda) == {
         "time_step": 0.01,
         "dynamic_factor": 0.9,
         "damping": 0.1,
+        "newmark": (0.25, 0.5),
+        "rayleigh_mass": mass,
+        "rayleigh_stiffness": stiffness,
         "max_displacement_ratio": 0.002,
         "normal_penalty": 1e12,
         "shear_penalty": 5e11,

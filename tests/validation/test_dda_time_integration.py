@@ -9,7 +9,7 @@ import pytest
 
 from geomech import dda
 from geomech.conventions import rotate_stress
-from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State, rayleigh_coefficients
 from geomech.reference import block_motion as exact
 
 SCHEMES = {
@@ -151,7 +151,7 @@ def test_rayleigh_damping_has_the_fractions_asked_for():
     hertz = omega / (2 * np.pi)
     n = 200
     for frequencies, expected in (((hertz, 10 * hertz), fractions[0]), ((0.1 * hertz, hertz), fractions[1])):
-        alpha, beta = dda.rayleigh_coefficients(fractions if expected == fractions[0] else (0.1, 0.02), frequencies)
+        alpha, beta = rayleigh_coefficients(fractions if expected == fractions[0] else (0.1, 0.02), frequencies)
         system, _ = square((0.25, 0.5), rayleigh_mass=alpha, rayleigh_stiffness=beta)
         state = State.at_rest(system.blocks)
         state.velocity[0, 3] = 1e-8 * omega
@@ -236,4 +236,4 @@ def test_schemes_that_drive_the_blocks_are_refused(change, message):
 
 def test_rayleigh_fractions_that_need_driving_are_refused():
     with pytest.raises(ValueError, match="negative coefficient"):
-        dda.rayleigh_coefficients((0.01, 0.5), (10.0, 1.0))
+        rayleigh_coefficients((0.01, 0.5), (10.0, 1.0))
