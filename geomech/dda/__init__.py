@@ -10,6 +10,7 @@
 
 from .basis import displacement_matrix
 from .energy import EnergyBudget, StepEnergy
+from .equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
 from .force_rows import EDGE_FORCE, POINT_FORCE
 from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
@@ -20,10 +21,12 @@ from .time_integration import TimeScheme
 __all__ = [
     "EDGE_FORCE",
     "POINT_FORCE",
+    "RELAXATION_STEP",
     "AppliedForces",
     "BlockSystem",
     "CrackResponse",
     "EnergyBudget",
+    "Equilibrium",
     "NotConverged",
     "StepEnergy",
     "StepResult",
@@ -31,6 +34,7 @@ __all__ = [
     "block_moments",
     "contact_resultants",
     "displacement_matrix",
+    "equilibrium",
     "mass_matrix",
     "run",
 ]

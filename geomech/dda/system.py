@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,6 +65,7 @@ class BlockSystem:
         self.compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
         modulus = np.array([m.plane_modulus for m in self.materials])[of]
         joint_index = joint_index or (lambda edge_name, other_name: 0)
+        self._joint_index = joint_index
         self._finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus)
         self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
@@ -86,6 +88,11 @@ class BlockSystem:
         self._limit = min(
             self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
         )
+
+    def in_statics(self) -> BlockSystem:
+        """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
+        settings = replace(self.settings, dynamic_factor=0.0)
+        return BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings)
 
     def step(
         self,

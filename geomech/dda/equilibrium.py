@@ -1,0 +1,190 @@
+"""Static equilibrium found by itself: pseudo-time continuation of static steps.
+
+A static step, which carries no velocity, solves (2M/dt² + K) d = F: of what is out of balance its inertia takes the part
+2M d/dt². Small dt moves blocks gently until contacts have found one another, large dt is Newton's method for statics.
+dt therefore starts at a few transits of sound through a block and grows while open–close iterations are easy (switched
+evolution relaxation, after Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is as small as asked for. Where
+nothing holds the blocks it never is, and they move on: a collapse.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model import OPEN, Loads, State
+from .moments import block_moments
+from .step import CrackResponse, NotConverged, StepResult
+from .system import BlockSystem
+
+log = logging.getLogger(__name__)
+
+#: One row a static step on the way.
+RELAXATION_STEP = np.dtype(
+    [
+        ("dt", np.float64),  # s, of pseudo-time
+        ("unbalanced", np.float64),  # largest unbalanced force on a block over the mean force on blocks
+        ("kinetic_energy", np.float64),  # J/m, of the motion d/dt
+        ("displacement", np.float64),  # m, largest of a block's centroid in the step
+        ("iterations", np.int64),  # open–close iterations
+        ("cuts", np.int64),
+    ]
+)
+#: The first step is this many transits of sound through the smallest block.
+_FIRST_TRANSITS = 3.0
+#: dt grows by the first factor after up to so many open–close iterations, by the second up to so many, else it stays.
+_EASY, _FAIR = (3, 4.0), (10, 2.0)
+#: Inertia stays above this part of the contacts' stiffness, so that blocks that nothing pushes stay put.
+_LEAST_INERTIA = 1e-10
+#: Penalty over E', for that comparison.
+_PENALTY = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """Where static relaxation ended.
+
+    state       at the time it began, with no velocity
+    converged   True: the unbalanced force is below the tolerance
+    collapsed   True: there is no equilibrium within reach; ``moving`` says which blocks go, the fastest first
+    reason      one sentence
+    history     RELAXATION_STEP rows, one a step
+    result      the final StepResult: contact forces and what else acted (None if no step was made)
+    """
+
+    state: State
+    converged: bool
+    collapsed: bool
+    moving: tuple[int, ...]
+    reason: str
+    history: np.ndarray
+    result: StepResult | None
+
+
+def equilibrium(
+    system: BlockSystem,
+    state: State,
+    loads: Loads,
+    *,
+    load_time: float | None = None,
+    tolerance: float = 1e-6,
+    max_steps: int = 400,
+    reach: float | None = None,
+    crack: CrackResponse | None = None,
+    watch: Callable[[StepResult, np.void], None] | None = None,
+) -> Equilibrium:
+    """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default: state.time).
+
+    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. A block that has gone ``reach`` m
+    (default: a tenth of the blocks' extent) and is out of balance still is taken to have collapsed. ``watch`` sees every step
+    and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in the answer.
+    """
+    if not tolerance > 0:
+        raise ValueError(f"the tolerance of the unbalanced force must be positive, got {tolerance!r}")
+    blocks = system.blocks
+    static = system if system.scheme.static else system.in_statics()
+    time = state.time if load_time is None else load_time
+    begin = state = replace(state, velocity=np.zeros_like(state.velocity), acceleration=None)
+    free = np.flatnonzero(~blocks.fixed)
+    if not len(free):
+        return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), None)
+    reach = 0.1 * float(np.hypot(*np.ptp(blocks.vertices, axis=0))) if reach is None else reach
+    dt, longest = _pseudo_times(static)
+    history: list[np.void] = []
+    result = None
+    travelled = np.zeros(blocks.n_blocks)
+
+    def answer(converged: bool, collapsed: bool, reason: str) -> Equilibrium:
+        moving: tuple[int, ...] = ()
+        if not converged and result is not None:
+            speed = np.hypot(*result.state.velocity[:, :2].T)
+            order = np.argsort(-speed, kind="stable")
+            moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
+            named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
+            reason += f"; {named}{' and others' if len(moving) > 5 else ''} move"
+        rest = replace(state, time=begin.time, velocity=np.zeros_like(state.velocity))
+        rows = np.array(history, RELAXATION_STEP) if history else np.empty(0, RELAXATION_STEP)
+        log.info("static equilibrium: %s (%d steps)", reason, len(rows))
+        return Equilibrium(rest, converged, collapsed, moving, reason, rows, result)
+
+    for _ in range(max_steps):
+        try:
+            result = static.step(state, loads, dt, crack, time)
+        except NotConverged as failure:
+            return answer(False, False, str(failure))
+        state = result.state
+        statistics = result.statistics
+        unbalanced = unbalanced_force(static, result)
+        moved = np.hypot(*(result.forces.centroid - _centroids(static, state)).T)
+        row = np.array(
+            (
+                result.dt,
+                unbalanced,
+                statistics["kinetic_energy"],
+                moved.max(),
+                statistics["open_close_iterations"],
+                statistics["step_cuts"],
+            ),
+            RELAXATION_STEP,
+        )[()]
+        history.append(row)
+        if watch is not None:
+            watch(result, row)
+        if unbalanced <= tolerance:
+            return answer(True, False, f"unbalanced force {unbalanced:.2g} of the mean force")
+        travelled += moved
+        if travelled.max() > reach:
+            return answer(False, True, f"no equilibrium: blocks have moved {travelled.max():.3g} m and go on")
+        dt = min(_next(result), longest)
+    return answer(False, False, f"unbalanced force {history[-1]['unbalanced']:.2g} after {max_steps} steps")
+
+
+def _next(result: StepResult) -> float:
+    """Pseudo-time step after ``result``."""
+    if result.statistics["step_cuts"]:
+        return result.dt
+    iterations = result.statistics["open_close_iterations"]
+    for most, factor in (_EASY, _FAIR):
+        if iterations <= most:
+            return factor * result.dt
+    return result.dt
+
+
+def _pseudo_times(system: BlockSystem) -> tuple[float, float]:
+    """First and longest step, s; blocks without mass have no say."""
+    free = ~system.blocks.fixed & (system.density > 0)
+    if not free.any():
+        return 1.0, 1.0
+    stiffness = 1.0 / system.compliance[:, 0, 0]
+    area = system.blocks.areas()
+    transit = np.sqrt(area * system.density / stiffness)[free].min()
+    lightest = (system.density * area)[free].min()
+    return _FIRST_TRANSITS * transit, float(np.sqrt(2 * lightest / (_LEAST_INERTIA * _PENALTY * stiffness.max())))
+
+
+def _centroids(system: BlockSystem, state: State) -> np.ndarray:
+    blocks = system.blocks
+    return block_moments(state.vertices, blocks.next_vertex, blocks.vertex_start)[:, 1:3]
+
+
+def unbalanced_force(system: BlockSystem, result: StepResult) -> float:
+    """Largest force (or moment over √area) out of balance on a free block in a static step: its inertia 2M d/dt², over the
+    mean of all forces on free blocks, contact forces and loads by their magnitudes; 0 where no force acts."""
+    free = ~system.blocks.fixed
+    f, a = result.forces, result.acceleration
+    h2 = f.area
+    mass = f.inertia.density * f.area
+    # For a rotation the moment of inertia is of the order m h²/6: the bound is enough.
+    out = mass * np.maximum(np.hypot(a[:, 0], a[:, 1]), np.sqrt(h2) / 6 * np.abs(a[:, 2]))
+    acting = mass * float(np.hypot(*f.inertia.gravity))
+    for rows in (f.points, f.edges):
+        np.add.at(acting, rows["block"], np.hypot(rows["force"][:, 0], rows["force"][:, 1]))
+    closed = result.contacts[result.contacts["state"] != OPEN]
+    push = np.hypot(closed["normal_force"], closed["shear_force"])
+    for side in ("block", "other"):
+        np.add.at(acting, closed[side], push)
+    mean = float(acting[free].mean())
+    return float(out[free].max()) / mean if mean > 0 else 0.0
