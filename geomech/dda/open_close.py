@@ -3,9 +3,14 @@
 A set of states makes the step linear; its solution is checked against them. A closed contact must not pull beyond its
 tensile strength, an open one must not penetrate, a sticking one must hold less than its strength μN + cℓ, and a sliding
 one would carry more than it does if it stuck (the return mapping of an elastic-plastic spring, under which exactly one of the
-states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves cases in which none does). Every contact that fails is switched and the step solved again. If a combination of
-states returns, the sliding contacts stick again and only the worst contact of each block is switched, and if one still
-returns, only the first (the least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
+states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves cases in which none does). Every contact
+that fails is switched and the step solved again: Newton's method, which ends in two or three iterations where few contacts
+change. Bonds, lost for good, break only when all else is right.
+
+Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states returns,
+the `CentralPath` proposes states to go on from. If it ends without, the sliding contacts stick again and only the worst
+contact of each block is switched, and if a combination still returns, only the first (the least-index rule, which cannot
+cycle where the problem has one solution; Murty 1974).
 Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
 """
 
@@ -18,13 +23,19 @@ from numba import njit
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
+from .central_path import CentralPath
 from .contact_springs import Springs
 from .contacts import ContactSet
 from .curved_joints import CurvedJoints
 
-#: After this many iterations only the worst contacts of each block are switched: opened all at once, the contacts of a block
-#: let it fly, to be closed all at once in the next iteration.
-_ALL_AT_ONCE = 4
+#: Which of the contacts that are wrong are switched.
+_ALL, _WORST, _FIRST = 0, 1, 2
+#: Switching all goes on while the number of wrong contacts falls to this part of the fewest so far, …
+_FEWER = 0.55
+#: … or for so many iterations although it does not.
+_TRIES = 1
+#: The central path proposes states when no more than this part of the contacts are undecided.
+_DECIDED = 0.006
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +191,130 @@ def _worst_of_their_blocks(
     return violation >= share * np.maximum(worst[block], worst[other])
 
 
+@dataclass(frozen=True, eq=False)
+class _States:
+    """What each contact (n,) is tried as."""
+
+    state: np.ndarray
+    direction: np.ndarray
+    bonded: np.ndarray
+
+    @property
+    def key(self) -> bytes:
+        return self.state.tobytes() + self.direction.tobytes() + self.bonded.tobytes()
+
+    def switched(self, wrong: np.ndarray, to: _States) -> _States:
+        """These states, and where ``wrong`` those of ``to``."""
+        pairs = ((self.state, to.state), (self.direction, to.direction), (self.bonded, to.bonded))
+        return _States(*(np.where(wrong, theirs, mine) for mine, theirs in pairs))
+
+
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """The motion (6 n,) and forces (n, 4) that states make, the states they call for, by how much each is wrong (N), whether
+    the lines agree with curved laws, and the lines."""
+
+    unknowns: np.ndarray
+    forces: np.ndarray
+    called: _States
+    violation: np.ndarray
+    missed: np.ndarray | None
+    slip: np.ndarray
+    springs: Springs
+    gap: np.ndarray
+
+
+@dataclass(eq=False)
+class _Equations:
+    """The step's equations but for the states; arguments as for `settle`."""
+
+    pattern: assembly.Pattern
+    matrix: np.ndarray
+    right: np.ndarray
+    found: ContactSet
+    vectors: np.ndarray
+    springs: Springs
+    gap: np.ndarray
+    slack: float
+    curved: CurvedJoints | None
+
+    def __post_init__(self) -> None:
+        self._data = np.empty(self.pattern.size)
+        self._side = np.empty(6 * self.pattern.n)
+
+    def answer(self, states: _States, normal_force: np.ndarray, slip: np.ndarray) -> _Answer:
+        """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises `Unsettled`."""
+        pattern, found, springs, gap = self.pattern, self.found, self.springs, self.gap
+        state, direction, bonded = states.state, states.direction, states.bonded
+        if self.curved is not None:
+            plastic = np.where(state == SLIP, slip, 0.0)
+            springs, gap = self.curved.lines(
+                self.springs, self.gap, found, state, direction, bonded, normal_force, plastic
+            )
+        symmetric = assembly.assemble_contacts(
+            self._data, self._side, self.matrix, self.right, pattern.stride, pattern.diagonal, pattern.upper,
+            pattern.lower, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
+            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
+        )  # fmt: skip
+        try:
+            unknowns = assembly.solve(pattern, self._data, self._side, symmetric)
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        if not np.isfinite(unknowns).all():
+            raise Unsettled("the step's matrix is singular")
+        forces = contact_forces(
+            unknowns, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
+            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
+        )  # fmt: skip
+        slip = _plastic(forces, state, found.shear, springs)
+        known, missed = springs, None
+        if self.curved is not None:
+            known, known_gap = self.curved.lines(
+                self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
+            )
+            missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
+        *called, violation = check_states(
+            forces, found.partner, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
+            known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
+        )  # fmt: skip
+        return _Answer(unknowns, forces, _States(*called), violation, missed, slip, springs, gap)
+
+
+def _settled(equations: _Equations, states: _States, answer: _Answer, iterations: int) -> Settled:
+    forces, springs = answer.forces, answer.springs
+    lifted = np.zeros(len(forces))
+    if equations.curved is not None:
+        lifted = springs.lift * np.where(springs.lift * states.direction < 0, answer.slip, forces[:, 3])
+    return Settled(
+        unknowns=answer.unknowns.reshape(-1, 6),
+        state=states.state,
+        direction=states.direction,
+        bonded=states.bonded,
+        normal_force=forces[:, 0],
+        shear_force=forces[:, 1],
+        gap=forces[:, 2] + springs.lift * forces[:, 3] - lifted - (answer.gap - equations.found.gap),
+        slip=answer.slip,
+        lifted=lifted,
+        springs=springs,
+        iterations=iterations,
+    )
+
+
+def _proposed(path: CentralPath, n: int, budget: int) -> tuple[bool, int]:
+    """Whether nearly all of ``n`` contacts are decided before the ``path`` ends, and the iterations spent, at most
+    ``budget``. Raises `Unsettled`."""
+    for spent in range(1, budget + 1):
+        try:
+            undecided = path.advance()
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        if path.ended:
+            return False, spent
+        if undecided <= max(2, _DECIDED * n):
+            return True, spent
+    return False, budget
+
+
 def settle(
     pattern: assembly.Pattern,
     matrix: np.ndarray,
@@ -194,102 +329,65 @@ def settle(
 ) -> Settled:
     """Iterate from the states of ``found`` to consistent ones; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the blocks' own
     part, ``springs`` and ``gap`` those of this step (dashpots included). ``curved`` joints bend them from iteration to
-    iteration.
+    iteration. An iteration is a solution of the step's equations, those along the central path included.
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
-    block, other, partner, shear_force = found.block, found.other, found.partner, found.shear
-    state, direction, bonded = found.state, found.direction, found.bonded
-    straight, straight_gap = springs, gap
+    equations = _Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved)
+    states = _States(found.state, found.direction, found.bonded)
     normal_force, slip = found.normal, np.zeros(len(found))
-    data = np.empty(pattern.size)
-    side = np.empty(6 * pattern.n)
     seen: set[bytes] = set()
-    patience = 0
-    worst = -1
-    for iteration in range(1, max_iterations + 1):
-        if curved is not None:
-            springs, gap = curved.lines(
-                straight,
-                straight_gap,
-                found,
-                state,
-                direction,
-                bonded,
-                normal_force,
-                np.where(state == SLIP, slip, 0.0),
-            )
-        symmetric = assembly.assemble_contacts(
-            data, side, matrix, right, pattern.stride, pattern.diagonal, pattern.upper, pattern.lower, block, other,
-            pattern.order, vectors, state, direction, gap, springs.normal, springs.shear, springs.friction,
-            springs.sliding, springs.lift, shear_force,
-        )  # fmt: skip
-        try:
-            unknowns = assembly.solve(pattern, data, side, symmetric)
-        except np.linalg.LinAlgError as error:
-            raise Unsettled(str(error)) from error
-        if not np.isfinite(unknowns).all():
-            raise Unsettled("the step's matrix is singular")
-        forces = contact_forces(
-            unknowns, block, other, pattern.order, vectors, state, direction, gap, springs.normal, springs.shear,
-            springs.friction, springs.sliding, springs.lift, shear_force,
-        )  # fmt: skip
-        normal_force = forces[:, 0]
-        known, missed = springs, None
-        if curved is not None:
-            slip = _plastic(forces, state, shear_force, springs)
-            known, known_gap = curved.lines(straight, straight_gap, found, state, direction, bonded, normal_force, slip)
-            missed = curved.misfit(springs, gap, known, known_gap, state, forces)
-        new_state, new_direction, new_bonded, violation = check_states(
-            forces, partner, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
-            known.peak, known.hold, known.cohesion, known.tension, known.keeps, shear_force, slack,
-        )  # fmt: skip
-        wrong = violation > 0
-        agreed = missed is None or not missed.any()
-        if agreed and not wrong.any():
-            slip = _plastic(forces, state, shear_force, springs)
-            lifted = np.zeros(len(found))
-            if curved is not None:
-                lifted = springs.lift * np.where(springs.lift * direction < 0, slip, forces[:, 3])
-            return Settled(
-                unknowns=unknowns.reshape(-1, 6),
-                state=state,
-                direction=direction,
-                bonded=bonded,
-                normal_force=normal_force,
-                shear_force=forces[:, 1],
-                gap=forces[:, 2] + springs.lift * forces[:, 3] - lifted - (gap - found.gap),
-                slip=slip,
-                lifted=lifted,
-                springs=springs,
-                iterations=iteration,
-            )
+    path: CentralPath | None = None
+    caution, fewest, tries = _ALL, np.inf, 0
+    iteration = 0
+    while True:
+        iteration += 1
+        answer = equations.answer(states, normal_force, slip)
+        normal_force, slip = answer.forces[:, 0], answer.slip
+        wrong = answer.violation > 0
+        if not wrong.any() and (answer.missed is None or not answer.missed.any()):
+            return _settled(equations, states, answer, iteration)
+        if iteration >= max_iterations:
+            break
         if not wrong.any():
-            worst = int(missed.argmax())
             continue
-        worst = int(violation.argmax())
-        mark = state.tobytes() + direction.tobytes() + bonded.tobytes()
-        if mark in seen and patience < 2:
-            patience += 1
-            seen.clear()
-            if patience == 1:
-                # A body held by sliding contacts alone has nothing but its inertia against the least imbalance: begin
-                # again from sticking, and let only the contact that is worst off slide.
-                state = np.where((state == SLIP) & (springs.friction > 0), STICK, state)
+        number = int(wrong.sum())
+        # Bonds are lost for good: none breaks before the contacts without are right, and the most strained break first.
+        bonds = wrong & (states.bonded > 0)
+        if not (wrong & ~bonds).any():
+            wrong = bonds & _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 0.5)
+        else:
+            wrong &= ~bonds
+        returned = states.key in seen
+        seen.add(states.key)
+        tries = 0 if number <= _FEWER * fewest else tries + 1
+        fewest = min(fewest, number)
+        if caution == _ALL and (returned or tries > _TRIES):
+            if path is None or not np.array_equal(path.bonded, states.bonded):
+                path = CentralPath(pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded)
+            proposed, spent = _proposed(path, len(found), max_iterations - iteration - 1)
+            iteration += spent
+            if proposed:
+                states, fewest, tries = _States(*path.states(), states.bonded), np.inf, 0
                 continue
-        seen.add(mark)
-        if patience == 0 and iteration > _ALL_AT_ONCE:
-            wrong &= _worst_of_their_blocks(violation, block, other, pattern.order, 0.5)
-        if patience == 1:
-            wrong &= _worst_of_their_blocks(violation, block, other, pattern.order, 1.0)
-        elif patience == 2:
+            caution = _WORST
+            seen.clear()
+            # A body held by sliding contacts alone has nothing but its inertia against the least imbalance: begin again
+            # from sticking, and let only the contact that is worst off slide.
+            rough = (springs.friction > 0) & (states.state == SLIP)
+            states = _States(np.where(rough, STICK, states.state), states.direction, states.bonded)
+            continue
+        if caution == _WORST:
+            if returned:
+                caution = _FIRST
+            wrong &= _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 1.0)
+        if caution == _FIRST:
             wrong[int(wrong.argmax()) + 1 :] = False
-        state = np.where(wrong, new_state, state)
-        direction = np.where(wrong, new_direction, direction)
-        bonded = np.where(wrong, new_bonded, bonded)
+        states = states.switched(wrong, answer.called)
+    worst = int((answer.violation if answer.violation.any() else answer.missed).argmax())
     name = ("open", "sticking", "sliding")
     raise Unsettled(
-        f"contact states did not settle in {max_iterations} open-close iterations; a contact that was {name[state[worst]]} "
-        "still disagrees with its motion",
+        f"contact states did not settle in {max_iterations} open-close iterations; a contact that was "
+        f"{name[states.state[worst]]} still disagrees with its motion",
         worst,
     )

@@ -35,7 +35,7 @@ class DdaSettings:
     max_displacement_ratio: float = 0.001
     normal_penalty: float | None = None
     shear_penalty: float | None = None
-    max_open_close_iterations: int = 30
+    max_open_close_iterations: int = 60
     max_step_cuts: int = 12
 
 

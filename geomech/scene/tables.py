@@ -279,7 +279,7 @@ class DdaTable(Table):
         None, description="stiffness of shear contact springs, Pa (unset: from the normal one)"
     )
     max_open_close_iterations: Annotated[int, Field(ge=1)] = Field(
-        30, description="open–close iterations before the time step is cut"
+        60, description="open–close iterations before the time step is cut"
     )
     max_step_cuts: Annotated[int, Field(ge=0)] = Field(12, description="how often a step is cut before the run fails")
 

@@ -1,0 +1,271 @@
+"""Contact states found along the central path: what to try when switching contact by contact leads nowhere.
+
+Where many contacts open, close and slide at once, as in a wall on which its weight is put suddenly, each set of states
+moves the blocks so far that most of the next set is wrong too. The interior-point method never decides: every contact keeps
+a force N > 0 and a gap w > 0, and sliding contacts slip rates α, β > 0 beside the strengths S has left on either side,
+
+    w = g + N/kₙ,   N w = ε,       (μN + c ∓ S) (α, β) = ε,   Δs + (S − S₀)/kₛ = β − α,
+
+and ε is driven to zero by Newton's method with Mehrotra's (1992) predictor and corrector, for the linear complementarity
+problem of Coulomb friction in an implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring
+between stiff and none, so that each iteration is one factorisation of the matrix of the open–close iterations. Friction on
+the present normal force is no gradient of an energy and nothing guarantees the end; what comes out is only a proposal, and
+the open–close iterations go on from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+
+from ..model import OPEN, SLIP, STICK
+from . import assembly
+from .contact_springs import Springs
+from .contacts import ContactSet
+
+#: ε at the start, in units of the squared load on a contact's blocks over its stiffness.
+_START = 10.0
+#: No step goes farther than this part of the way to where a force or a gap vanishes.
+_SHORT_OF = 0.99
+#: A contact is undecided while its force and its gap, in units of its stiffness, differ by less than this factor.
+_CLEAR = 3.0
+#: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere.
+_END, _STUCK = 1e-14, 1e-3
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _moved(unknowns, block, other, order, vectors, lift):
+    """(n, 2): change of gap and motion along the edge under ``unknowns``."""
+    n = block.shape[0]
+    out = np.zeros((n, 2))
+    for c in range(n):
+        for side in range(2):
+            i = order[block[c]] if side == 0 else order[other[c]]
+            if i < 0:
+                continue
+            for a in range(6):
+                out[c, 0] += vectors[c, 0, 6 * side + a] * unknowns[6 * i + a]
+                out[c, 1] += vectors[c, 1, 6 * side + a] * unknowns[6 * i + a]
+        out[c, 0] -= lift[c] * out[c, 1]
+    return out
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _add_forces(right, block, other, order, vectors, normal, shear):
+    """Add to ``right`` (6 n,) the forces ``normal`` and ``shear`` (n_contacts,) on the blocks."""
+    for c in range(block.shape[0]):
+        for side in range(2):
+            i = order[block[c]] if side == 0 else order[other[c]]
+            if i < 0:
+                continue
+            for a in range(6):
+                at = 6 * side + a
+                right[6 * i + a] += normal[c] * vectors[c, 0, at] + shear[c] * vectors[c, 1, at]
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift):
+    """Fill ``data`` with the blocks' own part and contacts that answer a motion by dN = −``normal`` (n − κ t)·Δu and
+    dS = −``shear`` t·Δu + ``slope`` dN."""
+    data[:] = 0.0
+    for b in range(matrix.shape[0]):
+        for a in range(6):
+            for m in range(6):
+                data[diagonal[b] + a * stride[b] + m] = matrix[b, a, m]
+    for c in range(block.shape[0]):
+        for side in range(2):
+            i = order[block[c]] if side == 0 else order[other[c]]
+            if i < 0:
+                continue
+            for a in range(6):
+                across = vectors[c, 1, 6 * side + a]
+                push = normal[c] * (vectors[c, 0, 6 * side + a] + slope[c] * across)
+                drag = shear[c] * across
+                for target in range(2):
+                    j = order[block[c]] if target == 0 else order[other[c]]
+                    if j < 0:
+                        continue
+                    if side == target:
+                        base = diagonal[i]
+                    elif side == 0:
+                        base = upper[c]
+                    else:
+                        base = lower[c]
+                    at = base + a * stride[i]
+                    for m in range(6):
+                        aside = vectors[c, 1, 6 * target + m]
+                        data[at + m] += push * (vectors[c, 0, 6 * target + m] - lift[c] * aside) + drag * aside
+
+
+def _solver(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """What solves with the matrix of ``data`` for one right side after the other. Raises numpy.linalg.LinAlgError."""
+    if pattern.solver is not None:
+        return lambda right: pattern.solver.solve(data, right)
+    from scipy.linalg.lapack import dgetrf, dgetrs
+
+    factors, pivots, info = dgetrf(data.reshape(6 * pattern.n, -1))
+    if info != 0:
+        raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
+    return lambda right: dgetrs(factors, pivots, right)[0]
+
+
+def _reach(number: np.ndarray, change: np.ndarray) -> float:
+    """How far along ``change`` (…) positive ``number`` (…) stay so; at most 1."""
+    falling = change < 0.0
+    return min(1.0, _SHORT_OF * float((-number[falling] / change[falling]).min(initial=np.inf)))
+
+
+def _acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """(n,) True for contacts that alone stand for their pair of corners: the line that is crossed last."""
+    acting = np.ones(len(gap), bool)
+    index = np.arange(len(gap))
+    for column in partner.T:
+        theirs = gap[column]
+        acting &= (column < 0) | (theirs < gap) | ((theirs == gap) & (column > index))
+    return acting
+
+
+class CentralPath:
+    """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which hold.
+
+    Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins.
+    """
+
+    def __init__(
+        self,
+        pattern: assembly.Pattern,
+        matrix: np.ndarray,
+        right: np.ndarray,
+        found: ContactSet,
+        vectors: np.ndarray,
+        springs: Springs,
+        gap: np.ndarray,
+        bonded: np.ndarray,
+    ) -> None:
+        self._pattern, self._matrix, self._right = pattern, matrix, right
+        self._n, self.bonded = len(found), bonded
+        some = self._some = np.flatnonzero(_acting(found.partner, gap))
+        order = pattern.order
+        self._at = found.block[some], found.other[some], order, np.ascontiguousarray(vectors[some])
+        self._upper, self._lower = pattern.upper[some], pattern.lower[some]
+        self._lift, self._kn, self._ks = springs.lift[some], springs.normal[some], springs.shear[some]
+        held, slides = bonded[some] > 0, found.state[some] == SLIP
+        friction = np.where(slides, springs.friction[some], springs.peak[some])
+        firm = np.where(slides, springs.sliding[some], springs.hold[some]) + held * springs.cohesion[some]
+        self._rough = (friction > 0.0) | (firm > 0.0)
+        # N is counted from where the contact is pulled off; its strength against sliding is positive to the last.
+        pull = np.minimum(held * springs.tension[some], 0.9 * firm / np.maximum(friction, 1e-300))
+        self._pull = np.where(friction > 0.0, pull, held * springs.tension[some])
+        self._mu = np.where(self._rough, friction, 1.0)
+        self._base = np.where(self._rough, firm - friction * self._pull, 0.0)
+
+        load = np.append(np.abs(right).max(axis=1, initial=0.0), 0.0)
+        load = np.maximum(load[order[self._at[0]]], load[order[self._at[1]]])
+        # Blocks without load share a little of the others'; without any, any unit will do.
+        load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
+        self._unit = load * load / self._kn
+        self._data = np.empty(pattern.size)
+        self._unknowns = np.zeros(right.size)
+        # Motions: what makes the gap and the motion along the edge 0 where no force acts.
+        self._g, self._s = gap[some] - self._pull / self._kn, -found.shear[some] / self._ks
+        self._centre(_START * self._unit)
+        self.ended = False
+
+    def _centre(self, epsilon: np.ndarray) -> None:
+        """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""
+        spread = np.sqrt(self._g**2 + 4.0 * epsilon / self._kn)
+        self._width = np.where(self._g > 0.0, 0.5 * (spread + self._g), 2.0 * epsilon / self._kn / (spread - self._g))
+        self._normal = epsilon / self._width
+        strength = self._mu * self._normal + self._base
+        low, high = -strength, strength
+        for _ in range(50):
+            shear = 0.5 * (low + high)
+            less = shear / self._ks + self._s < epsilon / (strength + shear) - epsilon / (strength - shear)
+            low, high = np.where(less, shear, low), np.where(less, high, shear)
+        self._shear = np.where(self._rough, 0.5 * (low + high), 0.0)
+        self._slip = epsilon / np.stack(self._left())
+
+    def _left(self) -> tuple[np.ndarray, np.ndarray]:
+        """The strength left against sliding either way, N: above and below S."""
+        strength = self._mu * self._normal + self._base
+        return strength - self._shear, strength + self._shear
+
+    def advance(self) -> int:
+        """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
+        pattern, kn, ks, mu, rough, unit = self._pattern, self._kn, self._ks, self._mu, self._rough, self._unit
+        normal, width, (back, ahead), (above, below) = self._normal, self._width, self._slip, self._left()
+        epsilon = float(self._products(normal, width, back, ahead, above, below).sum()) / float((1 + 2 * rough).sum())
+        residual = (self._right - np.einsum("bij,bj->bi", self._matrix, self._unknowns.reshape(-1, 6))).ravel()
+        _add_forces(residual, *self._at, normal - self._pull, self._shear)
+        gap_missed = self._g + normal / kn - width
+        slip_missed = self._s + self._shear / ks - (ahead - back)
+        soft = width + normal / kn
+        stiff, stiff_along = normal / soft, rough / (1.0 / ks + ahead / below + back / above)
+        slope = stiff_along * mu * (back / above - ahead / below)
+        _assemble(
+            self._data, self._matrix, pattern.stride, pattern.diagonal, self._upper, self._lower, *self._at, stiff,
+            stiff_along, slope, self._lift,
+        )  # fmt: skip
+        solve = _solver(pattern, self._data)
+
+        def newton(to_normal, to_back, to_ahead):
+            """Changes of the unknowns, of gap and motion along, of N and S, and of the six positive numbers."""
+            given = (to_normal - normal * (width + gap_missed)) / soft
+            given_along = stiff_along * (to_ahead / below - ahead - to_back / above + back - slip_missed)
+            side = residual.copy()
+            _add_forces(side, *self._at, given, given_along + slope * given)
+            step = solve(side)
+            moved = _moved(step, *self._at, self._lift)
+            d_normal = given - stiff * moved[:, 0]
+            d_shear = given_along - stiff_along * moved[:, 1] + slope * d_normal
+            d_width = moved[:, 0] + d_normal / kn + gap_missed
+            d_above, d_below = mu * d_normal - d_shear, mu * d_normal + d_shear
+            d_back = to_back / above - back - back / above * d_above
+            d_ahead = to_ahead / below - ahead - ahead / below * d_below
+            return step, moved, d_shear, (d_normal, d_width, d_back, d_ahead, d_above, d_below)
+
+        numbers = (normal, width, back, ahead, above, below)
+
+        def reach(changes):
+            longest = min(_reach(number, change) for number, change in zip(numbers[:2], changes[:2], strict=True))
+            sliding = zip(numbers[2:], changes[2:], strict=True)
+            return min(longest, *(_reach(number[rough], change[rough]) for number, change in sliding))
+
+        *_, changes = newton(0.0, 0.0, 0.0)
+        far = reach(changes)
+        ahead_of = [number + far * change for number, change in zip(numbers, changes, strict=True)]
+        left = float(self._products(*ahead_of).sum()) / float(self._products(*numbers).sum())
+        target = epsilon * left**3 * unit
+        dn, dw, db, da, d_above, d_below = changes
+        step, moved, d_shear, changes = newton(target - dn * dw, target - db * d_above, target - da * d_below)
+        far = reach(changes)
+        self._unknowns += far * step
+        self._g, self._s = self._g + far * moved[:, 0], self._s + far * moved[:, 1]
+        self._normal, self._width = normal + far * changes[0], width + far * changes[1]
+        self._shear = self._shear + far * d_shear
+        self._slip = np.stack([back + far * changes[2], ahead + far * changes[3]])
+        self.ended = not (epsilon > _END and far > _STUCK)
+        return int(self._undecided().sum())
+
+    def _products(self, normal, width, back, ahead, above, below) -> np.ndarray:
+        """(n,) sum of a contact's products, in its unit."""
+        return (normal * width + self._rough * (back * above + ahead * below)) / self._unit
+
+    def _undecided(self) -> np.ndarray:
+        ratio = np.stack(
+            [self._kn * self._width / self._normal, *(self._ks * self._slip / np.maximum(self._left(), 1e-300))]
+        )
+        vague = (ratio < _CLEAR) & (ratio > 1.0 / _CLEAR)
+        return vague[0] | (vague[1:].any(axis=0) & self._rough & (ratio[0] < 1.0))
+
+    def states(self) -> tuple[np.ndarray, np.ndarray]:
+        """States and directions (n,) that the contacts approach."""
+        above, below = self._left()
+        sliding = np.where(self._ks * self._slip[0] > above, 1.0, np.where(self._ks * self._slip[1] > below, -1.0, 0.0))
+        closed = np.where(self._rough & (sliding == 0.0), STICK, SLIP)
+        state, direction = np.full(self._n, OPEN), np.zeros(self._n)
+        state[self._some] = np.where(self._kn * self._width > self._normal, OPEN, closed)
+        direction[self._some] = np.where(self._rough & (state[self._some] == SLIP), sliding, 0.0)
+        return state, direction
