@@ -21,6 +21,7 @@ from .open_close import Settled, Unsettled, settle
 from .overlap import refuse_overlap
 from .step import CrackResponse, NotConverged, StepResult
 from .time_integration import TimeScheme, advance, assemble_blocks
+from .viscous_boundary import QuietEdges
 
 log = logging.getLogger(__name__)
 
@@ -218,6 +219,13 @@ class BlockSystem:
             compliance, offset, gravity, load, dt, scheme.weight, scheme.block_damping, scheme.mass_damping,
             scheme.stiffness_damping, n_free,
         )  # fmt: skip
+        quiet = None
+        if loads.viscous_boundaries and not static and n_free:
+            middle = state.time + 0.5 * dt if load_time is None else load_time
+            quiet = QuietEdges.of(
+                loads.viscous_boundaries, self.blocks, vertices, middle, self.density, self._stiffness
+            )
+            quiet.assemble(matrix, right, order, moments, dt)
         vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
         held = self.blocks.held
         alone = static and self.blocks.n_blocks == 1 and n_free
@@ -251,6 +259,10 @@ class BlockSystem:
             increment, carried, dt, static, vertices, self._start, moments, tangent, stress0, compliance, offset, given,
             crack_strain, self._turns,
         )  # fmt: skip
+        if quiet is not None:
+            absorbed = quiet.rows(increment, moments, dt)
+            edges = np.concatenate([edges, absorbed])
+            load = load + generalised(points[:0], absorbed, centroid)
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
         velocity, kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
         end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, weight)

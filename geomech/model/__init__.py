@@ -5,7 +5,7 @@ from .cracks import Cracks
 from .damping import rayleigh_coefficients
 from .history import History, Wave, baseline_corrected, read_record
 from .joint import JointLaw, Roughness
-from .loads import EdgeTraction, LinearProfile, Loads, PointLoad, WaterTable
+from .loads import EdgeTraction, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
 from .material import Material
 from .motion import Motion
 from .problem import DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
@@ -37,6 +37,7 @@ __all__ = [
     "Roughness",
     "RunSettings",
     "State",
+    "ViscousBoundary",
     "WaterTable",
     "Wave",
     "baseline_corrected",

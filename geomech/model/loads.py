@@ -90,6 +90,17 @@ class WaterTable:
 
 
 @dataclass(frozen=True, eq=False)
+class ViscousBoundary:
+    """Edges called ``edge_name`` absorb the waves that reach them, as rock that goes on for ever would (dynamic steps only).
+
+    ``incoming`` (2,) m/s: particle velocity, as a history, of a plane wave that enters through them, straight on.
+    """
+
+    edge_name: str
+    incoming: History | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Loads:
     """Everything that acts on the blocks. ``gravity`` (2,) m/s² as a history; the scene's ramp is part of it."""
 
@@ -97,3 +108,4 @@ class Loads:
     edge_tractions: tuple[EdgeTraction, ...] = ()
     point_loads: tuple[PointLoad, ...] = ()
     water: WaterTable | None = None
+    viscous_boundaries: tuple[ViscousBoundary, ...] = ()
