@@ -13,6 +13,8 @@ import numpy as np
 
 #: Blocks in a leaf of the dissection: smaller ones cost more calls, larger ones more arithmetic (measured on walls).
 LEAF = 10
+#: Entries of all S together up to which they are kept: 1.2 GB in single precision, those of some fifty thousand blocks.
+KEPT = 300_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +29,8 @@ class Tree:
     seat          (…,)            where each of them stands in the parent's front
     entries       (n_fronts + 1,) first matrix block of every front in ``entry``
     entry, row, column            the matrix block, and where it stands in the front
-    stack         (n_fronts,)     where the front leaves its S
+    stack         (n_fronts,)     where the front leaves its S, in a room of ``stack_size``
+    kept          whether every S has a room of its own, so that fronts can be eliminated again one by one
     at            (n_fronts + 1,) first entry of every front's factor
     pieces        (k, 2)          ranges of fronts that are independent of one another
     waves         arrays of fronts that need those before, and none of their own
@@ -45,6 +48,7 @@ class Tree:
     column: np.ndarray
     stack: np.ndarray
     stack_size: int
+    kept: bool
     at: np.ndarray
     pieces: np.ndarray
     waves: tuple[np.ndarray, ...]
@@ -143,7 +147,11 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
         here = entry[entries[f] : entries[f + 1]]
         row[here], column[here] = seats(f, row[here]), seats(f, column[here])
     pieces, waves = _independent(parent, own, far)
-    stack, stack_size = _stacked(children, far, pieces, waves)
+    kept = 36 * int((far**2).sum()) <= KEPT
+    if kept:
+        stack, stack_size = 36 * np.cumsum(far**2) - 36 * far**2, 36 * int((far**2).sum())
+    else:
+        stack, stack_size = _stacked(children, far, pieces, waves)
     return Tree(
         rank=rank,
         pivots=pivots,
@@ -157,6 +165,7 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
         column=column[entry],
         stack=stack,
         stack_size=stack_size,
+        kept=kept,
         at=36 * np.concatenate([[0], np.cumsum(own * (own + 2 * far))]),
         pieces=pieces,
         waves=waves,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
@@ -30,8 +30,8 @@ _jit = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="nu
 
 #: Unknowns eliminated at a time; twelve to thirty keep BLAS as busy.
 PANEL = 18
-#: Blocks from which subtrees are factored on all cores.
-THREADED = 500
+#: Blocks from which subtrees are factored, and solutions substituted, on all cores.
+THREADED, THREADED_SOLUTION = 500, 4000
 
 #: BLAS's general products, as Numba itself binds them for np.dot: here with strides, and added in place.
 _gemm = types.ExternalFunction(
@@ -167,55 +167,65 @@ def _eliminate(
 
 
 @_jit
-def _substitute(right, pivots, reach, boundary, at, factors, units):
-    """The solution for ``right`` (6n,), of the factors' type, in the order of elimination."""
-    out = right.copy()
-    n_fronts = len(pivots) - 1
-    widest = 0
-    for f in range(n_fronts):
-        widest = max(widest, pivots[f + 1] - pivots[f] + reach[f + 1] - reach[f])
-    work = np.empty(6 * widest, factors.dtype)
+def _mark_above(touched, parent):
+    """Mark the parents of marked fronts, and theirs."""
+    for f in range(len(parent)):
+        if touched[f] and parent[f] >= 0:
+            touched[parent[f]] = True
+
+
+@_jit
+def _forward(fronts, out, pivots, reach, seat, at, child, sibling, factors, passed, units):
+    """Forward substitution in ``out`` (6n,), in the order of elimination; ``passed`` holds what each front passes on."""
     part = np.empty(PANEL, factors.dtype)
-    for f in range(n_fronts):
-        first, p, n = 6 * pivots[f], 6 * (pivots[f + 1] - pivots[f]), reach[f + 1] - reach[f]
-        if p == 0:
-            continue
-        m = p + 6 * n
+    for f in fronts:
+        own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
+        p = 6 * own
+        m = p + 6 * far
+        mine, further = out[6 * pivots[f] : 6 * pivots[f + 1]], passed[6 * reach[f] : 6 * reach[f + 1]]
+        further[:] = 0
+        g = child[f]
+        while g >= 0:
+            for u in range(reach[g], reach[g + 1]):
+                i = seat[u]
+                for a in range(6):
+                    if i < own:
+                        mine[6 * i + a] += passed[6 * u + a]
+                    else:
+                        further[6 * (i - own) + a] += passed[6 * u + a]
+            g = sibling[g]
         upper = factors[at[f] : at[f] + p * m].reshape((p, m))
-        lower = factors[at[f] + p * m : at[f + 1]].reshape((6 * n, p))
-        own = out[first : first + p]
+        lower = factors[at[f] + p * m : at[f + 1]].reshape((6 * far, p))
         for start in range(0, p, PANEL):
             end = min(start + PANEL, p)
             for i in range(start, end):
-                part[i - start] = own[i]
-                own[i] = 0
+                part[i - start] = mine[i]
+                mine[i] = 0
             for i in range(start, end):
                 for j in range(start, end):
-                    own[i] += upper[i, j] * part[j - start]
-            _subtract_product(units, upper[end:, start:end], own[start:end], own[end:])
-        passed = work[: 6 * n]
-        passed[:] = 0
-        _subtract_product(units, lower, own, passed)
-        for u in range(n):
-            i = 6 * boundary[reach[f] + u]
-            for a in range(6):
-                out[i + a] += passed[6 * u + a]
-    for f in range(n_fronts - 1, -1, -1):
+                    mine[i] += upper[i, j] * part[j - start]
+            _subtract_product(units, upper[end:, start:end], mine[start:end], mine[end:])
+        _subtract_product(units, lower, mine, further)
+
+
+@_jit
+def _backward(fronts, out, pivots, reach, boundary, at, factors, units):
+    """Backward substitution in ``out`` for ``fronts``, the last first."""
+    for f in fronts[::-1]:
         first, p, n = 6 * pivots[f], 6 * (pivots[f + 1] - pivots[f]), reach[f + 1] - reach[f]
         if p == 0:
             continue
         m = p + 6 * n
         upper = factors[at[f] : at[f] + p * m].reshape((p, m))
-        own, far = out[first : first + p], work[: 6 * n]
+        mine, known = out[first : first + p], np.empty(6 * n, factors.dtype)
         for u in range(n):
             i = 6 * boundary[reach[f] + u]
             for a in range(6):
-                far[6 * u + a] = out[i + a]
-        _subtract_product(units, upper[:, p:], far, own)
+                known[6 * u + a] = out[i + a]
+        _subtract_product(units, upper[:, p:], known, mine)
         for start in range(PANEL * ((p - 1) // PANEL), -1, -PANEL):
             end = min(start + PANEL, p)
-            _subtract_product(units, upper[start:end, end:p], own[end:], own[start:end])
-    return out
+            _subtract_product(units, upper[start:end, end:p], mine[end:], mine[start:end])
 
 
 @cache
@@ -243,11 +253,9 @@ def one_blas_thread() -> Iterator[None]:
             limit(before)
 
 
-@contextmanager
-def all_cores() -> Iterator[Callable[[Callable, Iterable], Iterator]]:
-    """A ``map`` that shares its items among the cores, for work that lets go of the interpreter's lock."""
-    with one_blas_thread(), ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="geomech-dda") as pool:
-        yield pool.map
+@cache
+def _cores() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="geomech-dda")
 
 
 class Factors:
@@ -266,37 +274,69 @@ class Factors:
                 self._sibling[f] = self._child[parent[f]]
                 self._child[parent[f]] = f
         self._by_rank = (6 * np.argsort(self.tree.rank)[:, None] + np.arange(6)).ravel()
+        self._front = np.searchsorted(self.tree.pivots, self.tree.rank, side="right") - 1
+        self._all = np.arange(len(parent))
         self._factors = np.empty(self.tree.at[-1], dtype)
         self._room = np.empty(self.tree.stack_size, dtype)
+        self._passed = np.empty(6 * self.tree.reach[-1], dtype)
         self._units = np.array([1.0, -1.0, 0.0], dtype)
 
-    def factor(self, data: np.ndarray, threads: bool = True) -> None:
-        """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row. Raises numpy.linalg.LinAlgError when it
-        is singular."""
+    @property
+    def single(self) -> bool:
+        """Whether the factors are in single precision."""
+        return self._factors.dtype == np.float32
+
+    def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> float:
+        """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row; the share of it that was done.
+
+        Where only rows and columns of the blocks ``changed`` (n,) differ from the matrix factored before, only their fronts
+        and those above are eliminated again. Raises numpy.linalg.LinAlgError when the matrix is singular.
+        """
         t = self.tree
+        touched = np.ones(len(t.parent), np.bool_)
+        if changed is not None and t.kept:
+            touched[:] = False
+            touched[self._front[changed]] = True
+            _mark_above(touched, t.parent)
 
         def eliminate(fronts: np.ndarray) -> bool:
             return _eliminate(
-                fronts, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row, t.column, t.stack, t.at,
-                self._child, self._sibling, self._room, self._factors, self._units,
+                fronts[touched[fronts]], data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row, t.column, t.stack,
+                t.at, self._child, self._sibling, self._room, self._factors, self._units,
             )  # fmt: skip
 
-        if threads and len(t.rank) >= THREADED:
-            groups = [[np.arange(a, b) for a, b in t.pieces], *(wave[:, None] for wave in t.waves)]
-            with all_cores() as share:
-                done = all(all(share(eliminate, group)) for group in groups)
-        else:
-            with one_blas_thread():
-                done = eliminate(np.arange(len(t.parent)))
-        if not done:
+        if not all(self._climb(eliminate, THREADED)):
             raise np.linalg.LinAlgError("the block system is singular")
+        return float(np.diff(t.at)[touched].sum() / max(1, t.at[-1]))
 
     def substitute(self, right: np.ndarray) -> np.ndarray:
         """The solution of the factored system for ``right`` (6n,)."""
         t = self.tree
-        out = np.empty(len(right))
         # Single precision has no more than 38 decades: the right side is brought to its middle.
         size = float(np.abs(right).max(initial=0.0)) or 1.0
-        given = (right[self._by_rank] / size).astype(self._factors.dtype)
-        out[self._by_rank] = _substitute(given, t.pivots, t.reach, t.boundary, t.at, self._factors, self._units)
-        return size * out
+        out = (right[self._by_rank] / size).astype(self._factors.dtype)
+
+        def forward(fronts: np.ndarray) -> None:
+            _forward(
+                fronts, out, t.pivots, t.reach, t.seat, t.at, self._child, self._sibling, self._factors, self._passed,
+                self._units,
+            )  # fmt: skip
+
+        def backward(fronts: np.ndarray) -> None:
+            _backward(fronts, out, t.pivots, t.reach, t.boundary, t.at, self._factors, self._units)
+
+        self._climb(forward, THREADED_SOLUTION)
+        self._climb(backward, THREADED_SOLUTION, down=True)
+        x = np.empty(len(right))
+        x[self._by_rank] = out
+        return size * x
+
+    def _climb(self, work: Callable, least: int, down: bool = False) -> list:
+        """What ``work`` gives for all fronts in pieces, children before parents or the other way; from ``least`` blocks on,
+        pieces that are independent share the cores, for ``work`` lets go of the interpreter's lock."""
+        t = self.tree
+        with one_blas_thread():
+            if len(t.rank) < least:
+                return [work(self._all)]
+            groups = [[np.arange(a, b) for a, b in t.pieces], *(wave[:, None] for wave in t.waves)]
+            return [one for group in groups[:: -1 if down else 1] for one in _cores().map(work, group)]

@@ -6,7 +6,7 @@ from scipy.sparse import bsr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 
-from geomech.dda import dissection, multifrontal
+from geomech.dda import block_solver, dissection, multifrontal
 from geomech.dda.block_solver import BlockSolver
 
 
@@ -56,22 +56,45 @@ def test_solution_is_that_of_superlu(n, islands):
     assert np.abs(matrix @ x - right).max() <= 1e-11 * (abs(matrix) @ np.abs(x)).max()
 
 
-def test_kept_factorisation_serves_while_few_springs_change():
+def test_only_fronts_of_changed_springs_are_factored_again():
     points, rows, columns, data = springs_between(300, seed=3)
     solver, rng = BlockSolver(points, rows, columns), np.random.default_rng(4)
     right = rng.normal(size=1800)
     solver.solve(data.ravel(), right)
+    assert solver.counts["shares"] == 1.0
     changed = data.copy()
     for at in rng.choice(np.flatnonzero(rows == columns), 3, replace=False):
         push = rng.normal(size=6)
         changed[at] += 1e4 * np.outer(push, push)
     x = solver.solve(changed.ravel(), right)
-    assert solver.counts["factorisations"] == 1
+    # Three leaves and what lies above them.
+    assert solver.counts["shares"] < 1.5
     fresh = BlockSolver(points, rows, columns).solve(changed.ravel(), right)
     assert np.abs(x - fresh).max() <= 1e-8 * np.abs(fresh).max()
-    other = springs_between(300, seed=3)[3] * np.where(rows == columns, 3.0, 1.0)[:, None, None]
-    solver.solve(other.ravel(), right)
+    # A matrix that has hardly changed has nothing factored again.
+    solver.solve(changed.ravel() * (1 + 1e-8 * rng.normal(size=changed.size)), right)
     assert solver.counts["factorisations"] == 2
+    other = springs_between(300, seed=3)[3] * np.where(rows == columns, 3.0, 1.0)[:, None, None]
+    before = solver.counts["shares"]
+    solver.solve(other.ravel(), right)
+    assert solver.counts["shares"] == before + 1.0
+
+
+def test_single_precision_is_refined_to_the_same_residual(monkeypatch):
+    points, rows, columns, data = springs_between(600, seed=8)
+    right = np.random.default_rng(2).normal(size=3600)
+    expected = BlockSolver(points, rows, columns).solve(data.ravel(), right)
+    monkeypatch.setattr(block_solver, "SINGLE", 0)
+    solver = BlockSolver(points, rows, columns)
+    x = solver.solve(data.ravel(), right)
+    assert np.abs(x - expected).max() <= 1e-8 * np.abs(expected).max()
+    # Blocks whose stiffness spans more than single precision resolves are factored in double after all.
+    soft = np.where(np.arange(600) % 2, 1.0, 1e-5)
+    scaled = data * soft[rows, None, None] * soft[columns, None, None]
+    scaled[rows == columns] += 1e-14 * np.eye(6)
+    x = solver.solve(scaled.ravel(), right)
+    product, size = block_solver.multiply(scaled.ravel(), solver.pointer, columns, x)
+    assert np.abs(product - right).max() <= max(1e-11 * np.abs(right).max(), 2e-14 * size)
 
 
 def test_result_does_not_depend_on_threads(monkeypatch):
