@@ -36,6 +36,7 @@ class ContactSet:
     state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
     normal, shear, slip        forces N and sliding m
     wear, lift                 m: way slid to and fro, and how far that has forced the faces apart
+    stretch                    m: motion along the edge that the multipliers of sticking contacts still have to take back
     """
 
     vertex: np.ndarray
@@ -54,6 +55,7 @@ class ContactSet:
     slip: np.ndarray
     wear: np.ndarray
     lift: np.ndarray
+    stretch: np.ndarray
 
     @cached_property
     def gap(self) -> np.ndarray:
@@ -78,6 +80,7 @@ class ContactSet:
         rows["length"] = self.geometry[:, 4]
         rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
         rows["lift"] = np.maximum(self.lift + settled.lifted, 0.0)
+        rows["stretch"] = settled.stretch
         return rows
 
 
@@ -161,13 +164,14 @@ class ContactFinder:
         """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
         n = len(parent)
         contact_state, bonded = np.zeros(n, np.int64), np.zeros(n, np.int64)
-        normal, shear, slip, wear, lift = np.zeros((5, n))
+        normal, shear, slip, wear, lift, stretch = np.zeros((6, n))
         known = parent >= 0
         if known.any():
             rows = old[parent[known]]
             contact_state[known], bonded[known] = rows["state"], rows["bonded"]
             normal[known], shear[known] = rows["normal_force"], rows["shear_force"]
             slip[known], wear[known], lift[known] = rows["slip"], rows["wear"], rows["lift"]
+            stretch[known] = rows["stretch"]
         if not known.all():
             # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
             fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
@@ -181,7 +185,7 @@ class ContactFinder:
         contact_state[(contact_state == STICK) & ~rough] = SLIP
         return {
             "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
-            "slip": slip, "wear": wear, "lift": lift,
+            "slip": slip, "wear": wear, "lift": lift, "stretch": stretch,
         }  # fmt: skip
 
     def _pass_on_wear(self, old, parent, block, other, geometry, remembered) -> None:
@@ -202,6 +206,15 @@ class ContactFinder:
     def closure(self) -> np.ndarray:
         """(n_laws,) m: the closure that each law tends to; infinite for a straight spring."""
         return self._table.closure
+
+    def on_penalty(self, found: ContactSet) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) twice: contacts whose normal, and whose shear springs are the solver's penalties, not a joint's stiffness."""
+        t, lone = self._table, found.geometry[:, 4] <= 0
+        by_peak = t.stiff_by_peak[found.law] & ~lone
+        return (
+            lone | np.isnan(t.normal_stiffness[found.law]),
+            (lone | np.isnan(t.shear_stiffness[found.law])) & ~by_peak,
+        )
 
     def curved(self, found: ContactSet) -> CurvedJoints | None:
         """The contacts of ``found`` whose laws are no straight lines; None where there are none."""

@@ -56,7 +56,7 @@ class CurvedJoints:
     def __init__(self, table: JointTable, found: ContactSet) -> None:
         at = np.flatnonzero(table.curved[found.law])
         self.rows, self.law, self.length = at, found.law[at], found.geometry[at, 4]
-        self._wear, self._slip, self._shear0 = found.wear[at], found.slip[at], found.shear[at]
+        self._wear, self._slip = found.wear[at], found.slip[at]
         self._table = table
 
     def lines(
@@ -93,11 +93,11 @@ class CurvedJoints:
         lift = np.where(state[at] == SLIP, self._lift(pressure, p, direction[at]), 0.0)
 
         stiff = normal + drag
-        start = gap0 + (normal * offset - drag * np.minimum(gap0, 0.0)) / stiff
+        start = (springs.normal[at] * gap[at] + normal * (gap0 + offset) - undamped * gap0) / stiff
         # Slip is what the shear spring does not take up; the lift counts slip alone on the way out.
         out = lift * direction[at] < 0
         share = np.where(out, lift / shear, 0.0)
-        start = start + share * (self._shear0 - direction[at] * sliding)
+        start = start + share * (found.shear[at] - direction[at] * sliding)
         stiff = stiff / (1.0 - stiff * share * direction[at] * friction)
 
         new = {

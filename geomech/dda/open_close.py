@@ -43,7 +43,8 @@ class Settled:
     """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`.
 
     ``gap`` is counted from where the faces meet, ``slip`` is what the shear spring did not take up of the motion along the
-    edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration.
+    edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration; ``stretch`` what multipliers have
+    left of the motion of sticking contacts.
     """
 
     unknowns: np.ndarray
@@ -57,6 +58,7 @@ class Settled:
     lifted: np.ndarray
     springs: Springs
     iterations: int
+    stretch: np.ndarray | float = 0.0
 
 
 class Unsettled(Exception):

@@ -10,8 +10,9 @@ import numpy as np
 
 from ..model import OPEN, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
+from .augmented import settle_augmented
 from .contact_springs import end_of_step, over_a_step
-from .contacts import ContactFinder
+from .contacts import ContactFinder, ContactSet
 from .energy import StepEnergy, step_energies
 from .held import balanced, hold, with_rigid_motion
 from .imbalance import imbalance
@@ -31,6 +32,8 @@ _WINDOW = 2.2
 _BLOCK_SHARE = 0.1
 #: Gaps below this many times the largest coordinate, its round-off, decide nothing.
 _SLACK = 5e-16
+#: Multipliers are not asked to close gaps below this many times that round-off.
+_FINEST = 10.0
 
 
 class BlockSystem:
@@ -89,6 +92,18 @@ class BlockSystem:
         self._limit = min(
             self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
         )
+        self._tolerance = self._allowed_penetration(float(np.sqrt(areas.min())))
+
+    def _allowed_penetration(self, size: float) -> float:
+        """m, of the multipliers' mode; 0 where penalty springs hold alone."""
+        share = self.settings.penetration_tolerance
+        if self.settings.contact == "penalty":
+            return 0.0
+        if self.settings.contact != "augmented":
+            raise ValueError(f'contact is "penalty" or "augmented", not {self.settings.contact!r}')
+        if not 0 < share < 1:
+            raise ValueError(f"penetration_tolerance must lie between 0 and 1, got {share!r}")
+        return max(share * size, _FINEST * self._slack)
 
     def in_statics(self) -> BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
@@ -183,6 +198,15 @@ class BlockSystem:
             self._sparse = block, assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
         return self._sparse[1]
 
+    def _settled(self, pattern, matrix, right, found, vectors, springs, gap, curved) -> Settled:
+        def solve(contacts: ContactSet, start: np.ndarray) -> Settled:
+            most = self.settings.max_open_close_iterations
+            return settle(pattern, matrix, right, contacts, vectors, springs, start, self._slack, most, curved)
+
+        if not self._tolerance or not len(found):
+            return solve(found, gap)
+        return settle_augmented(solve, found, springs, gap, self._finder.on_penalty(found), self._tolerance)
+
     def _attempt(
         self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
     ) -> tuple[StepResult, float]:
@@ -201,7 +225,8 @@ class BlockSystem:
         offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
         curved = self._finder.curved(found)
-        weight = scheme.weight
+        # Multipliers are forces at the end of the step.
+        weight = 1.0 if self._tolerance else scheme.weight
         if weight != 1.0 and curved is not None:
             # The lines of a law that is curved are those of the end of the step.
             weight = np.full(len(found), weight)
@@ -234,18 +259,7 @@ class BlockSystem:
         if held is not None and n_free:
             hold(held, matrix, right, vectors, found.block, found.other, order)
         if n_free:
-            settled = settle(
-                pattern,
-                matrix,
-                right,
-                found,
-                vectors,
-                springs,
-                gap,
-                self._slack,
-                self.settings.max_open_close_iterations,
-                curved,
-            )
+            settled = self._settled(pattern, matrix, right, found, vectors, springs, gap, curved)
         else:
             zero = np.zeros(len(found))
             settled = Settled(

@@ -18,7 +18,8 @@ class DdaSettings:
     """How blocks are moved (names and values of Shi 1988 where he has them).
 
     ``normal_penalty`` and ``shear_penalty`` are contact spring stiffnesses, N/m per metre of thickness (Pa); None
-    picks them from the blocks' stiffness. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
+    picks them from the blocks' stiffness. ``contact`` "augmented" adds multipliers to these springs until closed contacts
+    gape and sticking ones give by less than ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
     static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1) is Shi's, (¼, ½) the trapezoidal rule, which
     has no dissipation; in between it has some; 2β ≥ γ ≥ ½. ``damping`` is the fraction of critical damping of a block's own lowest vibration (dynamic
     steps only); ``rayleigh_mass`` 1/s and ``rayleigh_stiffness`` s damp blocks by α M + β K besides (`rayleigh_coefficients`
@@ -35,6 +36,8 @@ class DdaSettings:
     max_displacement_ratio: float = 0.001
     normal_penalty: float | None = None
     shear_penalty: float | None = None
+    contact: str = "penalty"
+    penetration_tolerance: float = 1e-8
     max_open_close_iterations: int = 60
     max_step_cuts: int = 12
 
