@@ -182,6 +182,8 @@ def _dda(tables: SceneTables) -> DdaSettings:
         max_displacement_ratio=d.max_displacement_ratio,
         normal_penalty=d.normal_penalty_pa,
         shear_penalty=d.shear_penalty_pa,
+        contact=d.contact,
+        penetration_tolerance=d.penetration_tolerance,
         max_open_close_iterations=d.max_open_close_iterations,
         max_step_cuts=d.max_step_cuts,
     )

@@ -278,6 +278,15 @@ class DdaTable(Table):
     shear_penalty_pa: Positive | None = Field(
         None, description="stiffness of shear contact springs, Pa (unset: from the normal one)"
     )
+    contact: Literal["penalty", "augmented"] = Field(
+        "penalty",
+        description='"penalty": springs hold the faces of blocks; "augmented": forces are added until they neither '
+        "penetrate nor give, however soft the springs",
+    )
+    penetration_tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
+        1e-8,
+        description='what "augmented" contacts may still gape or give, in units of the smallest block\'s size, √area',
+    )
     max_open_close_iterations: Annotated[int, Field(ge=1)] = Field(
         60, description="open–close iterations before the time step is cut"
     )

@@ -193,6 +193,8 @@ ADDED = [
     ("[growth]\nincrement_m = 1e-3\nmin_increment_m = 1e-2\n", "growth.min_increment_m", "longer than the", "at most"),
     ('[growth]\ncriterion = "sif"\n', "growth.criterion", '"sif" is not one of', '"mts"'),
     ("[dda]\ntime_step_s = 1000.0\n", "dda.time_step_s", "longer than the whole run", "shorten"),
+    ('[dda]\ncontact = "lagrange"\n', "dda.contact", "is not one of", "augmented"),
+    ("[dda]\npenetration_tolerance = 0.0\n", "dda.penetration_tolerance", "greater than 0", "size"),
     ("[dda]\ndynamic_factor = 2\n", "dda.dynamic_factor", "at most 1", "dynamic"),
     ("[ddm]\norder = 2.5\n", "ddm.order", "whole number", "order"),
     ("[ddm]\norder = 99\n", "ddm.order", "at most 10", "order"),

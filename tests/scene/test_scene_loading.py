@@ -129,6 +129,8 @@ rayleigh_frequencies_hz = [1, 4]
 max_displacement_ratio = 0.002
 normal_penalty_pa = 1e12
 shear_penalty_pa = 5e11
+contact = "augmented"
+penetration_tolerance = 1e-6
 max_open_close_iterations = 9
 max_step_cuts = 5
 [ddm]
@@ -188,6 +190,8 @@ def test_every_setting_arrives(scene_file):
         "max_displacement_ratio": 0.002,
         "normal_penalty": 1e12,
         "shear_penalty": 5e11,
+        "contact": "augmented",
+        "penetration_tolerance": 1e-6,
         "max_open_close_iterations": 9,
         "max_step_cuts": 5,
     }
