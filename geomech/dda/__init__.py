@@ -15,6 +15,7 @@ from .force_rows import EDGE_FORCE, POINT_FORCE
 from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
+from .strength_reduction import FactorOfSafety, factor_of_safety
 from .system import BlockSystem, run
 from .time_integration import TimeScheme
 
@@ -27,6 +28,7 @@ __all__ = [
     "CrackResponse",
     "EnergyBudget",
     "Equilibrium",
+    "FactorOfSafety",
     "NotConverged",
     "StepEnergy",
     "StepResult",
@@ -35,6 +37,7 @@ __all__ = [
     "contact_resultants",
     "displacement_matrix",
     "equilibrium",
+    "factor_of_safety",
     "mass_matrix",
     "run",
 ]

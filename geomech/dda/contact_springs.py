@@ -30,6 +30,7 @@ class JointTable:
     jrc: np.ndarray
     jcs: np.ndarray
     residual_angle: np.ndarray
+    reduction: np.ndarray
     peak_slip: np.ndarray
     stiff_by_peak: np.ndarray
     closure: np.ndarray
@@ -57,6 +58,7 @@ class JointTable:
             jrc=rough(lambda r: r.jrc_in_place, 0.0),
             jcs=rough(lambda r: r.jcs_in_place, 1.0),
             residual_angle=column(lambda j: j.friction_angle),
+            reduction=rough(lambda r: r.reduction, 1.0),
             peak_slip=rough(lambda r: r.peak_slip, np.inf),
             stiff_by_peak=rough(lambda r: r.from_peak_slip, 0.0) > 0,
             closure=column(lambda j: j.max_closure, np.inf),

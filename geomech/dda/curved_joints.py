@@ -128,8 +128,8 @@ class CurvedJoints:
             finite = np.where(rough, pressure, 0.0)
             for wear, slope, rest in ((self._wear, peak, hold), (self._wear + np.abs(plastic), friction, sliding)):
                 strength, tangent, _ = rough_strength(finite, self._roughness(wear), t.jcs[law], t.residual_angle[law])
-                slope[rough] = tangent[rough]
-                rest[rough] = (strength * length - tangent * n)[rough]
+                slope[rough] = (tangent / t.reduction[law])[rough]
+                rest[rough] = ((strength * length - tangent * n) / t.reduction[law])[rough]
         return friction, sliding, peak, hold, cohesion
 
     def _left(self, wear, slides: bool) -> np.ndarray:

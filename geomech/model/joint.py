@@ -18,6 +18,7 @@ class Roughness:
     length            length of the joint's blocks in place, m, to which both are corrected; None: no correction
     from_peak_slip    the shear stiffness is the peak strength over the slip of the peak, at the present normal stress
                       (Barton & Choubey 1977); otherwise the law's stiffness or the solver's springs hold up to the peak
+    reduction         the strength, whole and residual, is divided by this (a trial factor of safety); dilation is not
 
     Sources: Barton & Choubey (1977), Rock Mechanics 10, 1-54 (strength, 70° limit, stiffness); Barton & Bandis (1982),
     23rd US Symp. Rock Mech. (size, slip of the peak); Barton, Bandis & Bakhtar (1985), Int. J. Rock Mech. 22, 121-140
@@ -29,12 +30,15 @@ class Roughness:
     length: float | None = None
     sample_length: float = 0.1
     from_peak_slip: bool = False
+    reduction: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0 < self.jrc <= 20:
             raise ValueError(f"joint roughness coefficient must lie in (0, 20], got {self.jrc!r}")
         if not (self.jcs > 0 and math.isfinite(self.jcs)):
             raise ValueError(f"compressive strength of a joint's wall must be positive, got {self.jcs!r} Pa")
+        if not self.reduction > 0:
+            raise ValueError(f"the strength of a rough joint is divided by a positive number, got {self.reduction!r}")
         for what, value in (("length", self.length), ("sample_length", self.sample_length)):
             if value is not None and not (value > 0 and math.isfinite(value)):
                 raise ValueError(f"{what} of a rough joint must be positive, got {value!r} m")
@@ -151,7 +155,7 @@ class JointLaw:
     @property
     def friction(self) -> float:
         """tan φ, of the peak."""
-        return math.tan(self.friction_angle)
+        return math.tan(self.friction_angle) / (1.0 if self.roughness is None else self.roughness.reduction)
 
     @property
     def residual_friction(self) -> float:
