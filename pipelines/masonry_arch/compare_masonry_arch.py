@@ -1,0 +1,81 @@
+"""The thinnest arch beside limit analysis and Milankovitch (1907), its line of thrust, its hinges."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from arch import Seen
+
+from geomech.reference import masonry
+
+INK, STONE, BASE, THRUST, HINGE = "#2f3136", "#d8d2c4", "#a9a9a4", "#1f6f8b", "#c8553d"
+
+LIMITS = """\
+What this does and does not say
+  - Joints are radial, of equal angle, and too rough to slide (60°); stone does not crush. Gravity acts on the whole arch
+    at once, as when a centring is struck.
+  - Hinges form at joints only: few voussoirs stand thinner than many. With an odd number the crown's hinge splits over
+    the two joints of the keystone.
+  - Elastic shortening (E = 100 GPa) lowers the line of thrust by 1e-4 of the thickness: that much more t/R is needed."""
+
+
+def report(thinnest: dict[int, float], hinges: np.ndarray) -> str:
+    """``thinnest``: number of voussoirs → t/R found; ``hinges`` degrees from the crown."""
+    rows = ["voussoirs   thinnest t/R   limit analysis   difference"]
+    for n, ratio in thinnest.items():
+        exact = masonry.thinnest_arch(n)
+        rows.append(f"{n:9d} {ratio:14.5f} {exact:16.5f} {ratio / exact - 1:12.1e}")
+    rows += [
+        "",
+        f"limit of many, Milankovitch (1907): {masonry.MILANKOVITCH_RATIO}",
+        f"haunches of a thinnest arch hinge at {masonry.MILANKOVITCH_HINGE_DEG}° from the crown (Milankovitch)",
+        "the falling arch hinges at " + ", ".join(f"{a:.1f}°" for a in hinges) + " from the crown",
+    ]
+    return "\n".join([*rows, "", LIMITS])
+
+
+def hinges(seen: Seen) -> np.ndarray:
+    """Joints (indices) that have turned by more than a tenth of the most turned one."""
+    return np.flatnonzero(np.abs(seen.opening) > 0.1 * np.abs(seen.opening).max())
+
+
+def from_crown(joints: np.ndarray, n: int) -> np.ndarray:
+    """Degrees from the crown of ``joints`` (indices) of an undeformed arch of ``n`` voussoirs."""
+    return np.abs(90.0 - 180.0 * joints / n)
+
+
+def draw(path: Path, thinnest: dict[int, float], standing: Seen, falling: Seen, titles: tuple[str, str]) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 6.6), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=[1.25, 1])
+    for axes, seen, title in zip(upper.subplots(1, 2, sharey=True), (standing, falling), titles):
+        for outline in (seen.outlines[0], seen.outlines[-1]):
+            axes.fill(*outline.T, color=BASE)
+        for outline in seen.outlines[1:-1]:
+            axes.fill(*outline.T, facecolor=STONE, edgecolor=INK, lw=0.7)
+        if seen is standing:
+            axes.plot(*seen.thrust.T, color=THRUST, lw=2, label="line of thrust")
+        else:
+            at = hinges(seen)
+            # A joint that opens outside turns about its inner corner.
+            corner = seen.joints[at, (seen.opening[at] < 0).astype(int)]
+            axes.plot(*corner.T, "o", ms=7, mfc="white", mec=HINGE, mew=2, label="hinge")
+        axes.set(aspect="equal", title=title)
+        axes.title.set_fontsize(10)
+        axes.legend(frameon=False, fontsize=9, loc="lower center")
+        axes.axis("off")
+    axes = lower.subplots()
+    number = np.r_[4:31, 32:61:4]
+    axes.axhline(masonry.MILANKOVITCH_RATIO, color=HINGE, lw=1.2)
+    axes.text(
+        60, masonry.MILANKOVITCH_RATIO + 2e-4, "Milankovitch (1907)", color=HINGE, fontsize=9, ha="right", va="bottom"
+    )
+    exact = np.array([masonry.thinnest_arch(int(n)) for n in number])
+    axes.plot(number, exact, ".-", color="#9a9a94", ms=5, lw=0.8, label="limit analysis of rigid voussoirs")
+    axes.plot(*zip(*thinnest.items()), "o", ms=7, mfc="none", mec=THRUST, mew=1.8, label="block solver")
+    axes.set(xlabel="voussoirs", ylabel="thinnest arch, $t/R$")
+    axes.legend(frameon=False, fontsize=9, loc="lower right")
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=150)

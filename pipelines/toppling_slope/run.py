@@ -1,0 +1,36 @@
+"""A slope of sixteen blocks topples and slides: the block solver alone, held against Goodman & Bray (1976).
+
+`geomech run pipelines/toppling_slope` calls `main`; copy the folder to make a study of your own.
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from compare_toppling_slope import draw, report
+from toppling import at_rest, forces, last, limit_friction, modes, run, slope
+
+FRICTION, SECONDS = 0.65, 3.0  # of the slope that comes down
+
+
+def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
+    if overrides or variants:
+        raise ValueError("this study has no scene to override and no variants: change run.py and toppling.py")
+    rest = at_rest()
+    limit = limit_friction(rest)
+    table = forces(last(run(slope(1.0005 * limit), rest, 2.0)))
+    falling = slope(FRICTION)
+    early = last(run(falling, rest, 0.5)).state
+    fallen = last(run(falling, early, SECONDS)).state
+    done = modes(falling, rest, early)
+    text = report(limit, table, FRICTION, done)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
+    outlines = [
+        [falling.blocks.loops(b, s.vertices)[0] for b in range(falling.blocks.n_blocks)] for s in (rest, fallen)
+    ]
+    title = f"tan φ = {FRICTION:g}, {SECONDS:g} s after the friction dropped; it stands from tan φ = {limit:.3f} on"
+    draw(Path(out) / "toppling_slope.png", table, *outlines, done, title)
+    if not quiet:
+        print(text)
+    return 0

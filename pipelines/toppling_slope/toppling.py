@@ -1,0 +1,98 @@
+"""The sixteen blocks of Goodman & Bray (1976): moved by the block solver, brought to rest, searched for their limit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from geomech import dda
+from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.reference import toppling_slope as published
+
+#: Stiff rock: the published calculation knows rigid blocks, and the columns lean by their elastic give.
+ROCK = Material("rock", youngs_modulus=1e11, poissons_ratio=0.25, density=2500.0)
+WEIGHT = Loads(gravity=History.constant([0.0, -10.0]))  # 25 kN/m³, as published
+SETTINGS = DdaSettings(time_step=0.02, dynamic_factor=1.0, max_displacement_ratio=0.01)
+#: Between 2 and 2.5 s a slope that stands moves less than this, m; one with 0.1 % less friction ten times as much.
+STANDS = 2e-4
+
+
+def slope(friction: float, settings: DdaSettings = SETTINGS) -> dda.BlockSystem:
+    """Base and blocks with ``friction`` = tan φ in all joints."""
+    outlines = published.polygons()
+    blocks = Blocks.from_polygons(
+        outlines,
+        fixed=[True] + [False] * (len(outlines) - 1),
+        names=["base", *(f"block {n}" for n in range(1, len(outlines)))],
+    )
+    return dda.BlockSystem(blocks, [ROCK], [JointLaw("joints", friction_angle=np.arctan(friction))], settings=settings)
+
+
+def at_rest() -> State:
+    """Equilibrium under the weight with more friction than is needed: where every run begins."""
+    system = slope(1.0)
+    return dda.equilibrium(system, State.at_rest(system.blocks), WEIGHT).state
+
+
+def run(system: dda.BlockSystem, state: State, end: float) -> Iterator[dda.StepResult]:
+    """Steps until ``end`` s."""
+    while state.time < end * (1 - 1e-12):
+        result = system.step(state, WEIGHT, min(system.settings.time_step, end - state.time))
+        state = result.state
+        yield result
+
+
+def creep(friction: float, rest: State) -> float:
+    """Largest displacement of a corner between 2 and 2.5 s, m, when the friction drops to ``friction`` at rest."""
+    system = slope(friction)
+    early = last(run(system, rest, 2.0)).state
+    return float(np.abs(last(run(system, early, 2.5)).state.vertices - early.vertices).max())
+
+
+def limit_friction(rest: State, low: float = 0.75, high: float = 0.83) -> float:
+    """tan φ at which the slope just stands, by bisection to 2e-4."""
+    while high - low > 2e-4:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if creep(middle, rest) < STANDS else (middle, high)
+    return high
+
+
+def forces(result: dda.StepResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(R, S, P), each (16,) kN of blocks 1 … 16: base normal and shear (up the dip), and the push of the block above."""
+    rows = result.contacts[result.contacts["state"] != OPEN]
+    normal = rows["normal"]
+    force = rows["normal_force"][:, None] * normal
+    force += rows["shear_force"][:, None] * np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    dip = np.radians(published.BASE_DIP_DEG)
+    uphill, up = np.array([np.cos(dip), np.sin(dip)]), np.array([-np.sin(dip), np.cos(dip)])
+    base, push = np.zeros((17, 2)), np.zeros(18)
+    for block, other, on_block in zip(rows["block"], rows["other"], force):
+        low, high = sorted((block, other))
+        on_high = on_block if block == high else -on_block
+        if low == 0:
+            base[high] += on_high @ up, on_high @ uphill
+        else:
+            push[high] += on_high @ uphill
+    return base[1:, 0] / 1e3, base[1:, 1] / 1e3, push[2:] / 1e3
+
+
+def modes(system: dda.BlockSystem, rest: State, state: State) -> list[str]:
+    """What each of blocks 1 … 16 has done since ``rest``: "slides", "topples" or "stands"."""
+    moved = state.vertices - rest.vertices
+    most = np.hypot(*moved.T).max()
+    out = []
+    for n in range(1, system.blocks.n_blocks):
+        own = slice(system.blocks.vertex_start[n], system.blocks.vertex_start[n + 1])
+        turn = abs(state.rotation[n] - rest.rotation[n]) * np.sqrt(np.ptp(rest.vertices[own], axis=0).prod())
+        if np.hypot(*moved[own].T).max() < 0.02 * most:
+            out.append("stands")
+        else:
+            out.append("topples" if turn > 0.1 * np.hypot(*moved[own].T).max() else "slides")
+    return out
+
+
+def last(results: Iterator[dda.StepResult]) -> dda.StepResult:
+    for result in results:
+        kept = result
+    return kept
