@@ -22,7 +22,8 @@ def elastic_bodies(
     ``kept``: earlier bodies of the same blocks, of which whatever has not changed is reused; ``work`` counts what was done.
     """
     cracked = np.arange(blocks.n_blocks) if problem.growth.initiation else np.unique(cracks.block)
-    cracked = cracked[~blocks.fixed[cracked]]
+    rigid = np.array([m.rigid for m in problem.materials], bool)
+    cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
     if not len(cracked):
         return {}, {}
     from .. import ddm

@@ -158,7 +158,7 @@ def _pseudo_times(system: BlockSystem) -> tuple[float, float]:
     free = ~system.blocks.fixed & (system.density > 0)
     if not free.any():
         return 1.0, 1.0
-    stiffness = 1.0 / system.compliance[:, 0, 0]
+    stiffness = np.array([m.plane_modulus for m in system.materials])[np.asarray(system.blocks.material, int)]
     area = system.blocks.areas()
     transit = np.sqrt(area * system.density / stiffness)[free].min()
     lightest = (system.density * area)[free].min()

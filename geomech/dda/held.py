@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 #: Loads on a lone block whose resultant is below this part of their size are in balance: it strains by less, and loads
 #: that balance on the undeformed block miss by about its strain on the deformed one.
@@ -28,26 +29,30 @@ def with_rigid_motion(held: np.ndarray | None) -> np.ndarray:
     return out
 
 
-def hold(
-    held: np.ndarray,
-    matrix: np.ndarray,
-    right: np.ndarray,
-    vectors: np.ndarray,
-    block: np.ndarray,
-    other: np.ndarray,
-    order: np.ndarray,
-) -> None:
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def hold(held, matrix, right, vectors, block, other, order):
     """Take the unknowns ``held`` (n_blocks, 6) out of the equations, in place: their rows say that they are zero.
 
     ``matrix`` (n, 6, 6) and ``right`` (n, 6) as in `assembly`; ``vectors`` (n_contacts, 2, 12) of the contacts between
     ``block`` and ``other``; ``order`` (n_blocks,) the row of each block, −1 if fixed.
     """
-    at, unknown = np.nonzero(held & (order >= 0)[:, None])
-    row = order[at]
-    size = np.abs(matrix).max()
-    matrix[row, unknown, :] = 0.0
-    matrix[row, :, unknown] = 0.0
-    matrix[row, unknown, unknown] = size
-    right[row, unknown] = 0.0
-    vectors[:, :, :6] *= ~held[block, None]
-    vectors[:, :, 6:] *= ~held[other, None]
+    size = 0.0
+    for i in range(matrix.shape[0]):
+        for k in range(6):
+            size = max(size, abs(matrix[i, k, k]))
+    for b in range(held.shape[0]):
+        i = order[b]
+        if i < 0:
+            continue
+        for k in range(6):
+            if held[b, k]:
+                for m in range(6):
+                    matrix[i, k, m] = matrix[i, m, k] = 0.0
+                matrix[i, k, k] = size
+                right[i, k] = 0.0
+    for c in range(block.shape[0]):
+        for k in range(6):
+            if held[block[c], k]:
+                vectors[c, 0, k] = vectors[c, 1, k] = 0.0
+            if held[other[c], k]:
+                vectors[c, 0, 6 + k] = vectors[c, 1, 6 + k] = 0.0

@@ -20,6 +20,7 @@ from .loads import AppliedForces, Inertia, LoadMap, generalised
 from .moments import block_moments
 from .open_close import Settled, Unsettled, settle
 from .overlap import refuse_overlap
+from .rigid import mean_stress, with_rigid
 from .step import CrackResponse, NotConverged, StepResult
 from .time_integration import TimeScheme, advance, assemble_blocks
 from .viscous_boundary import QuietEdges
@@ -74,6 +75,10 @@ class BlockSystem:
         self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
         self._moving = np.flatnonzero(~self._fixed)
+        rigid = np.array([m.rigid for m in self.materials])[of] & ~self._fixed
+        self._rigid = np.flatnonzero(rigid)
+        self.compliance[rigid] = 0.0
+        self._held = with_rigid(blocks.held, rigid)
         self._turns = ~self._fixed if blocks.held is None else ~(self._fixed | blocks.held[:, 2])
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
@@ -252,7 +257,7 @@ class BlockSystem:
             )
             quiet.assemble(matrix, right, order, moments, dt)
         vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
-        held = self.blocks.held
+        held = self._held
         alone = static and self.blocks.n_blocks == 1 and n_free
         if alone and balanced(load[0], points, edges, self._mass[0] * gravity, moments[0]):
             held = with_rigid_motion(held)
@@ -296,6 +301,10 @@ class BlockSystem:
         )  # fmt: skip
 
         rows = found.rows(settled)
+        if len(self._rigid):
+            new_stress[self._rigid] = mean_stress(
+                self._rigid, rows, load, moments, density, acceleration, carried[:, 2], increment[:, 2]
+            )
         if scheme.mass_damping:
             acceleration = acceleration + scheme.mass_damping / dt * increment
         memory = rows

@@ -15,7 +15,8 @@ class Material:
     ``density`` kg/m³, ``youngs_modulus`` Pa, ``k_ic`` Pa √m (infinite: cracks in it do not grow), ``plane`` either
     "strain" or "stress". ``k_iic`` Pa √m is the toughness against growth in shear, asked for by the F-criterion alone;
     ``tensile_strength`` Pa, ``cohesion`` Pa and ``friction_angle`` rad (Mohr–Coulomb) are those of intact rock, asked for
-    where cracks may be born. What is infinite does not fail. Raises ValueError, naming the material, on constants
+    where cracks may be born. Blocks of a ``rigid`` material move as if they were stiffer than all others, by three unknowns; its
+    Young's modulus sets the springs of their contacts only. What is infinite does not fail. Raises ValueError, naming the material, on constants
     that no elastic solid has.
     """
 
@@ -29,6 +30,7 @@ class Material:
     tensile_strength: float = math.inf
     cohesion: float = math.inf
     friction_angle: float = 0.0
+    rigid: bool = False
 
     def __post_init__(self) -> None:
         def refuse(what: str) -> None:

@@ -133,6 +133,11 @@ class Problem:
     def __post_init__(self) -> None:
         if self.cracks.n_segments and not np.isin(self.cracks.block, np.arange(self.blocks.n_blocks)).all():
             raise ValueError("a crack lies in a block that does not exist")
+        for block in np.unique(self.cracks.block):
+            material = self.materials[self.blocks.material[block]]
+            if material.rigid:
+                name = self.blocks.names[block] if self.blocks.names else f"block {block}"
+                raise ValueError(f"{name!r} holds a crack, but its material {material.name!r} is rigid")
 
 
 def counted(number: int, noun: str) -> str:
