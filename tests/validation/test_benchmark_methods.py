@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geomech.bench import constant_elements, crack_accuracy, crack_problems, finite_elements, growth_run, work_precision
-from geomech.bench.work_precision import Point, time_to
+from geomech.bench.work_precision import Point, extrapolated, own_time, time_to
 from geomech.model import DdmSettings
 from geomech.render.work_precision import draw
 
@@ -65,6 +65,17 @@ def test_time_to_an_error_is_interpolated_and_not_guessed():
     assert time_to(points, "a", "other", 1e-3) is None
 
 
+def test_what_is_not_reached_is_extrapolated_in_the_other_method_s_favour():
+    """First order in the unknowns, time with their cube: time is taken to go on with the unknowns alone."""
+    points = [Point("a", "m", n, n, 1.0 / n, 1e-9 * n**3) for n in (100, 200)]
+    assert extrapolated(points, "a", "m", 1e-4) == pytest.approx(points[-1].seconds * 50)
+    points += [Point("a", "m", 400, 400, 1.0 / 201, 1.0)]
+    assert extrapolated(points, "a", "m", 1e-4) is None
+    own = [Point("a", work_precision.OURS, p, 1, 10.0**-p, 1e-3 * p) for p in (3, 5)]
+    own += [Point("a", work_precision.ASKED, d, 1, 1e-5, 2e-3) for d in (4, 5)]
+    assert own_time(own, "a", 1e-4) == pytest.approx(2e-3) and own_time(own, "a", 1e-9) is None
+
+
 def test_table_and_picture(tmp_path):
     """From made-up curves: a method that gets there has a ratio, one that does not the time it was given."""
     growth = dict.fromkeys(("increments", "elements_at_the_end"), 1)
@@ -83,6 +94,6 @@ def test_table_and_picture(tmp_path):
     assert not rows[work_precision.QUADRATIC]["reached"] and rows[work_precision.QUADRATIC]["ratio"] == pytest.approx(
         500
     )
-    assert "500, and then still at 1e-03" in work_precision._table(points, growth, goals)
+    assert "500  and then still at 1e-03; its error does not fall" in work_precision._table(points, growth, goals)
     path = draw(points, work_precision.METHODS, tmp_path / "picture.png")
     assert path.read_bytes().startswith(b"\x89PNG")
