@@ -143,10 +143,10 @@ def _constant_elements(name: str, problem: CrackProblem | None, low: float, long
         for method, k in zip((FITTED, CALIBRATED), found):
             rows[method].append(Point(name, method, n, unknowns, refined.error(k), seconds))
         most = MOST_UNKNOWNS * n // unknowns
-        if seconds > 0.9 * longest or n >= most:
+        if seconds >= longest or n >= most:
             return rows[FITTED] + rows[CALIBRATED]
         # Most of it goes with the third power of n.
-        rest = max(1.1, (1.1 * longest / seconds) ** (1 / 3))
+        rest = max(1.1, (1.2 * longest / seconds) ** (1 / 3))
         n = min(2 * n if rest > 2 else math.ceil(n * rest), most)
 
 

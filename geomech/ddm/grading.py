@@ -20,9 +20,9 @@ KINK = math.radians(20)
 #: A turn by more than this is a sharp kink, graded for good and by so many layers more (two of them: K_I 3.5 % → 1 %).
 SHARP_KINK = math.radians(60)
 SHARP_LAYERS = 2
-#: Beyond this a crack folds back on itself and gets more still (three: K of a fold by 150° 1.6 % → 0.2 %).
-FOLD = math.radians(130)
-FOLD_LAYERS = 3
+#: Beyond this a crack folds back on itself and gets a layer more for each of these angles: K of folds by 110° to 169° is
+#: then right to 1e-3 (without 1 to 4 % off, beyond 165° up to 15 %).
+FOLD, FOLD_LAYER = math.radians(100), math.radians(40 / 6)
 #: Layers that any node gets; the smallest element stays above `Grading.finest` anyhow.
 MOST_LAYERS = 12
 #: An element of length h at a distance r from the origin loses 1e-13 r/h of K, since its collocation points are rounded;
@@ -97,7 +97,7 @@ class Grading:
         if self.target is not None:
             return self.needed(math.pi + turn, "crack")
         if turn > SHARP_KINK and self.layers:
-            return self.layers + SHARP_LAYERS + (FOLD_LAYERS if turn > FOLD else 0)
+            return self.layers + SHARP_LAYERS + max(0, math.ceil((turn - FOLD) / FOLD_LAYER))
         return self.layers if turn > KINK and not forgotten else 0
 
     def at_node(self, wedges: np.ndarray, where: str) -> int:

@@ -11,8 +11,8 @@ from ..model.polygon import signed_area
 
 #: Lengths below this part of the extent are zero.
 _SMALL = 1e-9
-#: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: K is off by a few per cent
-#: there, and by more below.
+#: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: there K begins to be off by more
+#: than grading mends.
 SHARPEST_FOLD, SHARPEST_MOUTH = np.radians(10.0), np.radians(3.0)
 #: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two thousand.
 _PAIRS_AT_ONCE = 4_000_000
