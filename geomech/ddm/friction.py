@@ -140,8 +140,10 @@ class _Contact:
     def __init__(self, equations: FaceEquations, right: np.ndarray, memory: FaceMemory):
         self.equations, self.laws, self.right, self.memory = equations, equations.laws, right, memory
         self.broken = memory.broken.copy()
-        self.stress = max(float(np.abs(right).max()), np.finfo(float).tiny)
         self.length = float(self.laws.elements.length.max())
+        # Without load there is nothing to measure by but what slip has left behind.
+        left = 1e-8 * float(np.abs(memory.rest).max(initial=0.0)) / self.length
+        self.stress = max(float(np.abs(right).max()), left, np.finfo(float).tiny)
         self.solves = 0
 
     @property
