@@ -72,7 +72,10 @@ class Coupling:
 
     def cycles(self) -> Iterator[Cycle]:
         settings = self.problem.run
-        yield self._record(self.state, np.empty(0, TIP), {}, (), 0, {})
+        collapse = self._relax(self.state.time) if self.problem.dda.equilibrium else ()
+        yield self._record(self.state, np.empty(0, TIP), {}, collapse, 0, {})
+        if collapse:
+            return
         # Rounding of the summed steps must not add a last, empty one.
         end = settings.end_time - 1e-9 * self.problem.dda.time_step
         while self.state.time < end:
@@ -87,6 +90,13 @@ class Coupling:
         pending: tuple[Event, ...] = ()
         stops, load_time = False, None
         static = self.problem.dda.dynamic_factor == 0.0
+        if static and self.problem.dda.equilibrium == "loads":
+            collapse = self._relax(self.state.time + dt)
+            if collapse:
+                self.number += 1
+                self.state = replace(self.state, time=self.state.time + dt)
+                yield self._record(self.state, np.empty(0, TIP), {}, collapse, 0, {})
+                return True
         for growth_pass in range(self.problem.growth.max_passes + 1):
             self.number += 1
             try:
@@ -132,6 +142,24 @@ class Coupling:
                 return stops
             pending = self._take_growth(growth, result, solutions)
         raise AssertionError("unreachable: the last pass takes no growth")
+
+    def _relax(self, load_time: float) -> tuple[Event, ...]:
+        """Bring the blocks to rest under the loads of ``load_time``; a collapse when there is no equilibrium."""
+        settings = self.problem.dda
+        with self._timed("dda"):
+            found = dda.equilibrium(
+                self.system, self.state, self.problem.loads, load_time=load_time, crack=self.response,
+                tolerance=settings.unbalanced_tolerance,
+            )  # fmt: skip
+        # The budget is one of the steps that are recorded.
+        self.state, self.budget = found.state, self.budget.cut()
+        if not found.collapsed:
+            if not found.converged:
+                log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+            return ()
+        log.warning("t = %g s: %s; the run ends", load_time, found.reason)
+        first = int(self.blocks.vertex_start[found.moving[0]])
+        return (self._event("collapse", self.state, self.blocks.vertices[first], found.reason),)
 
     def _lost(self, state: State) -> tuple[Event, ...]:
         """A collapse, when a block has gone farther than the blocks reach: in statics nothing will hold it any more, and

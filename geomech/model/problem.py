@@ -24,12 +24,15 @@ class DdaSettings:
     has no dissipation; in between it has some; 2β ≥ γ ≥ ½. ``damping`` is the fraction of critical damping of a block's own lowest vibration (dynamic
     steps only); ``rayleigh_mass`` 1/s and ``rayleigh_stiffness`` s damp blocks by α M + β K besides (`rayleigh_coefficients`
     finds them). ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
-    height of the domain.
+    height of the domain. ``equilibrium`` says when a run seeks static equilibrium (`dda.equilibrium`): "" never, "start" before
+    it begins, "loads" at every load of a static run too; ``unbalanced_tolerance`` is its unbalanced force over the mean force.
     """
 
     time_step: float = 1.0
     dynamic_factor: float = 0.0
     newmark: tuple[float, float] = (0.5, 1.0)
+    equilibrium: str = ""
+    unbalanced_tolerance: float = 1e-6
     damping: float = 0.05
     rayleigh_mass: float = 0.0
     rayleigh_stiffness: float = 0.0

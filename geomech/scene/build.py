@@ -20,6 +20,7 @@ from ..model import (
     PointLoad,
     Problem,
     RunSettings,
+    ViscousBoundary,
     rayleigh_coefficients,
 )
 from .checks import carrier, gauge_carriers, material_of
@@ -55,6 +56,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
                 density=m.density_kg_m3,
                 k_ic=m.k_ic_pa_sqrt_m if m.k_ic_pa_sqrt_m is not None and tables.growth.enabled else math.inf,
                 plane=m.plane,
+                rigid=m.rigid,
                 tensile_strength=math.inf if m.tensile_strength_pa is None else m.tensile_strength_pa,
                 cohesion=math.inf if m.cohesion_pa is None else m.cohesion_pa,
                 friction_angle=math.radians(m.internal_friction_angle_deg),
@@ -148,6 +150,12 @@ def _loads(tables: SceneTables, check: Check) -> Loads:
             PointLoad(carrier(check, ("loads", "forces", k, "at"), "force", f.at, f.zone), f.at, force_history(f))
             for k, f in enumerate(tables.loads.forces)
         ),
+        viscous_boundaries=tuple(
+            ViscousBoundary(
+                v.edge, None if v.times_s is None else History(np.array(v.times_s), np.array(v.incoming_m_per_s))
+            )
+            for v in tables.loads.viscous_boundaries
+        ),
     )
 
 
@@ -176,6 +184,8 @@ def _dda(tables: SceneTables) -> DdaSettings:
         time_step=d.time_step_s,
         dynamic_factor=d.dynamic_factor,
         newmark=d.newmark,
+        equilibrium=d.equilibrium,
+        unbalanced_tolerance=d.unbalanced_tolerance,
         damping=d.damping,
         rayleigh_mass=mass,
         rayleigh_stiffness=stiffness,

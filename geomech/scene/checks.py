@@ -31,6 +31,8 @@ def check(c: Check) -> None:
         _points(c)
         _toughness(c)
         _strength(c)
+        _rigid(c)
+    _statics(c)
 
 
 def _times(c: Check) -> None:
@@ -42,6 +44,25 @@ def _times(c: Check) -> None:
             f"the time step ({c.tables.dda.time_step_s:g} s) is longer than the whole run "
             f"({c.tables.run.end_time_s:g} s)",
             "shorten dda.time_step_s, or raise run.end_time_s",
+        )
+
+
+def _statics(c: Check) -> None:
+    """What only static or only dynamic runs can do."""
+    dda, loads = c.tables.dda, c.tables.loads
+    if dda is None:
+        return
+    if dda.equilibrium == "loads" and dda.dynamic_factor > 0:
+        c.refuse(
+            ("dda", "equilibrium"),
+            "equilibrium at every load is for static runs, and dda.dynamic_factor is not 0",
+            'say equilibrium = "start" to begin at rest, or dynamic_factor = 0',
+        )
+    if loads is not None and loads.viscous_boundaries and dda.dynamic_factor == 0:
+        c.warn(
+            ("loads", "viscous_boundaries"),
+            "viscous boundaries do nothing in a static run",
+            "set dda.dynamic_factor = 1, or leave them out",
         )
 
 
@@ -236,6 +257,21 @@ def _strength(c: Check) -> None:
             "cracks are to be born, but no material has a strength that could be reached",
             "add tensile_strength_pa or cohesion_pa to a material",
         )
+
+
+def _rigid(c: Check) -> None:
+    """Cracks open in rock that strains."""
+    t = c.tables
+    if t.materials is None or t.zones is None:
+        return
+    for block in dict.fromkeys(c.drawing.cracks.block.tolist()):
+        name = material_of(t, c.drawing.zones[block])
+        if name in t.materials and t.materials[name].rigid:
+            c.refuse(
+                ("materials", name, "rigid"),
+                f"zone {c.drawing.zones[block]!r} holds a crack, but its material {name!r} is rigid",
+                "take rigid = true away, or give the zone a material of its own",
+            )
 
 
 def _toughness(c: Check) -> None:

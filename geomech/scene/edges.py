@@ -35,6 +35,13 @@ def _tractions(c: Check) -> None:
                 f"the geometry has no edge {traction.edge!r}",
                 _edge_hint(c, traction.edge, known, taken),
             )
+    for k, boundary in enumerate(c.tables.loads.viscous_boundaries):
+        if boundary.edge not in known:
+            c.refuse(
+                ("loads", "viscous_boundaries", k, "edge"),
+                f"the geometry has no edge {boundary.edge!r}",
+                _edge_hint(c, boundary.edge, known, set()),
+            )
     leading = c.tables.loads.leading_edge
     # Where a traction's own edge is wrong, it may be the one that leads.
     if leading is not None and leading not in taken and taken <= set(known):
@@ -70,7 +77,7 @@ def _unused(c: Check) -> None:
     t = c.tables
     if c.drawing.model is None or t.loads is None or t.joints is None:
         return
-    used = {traction.edge for traction in t.loads.tractions}
+    used = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
     idle = [name for name in _edge_names(c) if name not in used]

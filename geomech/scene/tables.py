@@ -110,6 +110,10 @@ class MaterialTable(Table):
         0.0, description="angle of internal friction of intact rock, beside its cohesion, degrees"
     )
     plane: Literal["strain", "stress"] = Field("strain", description='"strain" or "stress" in the plane')
+    rigid: bool = Field(
+        False,
+        description="true: its blocks move without straining; the modulus sets the springs of their contacts only",
+    )
 
 
 class ZoneTable(Table):
@@ -237,6 +241,27 @@ class ForceTable(_Timed):
         return self.value_n_per_m, self.rate_n_per_m_s, self.values_n_per_m, names
 
 
+class ViscousBoundaryTable(Table):
+    edge: str = Field(description="name of the edges that let waves out (dynamic runs)")
+    times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="times of `incoming_m_per_s`, s, ascending"
+    )
+    incoming_m_per_s: Points | None = Field(
+        None, description="particle velocity [[x, y], …] of a wave that enters there, at `times_s`, m/s (unset: none)"
+    )
+
+    @model_validator(mode="after")
+    def _one_history(self):
+        if (self.times_s is None) != (self.incoming_m_per_s is None):
+            raise ValueError("a wave takes `times_s` and `incoming_m_per_s` together")
+        if self.times_s is not None:
+            if len(self.times_s) != len(self.incoming_m_per_s) or not self.times_s:
+                raise ValueError("`times_s` and `incoming_m_per_s` need the same number of entries, at least one")
+            if any(b <= a for a, b in zip(self.times_s[:-1], self.times_s[1:])):
+                raise ValueError("`times_s` must ascend")
+        return self
+
+
 class LoadsTable(Table):
     gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
     gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
@@ -246,6 +271,9 @@ class LoadsTable(Table):
     )
     tractions: Annotated[tuple[TractionTable, ...], Strict(False)] = Field((), description="tractions on named edges")
     forces: Annotated[tuple[ForceTable, ...], Strict(False)] = Field((), description="forces on points")
+    viscous_boundaries: Annotated[tuple[ViscousBoundaryTable, ...], Strict(False)] = Field(
+        (), description="named edges that absorb waves, or let one in"
+    )
 
 
 class DdaTable(Table):
@@ -260,6 +288,14 @@ class DdaTable(Table):
         (0.5, 1.0),
         description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation; "
         "2β ≥ γ ≥ 0.5",
+    )
+    equilibrium: Literal["", "start", "loads"] = Field(
+        "",
+        description='when static equilibrium is sought, whatever the time step: "" never, "start" before the run begins, '
+        '"loads" at every load of a static run too; a run ends where there is none',
+    )
+    unbalanced_tolerance: Positive = Field(
+        1e-6, description="equilibrium: largest unbalanced force on a block, over the mean force on blocks"
     )
     rayleigh_fractions: Annotated[tuple[NotNegative, NotNegative], Strict(False)] | None = Field(
         None,

@@ -42,6 +42,28 @@ SPOILT = [
     ("density_kg_m3 = 2500", "density_kg_m3 = true", "materials.rock.density_kg_m3", "true stands", "density"),
     ("k_ic_pa_sqrt_m = 1e6", "", "materials.rock", "no fracture toughness", "growth.enabled = false"),
     ("[run]", '[growth]\ninitiation = "surface"\n[run]', "growth.initiation", "no material has", "tensile_strength_pa"),
+    (
+        "[run]",
+        '[[loads.viscous_boundaries]]\nedge = "load:tip"\n[dda]\ndynamic_factor = 1\n[run]',
+        "loads.viscous_boundaries[0].edge",
+        "no edge 'load:tip'",
+        "did you mean 'load:top'?",
+    ),
+    (
+        "[run]",
+        '[[loads.viscous_boundaries]]\nedge = "load:top"\ntimes_s = [0, 1]\n[run]',
+        "loads.viscous_boundaries[0]",
+        "together",
+        "",
+    ),
+    (
+        "[run]",
+        '[dda]\ndynamic_factor = 1\nequilibrium = "loads"\n[run]',
+        "dda.equilibrium",
+        "is for static runs",
+        'equilibrium = "start"',
+    ),
+    ("density_kg_m3 = 2500", "density_kg_m3 = 2500\nrigid = true", "materials.rock.rigid", "holds a crack", "rigid"),
     ("[run]", "[dda]\nnewmark = [0.2, 0.5]\n[run]", "dda.newmark", "not stable at every time step", "trapezoidal"),
     (
         "[run]",

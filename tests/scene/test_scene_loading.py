@@ -119,11 +119,17 @@ values_pa = [[0, 0], [0, -1e5], [1e4, -1e5]]
 at = [0.5, 0.9]
 rate_n_per_m_s = [0.0, -10.0]
 start_s = 4.0
+[[loads.viscous_boundaries]]
+edge = "load:top"
+times_s = [0, 1]
+incoming_m_per_s = [[0, 0], [0, -0.1]]
 [dda]
 time_step_s = 0.01
 dynamic_factor = 0.9
 damping = 0.1
 newmark = [0.25, 0.5]
+equilibrium = "start"
+unbalanced_tolerance = 1e-5
 rayleigh_fractions = [0.02, 0.03]
 rayleigh_frequencies_hz = [1, 4]
 max_displacement_ratio = 0.002
@@ -179,12 +185,16 @@ def test_every_setting_arrives(scene_file):
     assert p.loads.edge_tractions[0].history.at(2.0).tolist() == [5e3, -1e5]
     force = p.loads.point_loads[0]
     assert force.block == 0 and force.at == (0.5, 0.9) and force.history.at(5.0).tolist() == [0.0, -10.0]
+    (quiet,) = p.loads.viscous_boundaries
+    assert quiet.edge_name == "load:top" and quiet.incoming.at(0.5).tolist() == [0.0, -0.05]
     mass, stiffness = rayleigh_coefficients((0.02, 0.03), (1.0, 4.0))
     assert vars(p.dda) == {
         "time_step": 0.01,
         "dynamic_factor": 0.9,
         "damping": 0.1,
         "newmark": (0.25, 0.5),
+        "equilibrium": "start",
+        "unbalanced_tolerance": 1e-5,
         "rayleigh_mass": mass,
         "rayleigh_stiffness": stiffness,
         "max_displacement_ratio": 0.002,
