@@ -266,5 +266,6 @@ def _refuse_crooked(loop: np.ndarray, name: str) -> None:
 
 def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
     for x, y in hole:
-        if abs(winding_number([outline], np.array([x, y]))) < 0.25:
+        # On a corner where it touches the outline, a hole sees the outline's angle there.
+        if abs(winding_number([outline], np.array([x, y]))) < 1e-6:
             raise ValueError(f"{name}: a hole reaches out of the outline at ({x:g}, {y:g})")

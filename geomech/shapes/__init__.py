@@ -4,17 +4,21 @@ from importlib import import_module
 
 # Resolved on first use: Shapely and Gmsh are loaded by those who draw.
 _PUBLIC = {
+    "Cutting": "cutting",
     "EdgeLine": "parts",
     "Flaw": "parts",
     "GmshDrawing": "gmsh_model",
     "GmshModelError": "gmsh_model",
     "GmshUnavailable": "gmsh_session",
     "InteriorMesh": "meshing",
+    "Joint": "parts",
+    "Mend": "noding",
     "ShapeError": "parts",
     "Trace": "parts",
     "Zone": "parts",
     "assemble": "assembly",
     "block_names": "assembly",
+    "cut": "cutting",
     "cutting_cracks": "network",
     "mesh_interior": "meshing",
     "read_gmsh_model": "gmsh_model",

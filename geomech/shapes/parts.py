@@ -28,6 +28,15 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False)
+class Joint:
+    """Joints of one kind as drawn: ``lines`` are polylines (n, 2) along which rock parts; ``name`` is what the block edges on
+    both sides are called, as "joint:bedding"."""
+
+    name: str
+    lines: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class EdgeLine:
     """A name for all block edges that lie on the straight piece from ``start`` to ``end`` (of ``zone`` alone, if
     given)."""
@@ -39,7 +48,7 @@ class EdgeLine:
 
 
 class Flaw(NamedTuple):
-    """One thing wrong with a drawing: ``part`` is "zones", "cracks" or "edges", ``index`` its place in that list."""
+    """One thing wrong with a drawing: ``part`` is "zones", "cracks", "joints" or "edges", ``index`` its place in that list."""
 
     part: str
     index: int

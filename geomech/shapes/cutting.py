@@ -1,0 +1,292 @@
+"""Rock cut into blocks by joint traces: cleaned, noded, faces taken, dead ends kept as cracks.
+
+Everything nearer than the tolerance meets: ends stop on what they nearly reach, near corners become one, a trace that
+nearly passes through a corner passes through it. Outlines stand still; joints give way. What was mended is told with its
+place. Cuts are exact otherwise: the blocks tile their zones.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..model import Blocks, Cracks
+from .arrangement import Arrangement, arrange, polygons
+from .assembly import block_names
+from .noding import FREE, Drawn, Graph, Mend, noded
+from .parts import Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
+
+#: Near things meet within this part of the drawing's largest side, unless said otherwise.
+TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Cutting:
+    """What cutting gives.
+
+    zone      (n_blocks,)  the zone each block was cut from
+    mends                  what was moved, joined or left out
+    nodes                  {"I": n, "Y": n, "X": n}: ends in rock, junctions of three, crossings of four joints
+    """
+
+    blocks: Blocks
+    cracks: Cracks
+    zone: np.ndarray
+    mends: tuple[Mend, ...]
+    nodes: dict[str, int]
+
+
+def cut(
+    zones: Sequence[Zone],
+    joints: Sequence[Joint],
+    *,
+    tolerance: float | None = None,
+    dead_ends: str = "cracks",
+    shortest_crack: float = 0.0,
+    smallest_area: float = 0.0,
+) -> Cutting:
+    """Cut ``zones`` along ``joints``.
+
+    Joint ends that stop in rock become cracks ("cracks") or are taken away ("trim"), those shorter than
+    ``shortest_crack`` m always. Blocks smaller than ``smallest_area`` m² join the neighbour across their longest joint.
+    ``tolerance`` m, default `TOLERANCE` of the largest side. Block edges carry their zone's edge names and the joints'
+    names. Raises ShapeError where a joint or zone has no length, area or number, or ``tolerance`` leaves nothing in place.
+    """
+    _refuse_bad(zones, joints)
+    every = [np.asarray(loop, dtype=float) for zone in zones for loop in zone.loops]
+    origin = _origin(every)
+    every = [loop - origin for loop in every]
+    decimals = grid_decimals(every)
+    tolerance = TOLERANCE * extent_of(every) if tolerance is None else float(tolerance)
+    drawn = Drawn.of(zones, joints, origin, decimals)
+    # Crossings keep two digits more than what is drawn: corners of blocks stay on the lines of their neighbours.
+    decimals += 2
+    mends: list[Mend] = []
+    grid = 10.0**-decimals
+    graph = noded(drawn, tolerance, decimals, mends)
+    while True:
+        arrangement = arrange(graph.nodes, graph.edges)
+        shapes = polygons(arrangement.nodes, arrangement.loops)
+        zone = _zones_of(shapes, zones, origin)
+        keep = _kept(
+            arrangement, shapes, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, mends
+        )
+        if keep.all():
+            break
+        graph = graph.only(keep)
+    inside = np.flatnonzero(zone >= 0)
+    cracks = _cracks(arrangement, graph, drawn, inside)
+    blocks = _blocks(arrangement, drawn.names[graph.source], inside, [zones[z].name for z in zone[inside]], grid)
+    if origin.any():
+        blocks = blocks.with_vertices(blocks.vertices + origin)
+        cracks = replace(cracks, nodes=cracks.nodes + origin)
+        mends = [mend._replace(x=mend.x + origin[0], y=mend.y + origin[1]) for mend in mends]
+    return Cutting(blocks, cracks, zone[inside], tuple(mends), _node_types(graph, drawn))
+
+
+def _origin(loops: Sequence[np.ndarray]) -> np.ndarray:
+    """(2,) where to count from: the drawing's own origin, or a round point in the rock when that is far away."""
+    low, high = (
+        np.min([loop.min(axis=0) for loop in loops], axis=0),
+        np.max([loop.max(axis=0) for loop in loops], axis=0),
+    )
+    size = float((high - low).max())
+    if np.abs([low, high]).max() <= 10 * size:
+        return np.zeros(2)
+    unit = 10.0 ** np.floor(np.log10(size))
+    return np.round(0.5 * (low + high) / unit) * unit
+
+
+def _refuse_bad(zones: Sequence[Zone], joints: Sequence[Joint]) -> None:
+    flaws = []
+    for k, zone in enumerate(zones):
+        if not all(np.isfinite(loop).all() for loop in zone.loops):
+            flaws.append(
+                Flaw("zones", k, f"zone {zone.name!r} has a coordinate that is not a finite number", "mend it")
+            )
+        elif any(len(loop) < 3 for loop in zone.loops):
+            flaws.append(Flaw("zones", k, f"zone {zone.name!r} has a loop of fewer than three corners", "add corners"))
+    for k, joint in enumerate(joints):
+        for line in joint.lines:
+            if not np.isfinite(line).all():
+                flaws.append(
+                    Flaw("joints", k, f"joint {joint.name!r} has a coordinate that is not a finite number", "mend it")
+                )
+            elif len(line) < 2 or not np.hypot(*np.ptp(line, axis=0)) > 0:
+                flaws.append(
+                    Flaw("joints", k, f"joint {joint.name!r} has a trace without length", "give two different points")
+                )
+    if flaws:
+        raise ShapeError(flaws)
+
+
+def _zones_of(faces: np.ndarray, zones: Sequence[Zone], origin: np.ndarray) -> np.ndarray:
+    """(n_faces,) the zone each face lies in, −1 for none."""
+    import shapely
+
+    out = np.full(len(faces), -1)
+    if len(out):
+        inside = shapely.point_on_surface(faces)
+        drawn = [[np.asarray(loop) - origin for loop in zone.loops] for zone in zones]
+        shapes = [shapely.Polygon(loops[0], loops[1:]) for loops in drawn]
+        face, zone = shapely.STRtree(shapes).query(inside, predicate="within")
+        out[face] = zone
+    return out
+
+
+def _kept(
+    arrangement, shapes, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, mends
+) -> np.ndarray:
+    """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, the longest joint of
+    blocks too small."""
+    joint = graph.source >= drawn.n_outlines
+    side = np.append(zone, -1)  # face −1 is outside
+    left, right = side[arrangement.left], side[arrangement.right]
+    keep = ~(joint & (left < 0) & (right < 0))
+    dead = arrangement.dead & keep & joint
+    if dead.any():
+        gone = _short_dead_ends(arrangement, dead, np.inf if dead_ends == "trim" else max(shortest, tolerance), mends)
+        keep[gone] = False
+    import shapely
+
+    area, rim = shapely.area(shapes), shapely.length(shapes)
+    small = (zone >= 0) & ((area < smallest) | (2 * area < tolerance * rim))
+    if small.any():
+        span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
+        inner = keep & joint & (left == right) & (arrangement.left != arrangement.right)
+        for face in np.flatnonzero(small)[np.argsort(area[small])]:
+            own = np.flatnonzero(inner & ((arrangement.left == face) | (arrangement.right == face)))
+            if not len(own):
+                continue
+            other = arrangement.left[own] + arrangement.right[own] - face
+            neighbours, which = np.unique(other, return_inverse=True)
+            best = neighbours[np.argmax(np.bincount(which, weights=span[own]))]
+            keep[own[other == best]] = inner[own[other == best]] = False
+            at = shapely.point_on_surface(shapes[face])
+            mends.append(Mend("sliver", at.x, at.y, float(area[face])))
+    return keep
+
+
+def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float, mends: list[Mend]) -> np.ndarray:
+    """Indices of the ``dead`` edges that hang together over less than ``shortest``."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    index = np.flatnonzero(dead)
+    edges, nodes = arrangement.edges[index], arrangement.nodes
+    ring = np.zeros(len(nodes), bool)
+    ring[arrangement.edges[~arrangement.dead].ravel()] = True
+    # Dead ends on either side of a block edge do not hang together: a node on a ring counts once for each of its edges.
+    joined = [(k, int(node)) for k, pair in enumerate(edges) for node in pair if not ring[node]]
+    rows, columns = np.array(joined, dtype=int).reshape(-1, 2).T
+    incidence = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(index), len(nodes))).tocsr()
+    label = connected_components(incidence @ incidence.T, directed=False)[1]
+    ends = nodes[edges]
+    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    total = np.bincount(label, weights=length)
+    for part in np.flatnonzero(total < shortest):
+        at = ends[label == part].mean(axis=(0, 1))
+        mends.append(Mend("dead end", float(at[0]), float(at[1]), float(total[part])))
+    return index[total[label] < shortest]
+
+
+def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.ndarray) -> Cracks:
+    """Dead ends as cracks: one a run of edges of one joint between ends, junctions and mouths."""
+    block_of = np.full(len(arrangement.loops) + 1, -1)
+    block_of[inside] = np.arange(len(inside))
+    dead = np.flatnonzero(arrangement.dead & (block_of[arrangement.left] >= 0))
+    ring = np.zeros(len(graph.nodes), bool)
+    ring[graph.edges[~arrangement.dead].ravel()] = True
+    chains: list[tuple[int, list[int], int]] = []
+    for source in np.unique(graph.source[dead]):
+        own = dead[graph.source[dead] == source]
+        at: dict[int, list[int]] = {}
+        for e in own.tolist():
+            for node in graph.edges[e].tolist():
+                at.setdefault(node, []).append(e)
+        left = set(own.tolist())
+        # Ends first, so that every chain is walked from one end to the other.
+        for node in sorted(at, key=lambda k: (len(at[k]) == 2 and not ring[k], k)):
+            for first in at[node]:
+                if first not in left:
+                    continue
+                chain, e, here = [node], first, node
+                while e is not None:
+                    left.discard(e)
+                    a, b = graph.edges[e].tolist()
+                    here = b if a == here else a
+                    chain.append(here)
+                    onward = [o for o in at[here] if o in left]
+                    e = onward[0] if len(onward) == 1 and not ring[here] and len(at[here]) == 2 else None
+                chains.append((int(source), chain, int(block_of[arrangement.left[first]])))
+    if not chains:
+        return Cracks.from_polylines([], names=())
+    count: Counter[str] = Counter()
+    names = []
+    for source, _, _ in chains:
+        count[drawn.names[source]] += 1
+        names.append(f"{drawn.names[source]} {count[drawn.names[source]]}")
+    segments = np.array([pair for _, chain, _ in chains for pair in pairwise(chain)])
+    used, flat = np.unique(segments.ravel(), return_inverse=True)
+    lengths = [len(chain) - 1 for _, chain, _ in chains]
+    crack = np.repeat(np.arange(len(chains)), lengths)
+    return Cracks(
+        nodes=graph.nodes[used],
+        segments=flat.reshape(-1, 2),
+        crack=crack,
+        block=np.array([block for _, _, block in chains])[crack],
+        birth_cycle=np.zeros(len(crack), int),
+        aperture=np.zeros(len(crack)),
+        surface=ring[used],
+        names=tuple(names),
+    )
+
+
+def _blocks(
+    arrangement: Arrangement, names: np.ndarray, inside: np.ndarray, zone_names: list[str], grid: float
+) -> Blocks:
+    loops = [loop for face in inside for loop in arrangement.loops[face]]
+    edges = np.concatenate([own for face in inside for own in arrangement.loop_edges[face]])
+    count = np.array([len(loop) for loop in loops])
+    start = np.concatenate([[0], np.cumsum(count)])
+    points, label = arrangement.nodes[np.concatenate(loops)], names[edges]
+    following = np.arange(1, len(points) + 1)
+    following[start[1:] - 1] = start[:-1]
+    before = np.empty(len(points), int)
+    before[following] = np.arange(len(points))
+    a, b = points - points[before], points[following] - points
+    off = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    short = np.minimum(np.hypot(*a.T), np.hypot(*b.T))
+    # A neighbour's corner on a straight side is no corner of this block. The turn, over the longer edge, is within the grid:
+    # beside a short edge it may be more, and the corner stays.
+    flat = (off <= 8 * grid * short) & (np.einsum("ij,ij->i", a, b) > 0) & (label == label[before])
+    kept = np.flatnonzero(~flat)
+    owner = np.repeat(np.arange(len(loops)), count)[kept]
+    count = np.bincount(owner, minlength=len(loops))
+    start = np.concatenate([[0], np.cumsum(count)])
+    # From the lowest, then leftmost vertex on, whatever the order of the joints.
+    lowest = np.lexsort((points[kept, 0], points[kept, 1], owner))[start[:-1]]
+    place = np.arange(len(kept)) - start[owner] + (lowest - start[:-1])[owner]
+    kept = kept[start[owner] + place % count[owner]]
+    edge_names, edge_name = np.unique(np.append("", label[kept].astype(str)), return_inverse=True)
+    n_blocks = len(inside)
+    return Blocks(
+        vertices=points[kept],
+        loop_start=start,
+        block_loop=np.concatenate([[0], np.cumsum([len(arrangement.loops[face]) for face in inside], dtype=int)]),
+        material=np.zeros(n_blocks, int),
+        fixed=np.zeros(n_blocks, bool),
+        edge_name=edge_name[1:],
+        edge_names=tuple(edge_names.tolist()),
+        names=tuple(block_names(zone_names)),
+    )
+
+
+def _node_types(graph: Graph, drawn: Drawn) -> dict[str, int]:
+    joint = graph.source >= drawn.n_outlines
+    degree = np.bincount(graph.edges[joint].ravel(), minlength=len(graph.nodes))[graph.home == FREE]
+    return {"I": int((degree == 1).sum()), "Y": int((degree == 3).sum()), "X": int((degree >= 4).sum())}
