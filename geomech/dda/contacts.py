@@ -11,7 +11,7 @@ import numpy as np
 
 from ..model import CONTACT, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from .contact_search import describe_contacts, find_contacts
-from .contact_springs import PENALTY_RATIO, JointTable, Springs, contact_springs
+from .contact_springs import JointTable, Springs, contact_springs, penalties
 from .curved_joints import CurvedJoints
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class ContactFinder:
         self._n_joints = len(joints)
         self._joint_index = joint_index
         self._settings = settings
-        self._modulus = modulus
+        self._modulus, self._area = modulus, blocks.areas()
         self._table = JointTable.of(joints)
         self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
         self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
@@ -153,9 +153,11 @@ class ContactFinder:
         )
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
-        stiffest = PENALTY_RATIO * np.maximum(self._modulus[block], self._modulus[other])
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
-        normal = stiffest if kn is None else np.full(len(block), float(kn))
+        if kn is None:
+            normal = penalties(block, other, length, self._modulus, self._area, self._fixed)
+        else:
+            normal = np.full(len(block), float(kn))
         return contact_springs(
             self._table, law, length, normal, normal if ks is None else np.full(len(block), float(ks))
         )

@@ -42,7 +42,7 @@ class BlockSystem:
 
     ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
     means that such edges do not touch; without it the first law holds everywhere. Contact springs are
-    ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default 40 times the stiffer block's E', both equal.
+    ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks (`penalties`).
 
     Raises ValueError when materials or joints are missing or a block has no area.
     """
