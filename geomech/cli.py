@@ -21,7 +21,7 @@ for _library in ("OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-BENCHMARKS = ("accuracy", "ddm", "kernels", "many", "stability", "startup")
+BENCHMARKS = ("accuracy", "dda", "ddm", "kernels", "many", "stability", "startup")
 #: Pixels, as for a scene's own render.width_px.
 LEAST_WIDTH = 64
 

@@ -1,0 +1,290 @@
+"""What a step of many blocks costs and how right it is: walls and jointed slopes of 100 to 100 000 blocks.
+
+Steps of 10 ms from rest under sudden weight, as many as half a minute has room for (one at least); the cost of an open–close
+iteration is that of the step over its iterations. Beside it the share of the contact search, the memory of the process, the
+exponent of the cost, iterative solutions of the last equations, and errors against closed forms.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import statistics
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..model import Blocks, JointLaw, State
+from . import block_scenes
+from .block_iteration import Iterated, block_jacobi, two_levels
+from .block_scenes import FRICTION, GRAVITY, JOINT, ROCK, WEIGHT
+
+#: Where the picture and the numbers go, below the working folder.
+FOLDER = Path("outputs/bench_dda")
+TIME_STEP = 0.01
+SIZES = (100, 1000, 10_000, 100_000)
+#: Blocks up to which the last equations are solved iteratively too: block Jacobi takes minutes beyond.
+ITERATED = 10_000
+SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
+
+#: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours → seconds
+#: an open–close iteration.
+SHI = {106: 0.0015, 411: 0.014, 1009: 0.084, 2003: 0.29, 4001: 0.99}
+#: Goals on two cores: blocks of a wall → seconds an iteration; exponent of the cost from 1 000 blocks on; share of the search.
+GOALS, EXPONENT, SEARCH = {1000: 6e-3, 10_000: 0.1}, 1.1, 0.25
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Medians over ``steps``: seconds of a step, of an iteration, of its solution, and of a step's contact search; memory of
+    the process at its peak, MB; ``factored`` of every factorisation; ``imbalance``: error of weight − inertia = reaction."""
+
+    scene: str
+    blocks: int
+    contacts: int
+    steps: int
+    iterations: float
+    step: float
+    iteration: float
+    solution: float
+    search: float
+    memory: float
+    factored: float
+    imbalance: float
+
+
+@dataclass(eq=False)
+class Watch:
+    """Seconds spent in contact searches and in solutions, and the last equations solved."""
+
+    search: float = 0.0
+    solution: float = 0.0
+    solutions: int = 0
+    last: tuple | None = None
+
+
+@contextmanager
+def _watched() -> Iterator[Watch]:
+    from ..dda.block_solver import BlockSolver
+    from ..dda.contacts import ContactFinder
+
+    watch, find, solve = Watch(), ContactFinder.find, BlockSolver.solve
+
+    def timed_find(self, *given):
+        began = time.perf_counter()
+        try:
+            return find(self, *given)
+        finally:
+            watch.search += time.perf_counter() - began
+
+    def timed_solve(self, data, right):
+        began = time.perf_counter()
+        try:
+            return solve(self, data, right)
+        finally:
+            watch.solution += time.perf_counter() - began
+            watch.solutions += 1
+            watch.last = self, data, right
+
+    ContactFinder.find, BlockSolver.solve = timed_find, timed_solve
+    try:
+        yield watch
+    finally:
+        ContactFinder.find, BlockSolver.solve = find, solve
+
+
+def measure(quick: bool = False) -> str:
+    """The table; leaves ``cost_of_size.png`` and ``cost_of_size.json`` in `FOLDER`. ``quick`` stops at 1 000 blocks."""
+    from ..render.cost_of_size import draw
+
+    run(block_scenes.wall(100), 0.0)  # compiles
+    costs: list[Cost] = []
+    iterated: list[dict] = []
+    for n in SIZES[:2] if quick else SIZES:
+        for name, make in SCENES.items():
+            cost, others = _measured(name, make(n), 4.0 if quick else 30.0, n <= ITERATED)
+            costs.append(cost)
+            for other in others:
+                told = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
+                iterated.append({"scene": name, "blocks": cost.blocks, **told})
+    exponents = {name: _exponent([c for c in costs if c.scene == name]) for name in SCENES}
+    errors = _errors()
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    written = {
+        "costs": [asdict(c) for c in costs], "exponents": exponents, "iterated": iterated, "errors": errors,
+        "shi_s_per_iteration": SHI, "quick": quick,
+    }  # fmt: skip
+    (FOLDER / "cost_of_size.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
+    draw(costs, SHI, FOLDER / "cost_of_size.png")
+    return _table(costs, exponents, iterated, errors)
+
+
+def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, object]:
+    """Steps until ``longest`` s are over: what each took, the watch, the last result and the system."""
+    from .. import dda
+
+    system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(TIME_STEP))
+    state, rows, result = State.at_rest(blocks), [], None
+    with _watched() as watch:
+        began = time.perf_counter()
+        while not rows or (time.perf_counter() - began < longest and len(rows) < 40):
+            before = watch.search, watch.solution, watch.solutions
+            start = time.perf_counter()
+            result = system.step(state, WEIGHT)
+            seconds = time.perf_counter() - start
+            state = result.state
+            spent, solution, solutions = (
+                after - b for after, b in zip((watch.search, watch.solution, watch.solutions), before, strict=True)
+            )
+            rows.append(
+                {
+                    "seconds": seconds,
+                    "iterations": solutions,
+                    "iteration": (seconds - spent) / solutions,
+                    "search": spent,
+                    "solution": solution / solutions,
+                }
+            )
+    return rows, watch, result, system
+
+
+def _measured(name: str, blocks: Blocks, longest: float, also_iterated: bool) -> tuple[Cost, list[Iterated]]:
+    rows, watch, result, system = run(blocks, longest)
+    # What a scene pays once, patterns and orderings, is in the first step.
+    regular = rows[1:] or rows
+
+    def median(key: str) -> float:
+        return statistics.median(row[key] for row in regular)
+
+    solver, data, right = watch.last
+    counts = solver.counts
+    cost = Cost(
+        name,
+        int((~np.asarray(blocks.fixed, bool)).sum()),
+        len(result.contacts),
+        len(rows),
+        statistics.mean(row["iterations"] for row in rows),
+        median("seconds"),
+        median("iteration"),
+        median("solution"),
+        median("search"),
+        _peak_memory(),
+        counts["shares"] / max(1, counts["factorisations"]),
+        _imbalance(blocks, system, result),
+    )
+    if not also_iterated:
+        return cost, []
+    free = ~np.asarray(blocks.fixed, bool)
+    centroid, area = result.forces.centroid[free], result.forces.area[free]
+    x = solver.solve(data, right)
+    residual = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
+    return cost, [
+        Iterated("direct", 1, cost.solution, residual, x),
+        block_jacobi(solver, data, right),
+        two_levels(solver, centroid, np.sqrt(area), data, right),
+    ]
+
+
+def _imbalance(blocks: Blocks, system, result) -> float:
+    """|Σ m (g + a) − reaction of the fixed blocks| over the weight, upwards."""
+    from ..dda.step import contact_resultants
+
+    fixed = np.asarray(blocks.fixed, bool)
+    mass = system.density * blocks.areas()
+    pushed = contact_resultants(result.contacts, blocks.n_blocks, result.forces.centroid)[fixed, 1].sum()
+    acting = (mass * (GRAVITY + result.acceleration[:, 1]))[~fixed].sum()
+    return float(abs(acting + pushed) / (GRAVITY * mass[~fixed].sum()))
+
+
+def _peak_memory() -> float:
+    try:
+        import resource
+    except ImportError:
+        return math.nan
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _exponent(costs: list[Cost]) -> float:
+    """Of the seconds of an iteration in the number of blocks, by regression from the second size on (or all of two)."""
+    used = costs[1:] if len(costs) > 2 else costs
+    n, seconds = np.log([c.blocks for c in used]), np.log([c.iteration for c in used])
+    return float(np.polyfit(n, seconds, 1)[0])
+
+
+def _errors() -> dict[str, float]:
+    """Relative errors against closed forms: the way of a block that slides, the creep of one that sticks, the shortening of
+    a column of twenty blocks under its own weight, a wall's reaction at rest."""
+    from .. import dda
+
+    def states(blocks: Blocks, dt: float, end: float, dynamic: bool = True):
+        settings = block_scenes.settings(dt, dynamic)
+        return list(dda.run(blocks, [ROCK], [JOINT], WEIGHT, settings, end))
+
+    out = {}
+    angle, end = math.radians(50), 0.25
+    slid = states(block_scenes.incline(-angle), 1e-3, end)
+    way = np.linalg.norm((slid[-1].vertices - slid[0].vertices)[4:].mean(axis=0))
+    expected = 0.5 * GRAVITY * (math.sin(angle) - math.tan(FRICTION) * math.cos(angle)) * end**2
+    out["block that slides at 50°, way after 0.25 s"] = float(abs(way / expected - 1))
+    rest = states(block_scenes.incline(-math.radians(30)), 1e-3, end)
+    crept = np.linalg.norm((rest[-1].vertices - rest[0].vertices)[4:].mean(axis=0))
+    out["block that sticks at 30°, creep in 0.25 s over the way it would slide without friction"] = float(
+        crept / (0.5 * GRAVITY * math.sin(math.radians(30)) * end**2)
+    )
+    blocks = block_scenes.column(20)
+    # Without friction, so that every block may widen.
+    system = dda.BlockSystem(blocks, [ROCK], [JointLaw("smooth")], settings=block_scenes.settings(1.0, dynamic=False))
+    state = State.at_rest(blocks)
+    for _ in range(3):
+        result = system.step(state, WEIGHT)
+        state = result.state
+    heights = state.vertices[:, 1].reshape(-1, 4)
+    shortening = (1.0 - (heights[1:, 2:].mean(axis=1) - heights[1:, :2].mean(axis=1))).sum()
+    expected = ROCK.density * GRAVITY * 20**2 / 2 / ROCK.plane_modulus
+    out["column of 20 blocks, own shortening"] = float(abs(shortening / expected - 1))
+    out["column of 20 blocks, reaction"] = _imbalance(blocks, system, result)
+    return out
+
+
+def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict], errors: dict[str, float]) -> str:
+    head = "  scene          blocks  contacts  steps  iterations   s/step  ms/iteration  of it solving  search/step"
+    busy = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
+    lines = [
+        f"steps of {1e3 * TIME_STEP:g} ms from rest under sudden weight; medians, the first step left out; iterations are",
+        f"solutions of the step's equations; {len(os.sched_getaffinity(0))} cores, load average of the machine {busy}",
+        f"{head}   memory  imbalance",
+    ]
+    lines += [
+        f"  {c.scene:<13}{c.blocks:8d}{c.contacts:10d}{c.steps:7d}{c.iterations:12.1f}{c.step:9.3g}{1e3 * c.iteration:14.2f}"
+        f"{c.solution / c.iteration:15.0%}{c.search / c.step:13.1%}{c.memory:7.0f} MB{c.imbalance:11.1e}"
+        for c in costs
+    ]
+    lines += [f"  exponent of an iteration's cost, {name}: {e:.2f} (goal {EXPONENT})" for name, e in exponents.items()]
+    lines += [
+        "",
+        "an iteration of a wall beside Shi's DDA in C (measured on a machine of the same kind, cost as n^1.8)",
+    ]
+    known_n, known_s = np.log(list(SHI)), np.log(list(SHI.values()))
+    for c in costs:
+        if c.scene == "wall":
+            his = math.exp(np.interp(math.log(c.blocks), known_n, known_s)) if c.blocks <= max(SHI) else None
+            goal = GOALS.get(10 ** round(math.log10(c.blocks)))
+            said = f"{his / c.iteration:8.1f} times as fast" if his else "   beyond his memory"
+            lines.append(
+                f"  {c.blocks:8d} blocks {1e3 * c.iteration:9.2f} ms {said}"
+                + (f"  (goal {1e3 * goal:g} ms)" if goal else "")
+            )
+    lines += ["", "the last equations solved in other ways, set-up included (residual over right side)"]
+    lines += [
+        f"  {row['scene']:<13}{row['blocks']:8d}  {row['method']:<24}{row['iterations']:6d} iterations"
+        f"{1e3 * row['seconds']:10.1f} ms   {row['residual']:.0e}"
+        for row in iterated
+    ]
+    lines += ["", "errors against closed forms"]
+    lines += [f"  {name:<88}{value:8.1e}" for name, value in errors.items()]
+    return "\n".join(lines)
