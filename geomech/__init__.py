@@ -2,7 +2,7 @@
 
 Blocks slide and rotate along joints (discontinuous deformation analysis, `geomech.dda`), cracks grow through the rock
 bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` lets each drive the
-other. `load_scene`, `cycles` and `run` are the whole pipeline; each solver also stands alone.
+other. `load_scene`, `cycles`, `run` and `factor_of_safety` are the whole pipeline; each solver also stands alone.
 """
 
 import os
@@ -20,7 +20,12 @@ if "numba" not in sys.modules:
     os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(_cache).expanduser() / "geomech" / "kernels"))
 
 # Resolved on first use, so that `import geomech` costs nothing that is not asked for.
-_PUBLIC = {"load_scene": "geomech.scene", "cycles": "geomech.pipeline", "run": "geomech.pipeline"}
+_PUBLIC = {
+    "load_scene": "geomech.scene",
+    "cycles": "geomech.pipeline",
+    "run": "geomech.pipeline",
+    "factor_of_safety": "geomech.pipeline",
+}
 
 __all__ = ["__version__", *_PUBLIC]
 

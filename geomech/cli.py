@@ -1,4 +1,4 @@
-"""The command line: ``geomech check | run | render | report | bench | doctor``.
+"""The command line: ``geomech check | run | safety | render | report | bench | doctor``.
 
 Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input. Nothing heavy is imported before a
 verb asks for it.
@@ -84,6 +84,27 @@ def _parser() -> argparse.ArgumentParser:
     _scene_arguments(run)
     run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default outputs/NAME[/VARIANT])")
     run.add_argument("--quiet", action="store_true", help="say nothing but errors")
+
+    safety = verb(
+        "safety", _safety, "find by what factor the strength of joints may be divided before the blocks go",
+        "geomech safety slope.toml\ngeomech safety slope.toml --reduce bedding --tolerance 1e-3 --out safety.json",
+    )  # fmt: skip
+    safety.description += (
+        " tan φ, cohesion and tensile strength of the joints are divided by F until no static equilibrium is left; cracks"
+        " inside blocks are left out."
+    )
+    _scene_arguments(safety)
+    safety.add_argument(
+        "--reduce", action="append", metavar="JOINT", help="weaken this joint only (may be repeated; default: all)"
+    )
+    safety.add_argument(
+        "--tolerance", type=float, default=2e-3, metavar="X", help="relative width of the bracket (2e-3)"
+    )
+    safety.add_argument("--at", type=float, metavar="S", help="time whose loads act, s (default: the scene's end)")
+    safety.add_argument(
+        "--out", type=Path, metavar="FILE", help="write the trials and the answer to a JSON file as well"
+    )
+    safety.add_argument("--quiet", action="store_true", help="say nothing of the trials while they are made")
 
     render = verb(
         "render", _render, "draw a run: the last cycle as a picture, its growth as a movie, its curves",
@@ -179,6 +200,36 @@ def _run(options: argparse.Namespace) -> int:
         # One variant with --out goes into exactly that folder.
         folder = base if name is None or (options.out and len(scenes) == 1) else base / name
         run(scene, out=folder, observers=standard_observers(scene, quiet=options.quiet))
+    return DONE
+
+
+def _safety(options: argparse.Namespace) -> int:
+    from .output.summary import write_json
+    from .pipeline import factor_of_safety
+    from .scene import load_scene
+
+    scenes = _scenes(load_scene(options.scene, options.overrides, None), options)
+    _say_warnings(scenes.values())
+    told = {}
+    for name, scene in scenes.items():
+        problem = scene.problem()
+        if problem.cracks.n_cracks:
+            _say("warning: cracks inside blocks are left out")
+
+        def say(trial) -> None:
+            _say(f"  F = {trial.factor:.4f}: {trial.reason}")
+
+        try:
+            found = factor_of_safety(
+                scene, options.at, reduce=options.reduce, tolerance=options.tolerance,
+                watch=None if options.quiet else say,
+            )  # fmt: skip
+        except ValueError as error:
+            raise BadInput(str(error)) from error
+        print(f"{problem.title or options.scene}" + (f", {name}" if name else "") + f"\n{found.table()}", flush=True)
+        told[name or "scene"] = found.as_dict(problem.blocks)
+    if options.out:
+        write_json(options.out, told)
     return DONE
 
 

@@ -68,6 +68,22 @@ def run_problem(
     return summary
 
 
+def factor_of_safety(scene, load_time: float | None = None, **wishes):
+    """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
+    (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: reduce, tolerance, watch …
+
+    Blocks are whole: cracks inside them are left out. Raises SceneError on bad input, ValueError where there is no strength
+    to reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
+    """
+    from . import dda
+
+    problem = _loaded(scene).problem()
+    return dda.factor_of_safety(
+        problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index,
+        load_time=problem.run.end_time if load_time is None else load_time, **wishes,
+    )  # fmt: skip
+
+
 def _spare(scene, folder: Path) -> None:
     """Refuse to put a run, and with it a scene.toml, where the scene itself is kept."""
     kept = folder / "scene.toml"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
+import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +15,7 @@ import pytest
 from geomech import __version__, doctor
 from geomech.cli import BAD_INPUT, DONE, FAILED, default_folder, main
 
-VERBS = ("check", "run", "render", "report", "doctor")
+VERBS = ("check", "run", "safety", "render", "report", "doctor")
 SPECIMEN = """
 title = "A plate"
 [geometry]
@@ -362,3 +364,45 @@ def test_a_scene_runs_from_the_command_line_to_its_folder(tmp_path, capsys):
     grid = run.grid("interior", int(run.history["cycle"][-1]))
     corner = np.hypot(*(grid.points[:, :2] - (0.02, 0.05)).T).argmin()
     assert grid["stress"][corner, 1] == pytest.approx(-0.4e6, rel=0.05)
+
+
+SLOPE = """
+title = "A slab on a slope"
+[geometry]
+zones = [
+    { name = "base", polygon = [[0.0, 0.0], [10.0, 0.0], [10.0, 5.0]] },
+    { name = "slab", polygon = [[4.0, 2.0], [6.0, 3.0], [6.0, 4.0], [4.0, 3.0]] },
+]
+[materials.rock]
+youngs_modulus_pa = 50e9
+poissons_ratio = 0.2
+density_kg_m3 = 2600
+[zones.base]
+fixed = true
+[joints.default]
+friction_angle_deg = 35.0
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+[dda]
+time_step_s = 0.01
+[run]
+end_time_s = 1.0
+"""
+
+
+def test_safety_prints_trials_and_mechanism(tmp_path, capsys):
+    scene, answer = tmp_path / "slope.toml", tmp_path / "safety.json"
+    scene.write_text(SLOPE)
+    assert main(["safety", str(scene), "--out", str(answer)]) == DONE
+    out, err = capsys.readouterr()
+    # tan φ / tan α
+    factor = math.tan(math.radians(35)) / 0.5
+    assert f"factor of safety {factor:.4f}" in out
+    assert "slab: 1.00 of the fastest, towards -153°" in out
+    assert "F = 1.0000: at rest" in err
+    told = json.loads(answer.read_text())["scene"]
+    assert told["factor_of_safety"] == pytest.approx(factor, rel=1e-6)
+    assert list(told["moving"]) == ["slab"]
+    assert main(["safety", str(scene), "--reduce", "bedding"]) == BAD_INPUT
+    assert "no joint 'bedding' to reduce" in capsys.readouterr().err
+    assert main(["safety", str(scene), "--set", "joints.default.friction_angle_deg=0.0"]) == BAD_INPUT

@@ -79,6 +79,25 @@ class FactorOfSafety:
         lines.append(f"factor of safety {found}" + (", moving at failure:" if self.mechanism else ""))
         return "\n".join([*lines, *(f"  {line}" for line in self.mechanism)])
 
+    def as_dict(self, blocks: Blocks) -> dict[str, object]:
+        """Plain numbers for a file: the answer, its trials, and how ``blocks`` move at failure, the farthest one
+        by 1."""
+        failed = min((t for t in self.trials if not t.stable), key=lambda t: t.factor, default=None)
+        moving = {}
+        if failed is not None and self.moving:
+            far = float(np.hypot(*failed.displacement[self.moving[0]]))
+            for b in self.moving:
+                way, turn = (failed.displacement[b] / far).tolist(), float(failed.rotation[b] / far)
+                moving[blocks.names[b]] = {"displacement": way, "rotation_per_m": turn}
+        plain = ("factor", "stable", "steps", "unbalanced", "drift", "reason")
+        return {
+            "factor_of_safety": self.factor,
+            "lower": self.lower,
+            "upper": self.upper if math.isfinite(self.upper) else None,
+            "moving": moving,
+            "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],
+        }
+
 
 def factor_of_safety(
     blocks: Blocks,
