@@ -1,0 +1,86 @@
+"""Block theory in two dimensions on blocks whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.model.key_blocks import FALLS, FIXED, FRICTION, HELD, SAFE, SLIDES, key_blocks
+
+ROCK = Material("rock", 10e9, 0.25, density=2600.0)
+DOWN = np.array([0.0, -9.81])
+
+
+def polygon(*points) -> np.ndarray:
+    return np.array(points, dtype=float)
+
+
+def found(polygons, law: JointLaw, gravity=DOWN, fixed=None) -> np.ndarray:
+    """KEY_BLOCK rows of blocks that touch as drawn (a static step of no load finds the contacts)."""
+    blocks = Blocks.from_polygons(polygons, fixed=fixed or [True] + [False] * (len(polygons) - 1))
+    system = dda.BlockSystem(blocks, [ROCK], [law], settings=DdaSettings(max_displacement_ratio=0.1))
+    state = system.step(State.at_rest(blocks), Loads(gravity=History.constant([0.0, 0.0])), 1e-3).state
+    return key_blocks(blocks, [ROCK], [law], state, gravity)
+
+
+def roof(half_top: float, half_bottom: float) -> list[np.ndarray]:
+    """Two abutments, and between them a block of those half-widths at its top and bottom, 1 m high."""
+    left = polygon([-3, 0], [-half_bottom, 0], [-half_top, 1], [-3, 1])
+    right = polygon([half_bottom, 0], [3, 0], [3, 1], [half_top, 1])
+    middle = polygon([-half_bottom, 0], [half_bottom, 0], [half_top, 1], [-half_top, 1])
+    return [left, right, middle]
+
+
+@pytest.mark.parametrize(("friction_deg", "kind"), [(30, SLIDES), (50, FRICTION)])
+def test_a_block_on_an_incline_slides_or_is_held(friction_deg, kind):
+    law = JointLaw("joint", np.radians(friction_deg))
+    rows = found([polygon([0, 0], [4, 0], [4, 4]), polygon([1, 1], [2, 2], [2, 3], [1, 2])], law)
+    assert rows["kind"].tolist() == [FIXED, kind]
+    assert np.degrees(rows["direction"][1]) == pytest.approx(-135, abs=0.01)
+    assert rows["factor"][1] == pytest.approx(np.tan(np.radians(friction_deg)), rel=1e-4)
+
+
+def test_cohesion_counts_while_it_holds():
+    law = JointLaw("joint", np.radians(30), cohesion=10e3)
+    rows = found([polygon([0, 0], [4, 0], [4, 4]), polygon([1, 1], [2, 2], [2, 3], [1, 2])], law)
+    weight = 2600 * 9.81
+    expected = np.tan(np.radians(30)) + 10e3 * np.sqrt(2) / (weight * np.sin(np.pi / 4))
+    assert rows["factor"][1] == pytest.approx(expected, rel=1e-3)
+    assert rows["kind"][1] == FRICTION
+
+
+def test_roof_blocks_are_told_by_their_taper():
+    law = JointLaw("joint", 0.5)
+    fixed = [True, True, False]
+    # Wider below: falls out of the roof. Wider above: nothing lets it down, it can only be lifted out.
+    assert found(roof(0.5, 1.0), law, fixed=fixed)["kind"].tolist() == [FIXED, FIXED, FALLS]
+    assert found(roof(1.0, 0.5), law, fixed=fixed)["kind"].tolist() == [FIXED, FIXED, SAFE]
+    # Upside down it is the other way round.
+    assert found(roof(0.5, 1.0), law, -DOWN, fixed)["kind"][2] == SAFE
+
+
+def test_a_block_with_neighbours_all_round_is_held_and_a_loose_one_falls():
+    square = polygon([0, 0], [1, 0], [1, 1], [0, 1])
+    ring = [square + [dx, dy] for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1))]
+    rows = found([*ring, square, square + [5.0, 5.0]], JointLaw("joint", 0.5), fixed=[True] * 4 + [False] * 2)
+    assert rows["kind"].tolist() == [FIXED] * 4 + [HELD, FALLS]
+
+
+def test_without_gravity_only_removability_is_told():
+    rows = found(roof(0.5, 1.0), JointLaw("joint", 0.5), np.zeros(2), [True, True, False])
+    assert rows["kind"][2] == SAFE
+    assert np.degrees(rows["direction"][2]) == pytest.approx(-90, abs=0.01)
+
+
+def test_blocks_are_ranked_by_how_far_they_have_moved():
+    blocks = Blocks.from_polygons([polygon([k, 0], [k + 0.5, 0], [k, 1]) for k in range(4)], fixed=[1, 0, 0, 0])
+    state = State.at_rest(blocks)
+    state.vertices[3:6] += [0.1, 0.0]
+    state.vertices[9:12] += [0.0, -0.3]
+    state.velocity[2, :2] = [3.0, 4.0]
+    rows = key_blocks(blocks, [ROCK], [JointLaw("j")], state, DOWN)
+    assert rows["rank"].tolist() == [3, 1, 2, 0]
+    assert rows["displacement"] == pytest.approx([0, 0.1, 0, 0.3])
+    assert rows["speed"][2] == 5.0
