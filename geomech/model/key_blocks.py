@@ -19,7 +19,7 @@ from .material import Material
 from .state import OPEN, State
 
 #: Classes of blocks, by number.
-HELD, SAFE, FRICTION, SLIDES, FALLS, FIXED = 0, 1, 2, 3, 4, -1
+HELD, SAFE, FRICTION, SLIDES, FALLS, FIXED, UNKNOWN = 0, 1, 2, 3, 4, -1, -2
 CLASSES = {
     HELD: "held by its neighbours",
     SAFE: "removable, pushed in",
@@ -27,6 +27,7 @@ CLASSES = {
     SLIDES: "key block, slides",
     FALLS: "key block, falls",
     FIXED: "fixed",
+    UNKNOWN: "not known before contacts have been sought",
 }
 
 #: One row a block.
@@ -54,6 +55,7 @@ def key_blocks(
 
     Corners that only meet corners hold no block here: they let each other pass.
     """
+    joints = joints or (JointLaw("frictionless"),)
     out = np.zeros(blocks.n_blocks, KEY_BLOCK)
     fixed = np.asarray(blocks.fixed, dtype=bool)
     out["direction"] = out["factor"] = np.nan

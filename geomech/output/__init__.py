@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from .histories import Histories
+from .joint_histories import JointHistories
 from .observer import Group, Observer
 from .progress import Progress
 from .reading import Run
@@ -19,6 +20,7 @@ from .summary import Summary
 __all__ = [
     "Group",
     "Histories",
+    "JointHistories",
     "Observer",
     "Progress",
     "Run",
@@ -32,7 +34,7 @@ __all__ = [
 
 def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
     """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
-    (``every``, ``interior``, ``interior_every``, ``configuration``) and its ``resolved()`` form."""
+    (``every``, ``joints``, ``interior``, ``interior_every``, ``configuration``) and its ``resolved()`` form."""
     output = getattr(scene, "output", None)
     watchers: list[Observer] = [RunLog()]
     if scene is not None:
@@ -41,6 +43,7 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
     return [
         *watchers,
         Histories(),
+        *([JointHistories()] if _joints_wanted(scene) else []),
         Series(
             every=getattr(output, "every", 1),
             interior_every=interior_every,
@@ -49,3 +52,9 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
         Summary(),  # after the writers, whose times it takes in
         Progress(quiet=quiet),
     ]
+
+
+def _joints_wanted(scene: Any) -> bool:
+    """Whether sums by joint are written: as the scene says, else where no crack makes the blocks a specimen in a press."""
+    wanted = getattr(getattr(scene, "output", None), "joints", None)
+    return wanted if wanted is not None else scene is not None and not scene.cracks.n_cracks

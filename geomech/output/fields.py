@@ -48,6 +48,15 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("block_id", "cell", "-", "index of the block", dtype="int32"),
         Field("material", "cell", "-", "index of the block's material", dtype="int32"),
         Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
+        Field(
+            "key_block",
+            "cell",
+            "-",
+            "between neighbours that stand: -2 not known yet, -1 fixed, 0 held by them, 1 removable but pushed in, 2 removable but held by "
+            "strength, 3 slides, 4 falls",
+            dtype="int32",
+        ),
+        Field("displacement_rank", "cell", "-", "0 the block that has moved farthest", dtype="int32"),
     ),
     "cracks": (
         _DISPLACEMENT,
@@ -79,6 +88,8 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("gap", "point", "m", "negative when penetrating"),
         Field("slip", "point", "m", "accumulated sliding"),
         Field("state", "point", "-", _STATE, dtype="int32"),
+        Field("length", "point", "m", "tributary length; 0 at lone corners"),
+        Field("joint", "point", "-", "index of the joint law", dtype="int32"),
         Field("bonded", "point", "-", "1 while cohesion and tensile strength hold", dtype="int32"),
         Field("block_id", "point", "-", "owner of the vertex", dtype="int32"),
         Field("other_block_id", "point", "-", "owner of the edge", dtype="int32"),
@@ -123,6 +134,36 @@ TIPS: dict[str, str] = {
     "K_eq": "Pa √m",
     "angle_deg": "°, from the crack's direction, counter-clockwise",
     "grown_m": "m, in this cycle",
+}
+
+#: Columns of ``joints.csv``: a row a joint and cycle. A joint goes by the name of its edges, else by that of its law.
+JOINTS: dict[str, str] = {
+    "cycle": "-",
+    "time": "s",
+    "joint": "-",
+    "contacts": "number",
+    "length": "m, of faces that touch or are near",
+    "open_length": "m",
+    "sliding_length": "m",
+    "mean_opening": "m, over the length",
+    "max_opening": "m",
+    "max_penetration": "m",
+    "mean_slip": "m, over the length",
+    "max_slip": "m",
+    "normal_force": "N/m, sum, positive in compression",
+    "shear_force": "N/m, sum of sizes",
+    "mobilised": "shear force over what friction and cohesion hold",
+    "bonded_length": "m",
+}
+
+#: Columns of ``reactions.csv``: a row a fixed or guided block and cycle; what contacts put on it.
+REACTIONS: dict[str, str] = {
+    "cycle": "-",
+    "time": "s",
+    "block": "-",
+    "force_x": "N/m",
+    "force_y": "N/m",
+    "moment": "N m/m, about the mean of its reference vertices",
 }
 
 #: Columns of ``events.csv``.

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from geomech.conventions import normal_of
-from geomech.model import TIP, CrackFaces, Cracks, Cycle, Material
+from geomech.model import TIP, Blocks, CrackFaces, Cracks, Cycle, Material, Problem, State
+from geomech.model.key_blocks import UNKNOWN, key_blocks
 from geomech.model.motion import Motion
 
 from .motion import carried, displacement, vertex_velocity
@@ -20,8 +21,35 @@ from .vtu import LINE, TRIANGLE, VERTEX, Grid
 
 CONFIGURATIONS = ("reference", "current")
 
+#: Key blocks are found anew when a block has turned by the inverse of this, rad.
+_TURNS_SEEN = 50.0
 
-def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str, triangles: Triangles) -> Grid:
+
+class KeyBlocks:
+    """The key blocks of a run, kept while the same contacts are closed: block theory asks for directions only."""
+
+    def __init__(self, problem: Problem) -> None:
+        self._materials, self._joints, self._gravity = problem.materials, problem.joints, problem.loads.gravity
+        self._key: bytes | None = None
+        self._kind = np.empty(0, np.int64)
+
+    def kind(self, cycle: Cycle) -> np.ndarray:
+        """(n_blocks,) the class of every block (`geomech.model.key_blocks`)."""
+        contacts, state = cycle.state.contacts, cycle.state
+        if cycle.number == 0 and len(contacts) == 0:
+            return np.full(cycle.blocks.n_blocks, UNKNOWN)
+        turned = np.round(state.rotation * _TURNS_SEEN).astype(np.int64)
+        key = contacts["edge"].tobytes() + contacts["vertex"].tobytes() + contacts["state"].tobytes() + turned.tobytes()
+        if key != self._key:
+            self._key = key
+            gravity = self._gravity.at(state.time)
+            self._kind = key_blocks(cycle.blocks, self._materials, self._joints, state, gravity)["kind"]
+        return self._kind
+
+
+def blocks_grid(
+    cycle: Cycle, materials: Sequence[Material], configuration: str, triangles: Triangles, keys: KeyBlocks
+) -> Grid:
     """Every block as triangles on its own vertices, so that Warp By Vector opens the joints and Feature Edges draws
     the outlines."""
     blocks, state = cycle.blocks, cycle.state
@@ -42,8 +70,18 @@ def blocks_grid(cycle: Cycle, materials: Sequence[Material], configuration: str,
             "block_id": owner,
             "material": blocks.material[owner],
             "fixed": blocks.fixed[owner],
+            "key_block": keys.kind(cycle)[owner],
+            "displacement_rank": _rank(blocks, state)[owner],
         },
     )
+
+
+def _rank(blocks: Blocks, state: State) -> np.ndarray:
+    """(n_blocks,) 0 for the block that has moved farthest."""
+    moved = blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)
+    rank = np.empty(blocks.n_blocks, int)
+    rank[np.argsort(-np.einsum("ij,ij->i", moved, moved), kind="stable")] = np.arange(blocks.n_blocks)
+    return rank
 
 
 class CrackLines:
@@ -152,6 +190,8 @@ def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
             "gap": contacts["gap"],
             "slip": contacts["slip"],
             "state": contacts["state"],
+            "length": contacts["length"],
+            "joint": contacts["law"],
             "bonded": contacts["bonded"],
             "block_id": contacts["block"],
             "other_block_id": contacts["other"],

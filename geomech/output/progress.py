@@ -12,6 +12,8 @@ import numpy as np
 
 from geomech.model import Cycle, Problem, counted
 
+from .condition import closing, told
+
 
 class Progress:
     """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
@@ -106,7 +108,10 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
             text += f"   σ√(πb)/K_Ic = {first['load_normalised']:.3f}"
         count = summary.get("events", {}).get(kind, 1)
         lines.append(text + (f"   (first of {count})" if count > 1 else ""))
-    if "cycles" in summary:
+    if "cycles" in summary and "key_blocks" in summary:
+        lines += closing(summary)
+        lines.append(f"  {counted(summary['load_steps'], 'load step')} in {summary.get('wall_s', math.nan):.2f} s")
+    elif "cycles" in summary:
         lines.append(
             f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with growth, "
             f"{1e3 * summary['crack_growth_m']:.3g} mm of new crack in {summary.get('wall_s', math.nan):.2f} s"
@@ -115,6 +120,8 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
 
 
 def _told(cycle: Cycle) -> str:
+    if not cycle.cracks.n_cracks:
+        return f"t = {cycle.state.time:.4g} s, {told(cycle)}"
     growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
     text = f"load {cycle.load / 1e6:.2f} MPa, cycle {cycle.number}"
     return text + (f", {growing} of {len(cycle.tips)} tips growing" if len(cycle.tips) else "")

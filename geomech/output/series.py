@@ -54,6 +54,7 @@ class Series:
         self._collections = {name: Collection(self._folder / f"{name}.pvd") for name in names}
         self._files = {name: GridFiles(name) for name in names}
         self._triangles, self._lines, self._meshes = Triangles(), grids.CrackLines(), InteriorMeshes()
+        self._keys = grids.KeyBlocks(problem)
         self._beside = Beside()
         self._time = SeriesTime()
         self._pending: tuple[Cycle, float, bool] | None = None
@@ -103,7 +104,7 @@ class Series:
 
     def _write(self, cycle: Cycle, at: float) -> None:
         motion, shape = cycle.motion, self.configuration
-        self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles))
+        self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles, self._keys))
         self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape, self._lines))
         self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
         self._save("contacts", cycle, at, grids.contacts_grid(cycle, shape))

@@ -15,6 +15,8 @@ import numpy as np
 
 from geomech.model import Cycle, Event, Problem
 
+from .condition import energy_summary, key_block_summary, motion_summary
+
 
 class Summary:
     """Observer that counts, and at the end completes the run's ``summary`` and writes it as ``summary.json``.
@@ -73,6 +75,10 @@ class Summary:
             summary["crack_growth_m"] = self._grown
             summary["crack_length_m"] = float(last.cracks.lengths.sum())
             summary["blocks"] = last.blocks.n_blocks
+            if last.statistics:
+                summary["motion"], summary["energy"] = motion_summary(last), energy_summary(last)
+            if not last.cracks.n_cracks and len(last.state.contacts):
+                summary["key_blocks"] = key_block_summary(last, self._problem)
             summary["tips"] = len(last.tips)
         if self._scale is not None:
             half_length, toughness = self._scale

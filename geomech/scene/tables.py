@@ -420,6 +420,11 @@ class OutputTable(Table):
     every: Annotated[int, Field(ge=1)] = Field(
         1, description="write every n-th cycle; cycles with growth or an event, the first and the last always"
     )
+    joints: bool | None = Field(
+        None,
+        description="write opening, slip and forces of every joint (joints.csv) and what fixed and guided blocks carry "
+        "(reactions.csv) (unset: in scenes without cracks)",
+    )
     interior: bool = Field(True, description="write stress inside cracked rock (interior.pvd)")
     interior_every: Annotated[int, Field(ge=1)] = Field(
         5,
