@@ -14,16 +14,18 @@ if TYPE_CHECKING:
 
 
 def elastic_bodies(
-    problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, work: Work
+    problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, work: Work, removed: np.ndarray | None = None
 ) -> tuple[dict[int, Body], dict[int, np.ndarray]]:
     """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole network.
-    What keeps a fixed block in place, and so what strains it, is not known.
+    What keeps a fixed block in place, and so what strains it, is not known; what is ``removed`` (n_blocks,) is not there.
 
     ``kept``: earlier bodies of the same blocks, of which whatever has not changed is reused; ``work`` counts what was done.
     """
     cracked = np.arange(blocks.n_blocks) if problem.growth.initiation else np.unique(cracks.block)
     rigid = np.array([m.rigid for m in problem.materials], bool)
     cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
+    if removed is not None:
+        cracked = cracked[~removed[cracked]]
     if not len(cracked):
         return {}, {}
     from .. import ddm
@@ -64,6 +66,7 @@ def boundary_loads(
             forces.inertia.gravity,
             result.acceleration[b],
             problem.dda.dynamic_factor * float(state.velocity[b, 2]),
+            None if forces.reaction is None else forces.reaction[b],
         )
         for b in bodies
     }

@@ -20,6 +20,7 @@ from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
 from ..model.polygon import winding_number
 from .bodies import boundary_loads, elastic_bodies, solve_bodies, tip_rows
 from .compliance import crack_response
+from .inherited_loads import on_children
 from .mean_stress import rotated_mean_stress
 from .record import axial_strain, joined_faces, leading_load
 from .splitting import split_blocks
@@ -66,6 +67,7 @@ class Coupling:
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
         self.budget = dda.EnergyBudget()
+        self.removed: np.ndarray | None = None
         self._take_blocks()
 
     # -- the generator -------------------------------------------------------------------------------------------
@@ -87,7 +89,7 @@ class Coupling:
     def _load_step(self):
         """All passes at one load. Returns True when a stop event happened."""
         dt = min(self.problem.dda.time_step, self.problem.run.end_time - self.state.time)
-        pending: tuple[Event, ...] = ()
+        pending: tuple[Event, ...] = self._excavated()
         stops, load_time = False, None
         static = self.problem.dda.dynamic_factor == 0.0
         if static and self.problem.dda.equilibrium == "loads":
@@ -160,6 +162,21 @@ class Coupling:
         log.warning("t = %g s: %s; the run ends", load_time, found.reason)
         first = int(self.blocks.vertex_start[found.moving[0]])
         return (self._event("collapse", self.state, self.blocks.vertices[first], found.reason),)
+
+    def _excavated(self) -> tuple[Event, ...]:
+        """Leave out the elastic bodies of blocks that are taken out at the present time; an event for each."""
+        removed = self.system.removed(self.problem.loads, self.state.time)
+        if removed is self.removed:
+            return ()
+        new = removed if self.removed is None else removed & ~self.removed
+        self.removed = removed
+        self._take_bodies()
+        return tuple(
+            self._event(
+                "excavation", self.state, self.blocks.area_moments(b)[1], f"{self.blocks.names[b]} is taken out"
+            )
+            for b in np.flatnonzero(new).tolist()
+        )
 
     def _lost(self, state: State) -> tuple[Event, ...]:
         """A collapse, when a block has gone farther than the blocks reach: in statics nothing will hold it any more, and
@@ -335,13 +352,9 @@ class Coupling:
         if self.gauge is not None:
             self.gauge = tuple((child(b, p), p) for b, p in self.gauge)
         self.monitors = {name: (child(b, p), p) for name, (b, p) in self.monitors.items()}
-        self.problem = replace(
-            self.problem,
-            loads=replace(
-                self.problem.loads,
-                point_loads=tuple(replace(p, block=child(p.block, p.at)) for p in self.problem.loads.point_loads),
-            ),
-        )
+        self.problem = replace(self.problem, loads=on_children(self.problem.loads, split.parent, child))
+        if self.removed is not None:
+            self.removed = self.removed[split.parent]
         # Children keep the reference coordinates of their parent, and so its faces' memory.
         parents = enumerate(split.parent.tolist())
         self.history = {child: self.history[parent] for child, parent in parents if parent in self.history}
@@ -378,7 +391,7 @@ class Coupling:
 
     def _bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
         with self._timed("ddm assembly"):
-            return elastic_bodies(self.problem, self.blocks, cracks, kept, self.work)
+            return elastic_bodies(self.problem, self.blocks, cracks, kept, self.work, self.removed)
 
     # -- records -------------------------------------------------------------------------------------------------
 

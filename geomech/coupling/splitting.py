@@ -112,6 +112,7 @@ def split_blocks(
         crack_strain=crack_strain,
         contacts=_contacts(state.contacts, pieces),
         acceleration=None,
+        removed=None if state.removed is None else state.removed[parent],
     )
     lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
     return Split(children_blocks, after, rest, parent, lost)

@@ -89,12 +89,14 @@ def boundary_load(
     gravity: np.ndarray | None = None,
     acceleration: np.ndarray | None = None,
     spin: float = 0.0,
+    reaction: np.ndarray | None = None,
 ) -> BoundaryLoad:
     """The load of ``block``.
 
     ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
     that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
-    ``acceleration`` (6,) and ``spin`` (rad/s) the block's own.
+    ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which is
+    spread over the block as its inertia is.
     """
     c, s = math.cos(rotation), math.sin(rotation)
     pieces = _Pieces()
@@ -113,7 +115,9 @@ def boundary_load(
         _add_point_load(pieces, blocks, block, row["at"].copy(), turn_back @ row["force"])
     segments, tractions = pieces.arrays()
     inside = pieces.inside()
-    return _balanced(block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back)
+    return _balanced(
+        block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction
+    )
 
 
 class _Pieces:
@@ -329,7 +333,7 @@ def _add_point_load(pieces, blocks, block: int, point: np.ndarray, force: np.nda
 
 
 def _balanced(
-    block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back
+    block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction
 ) -> BoundaryLoad:
     area, centroid, second = blocks.area_moments(block)
     (xx, xy), (_, yy) = second.tolist()
@@ -343,6 +347,9 @@ def _balanced(
         byy = density * (spin**2 - s * s * exx - c * c * eyy + s * c * shear)
         bxy = -density * (s * c * (eyy - exx) + 0.5 * (c * c - s * s) * shear)
         carried, angular = turn_back @ (density * (g - (ax, ay))), density * angular
+    if reaction is not None:
+        carried = carried + turn_back @ reaction[:2] / area
+        angular -= float(reaction[2]) / (xx + yy)
     force, moment, size = resultants(segments, tractions, centroid)
     if inside is not None:
         arm, (fx, fy) = (inside[0] - centroid).T, inside[1].T

@@ -22,7 +22,8 @@ DENSE_BLOCKS = 60
 class Pattern:
     """Where each 6×6 block stands in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
 
-    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. ``solver`` is None for a dense matrix.
+    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. ``solver`` is None for a dense matrix. ``links``
+    are flat places and the numbers that what links blocks besides contacts adds there, None without.
     """
 
     n: int
@@ -33,6 +34,12 @@ class Pattern:
     lower: np.ndarray
     size: int
     solver: BlockSolver | None = None
+    links: tuple[np.ndarray, np.ndarray] | None = None
+
+    def add_links(self, data: np.ndarray) -> None:
+        """Add them to an assembled matrix."""
+        if self.links is not None:
+            np.add.at(data, *self.links)
 
 
 def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pattern:
@@ -188,6 +195,7 @@ def assemble_contacts(
 
 def solve(pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool) -> np.ndarray:
     """Unknowns (6 n,) in the pattern's order. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+    pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
 

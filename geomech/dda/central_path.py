@@ -101,6 +101,7 @@ def _assemble(data, matrix, stride, diagonal, upper, lower, block, other, order,
 
 def _solver(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """What solves with the matrix of ``data`` for one right side after the other. Raises numpy.linalg.LinAlgError."""
+    pattern.add_links(data)
     if pattern.solver is not None:
         return lambda right: pattern.solver.solve(data, right)
     from scipy.linalg.lapack import dgetrf, dgetrs

@@ -111,8 +111,14 @@ class ContactFinder:
         self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
-        self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
+        self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
+        self.take_out(None)
         self._size = float(np.ptp(blocks.vertices, axis=0).max())
+
+    def take_out(self, removed: np.ndarray | None) -> None:
+        """Find no more contacts of the blocks ``removed`` (n_blocks,)."""
+        self._removed = removed
+        self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
 
     def find(self, state: State, vertices: np.ndarray, window: float) -> ContactSet:
         """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it."""
@@ -129,6 +135,8 @@ class ContactFinder:
             np.ascontiguousarray(old["normal"]), rank,
         )  # fmt: skip
         law = self._laws(table[:, 1], mate)
+        if self._removed is not None:
+            law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
         partner = table[:, 2:]
         if (law == _NEVER).any():
             keep = law != _NEVER

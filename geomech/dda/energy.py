@@ -39,7 +39,7 @@ class StepEnergy(NamedTuple):
     contact          Φ of contact springs, normal and shear
     before           T + U + Φ as the step began
     gravity_work     of the weight
-    load_work        of edge tractions and point loads
+    load_work        of edge tractions and point loads, bolts, and what imposes motion
     spin_work        of the centrifugal force on the strains of spinning blocks, at the expense of T
     crack_work       done on the blocks' cracks: stored, rubbed off and released there
     friction         lost in sliding, ≥ 0
@@ -175,6 +175,9 @@ def step_energies(
             cracked += now[k] * opened
         elastic += area * u1
         before += area * u0
+        # A fixed block may be made to move: what drives it works.
+        for k in range(6):
+            loads += load[b, k] * increment[b, k]
         if fixed[b]:
             continue
         scheme += area * (mean - (u1 - u0) - cracked)
@@ -194,8 +197,6 @@ def step_energies(
         lost += had - kept
         scheme += work - (after - kept)
         fallen += density[b] * area * (gravity[0] * increment[b, 0] + gravity[1] * increment[b, 1])
-        for k in range(6):
-            loads += load[b, k] * increment[b, k]
         omega = density[b] * carried[b, 2] * carried[b, 2]
         spin += omega * (
             moments[b, 3] * increment[b, 3] + moments[b, 4] * increment[b, 4] + moments[b, 5] * increment[b, 5]

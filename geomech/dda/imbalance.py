@@ -22,6 +22,7 @@ def imbalance(
     moments,
     gravity,
     load,
+    largest,
 ):
     """(residual, unbalanced force ratio).
 
@@ -31,12 +32,12 @@ def imbalance(
     largest: 0 at rest, 1 in free flight.
 
     ``matrix`` (n, 6, 6), ``right`` (n, 6), ``unknowns`` (n, 6) as solved; ``vectors`` (n_contacts, 2, 12);
-    ``acceleration`` and ``load`` (n_blocks, 6).
+    ``acceleration`` and ``load`` (n_blocks, 6); ``largest`` N of the forces in ``right`` that may cancel there.
     """
     n = right.shape[0]
     rest = np.empty((n, 6))
     size = np.zeros(n)
-    scale = 0.0
+    scale = largest
     for i in range(n):
         for k in range(6):
             own = 0.0

@@ -48,6 +48,8 @@ class AppliedForces:
     body_force            (n_blocks, 2)     ρ(g − a) at the centroid, N/m³
     body_force_gradient   (n_blocks, 2, 2)  ∂b/∂x: the rest of −ρ times the block's acceleration field, centrifugal
                                             part included; b(x) = body_force + body_force_gradient (x − centroid)
+    reaction              (n_blocks, 6)     N, N m: what it takes to give moving blocks the motion that is imposed on their
+                                            unknowns, about their centroids; None where none is
     """
 
     points: np.ndarray
@@ -55,6 +57,7 @@ class AppliedForces:
     centroid: np.ndarray
     area: np.ndarray
     inertia: Inertia
+    reaction: np.ndarray | None = None
 
     @cached_property
     def _body_forces(self) -> tuple[np.ndarray, np.ndarray]:
@@ -77,6 +80,11 @@ class LoadMap:
         self._edges: dict[tuple[str, LinearProfile | None], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._points: dict[tuple[int, tuple[float, float]], np.ndarray] = {}
         self._wet: tuple[WaterTable, np.ndarray] | None = None
+        self._removed: np.ndarray | None = None
+
+    def take_out(self, removed: np.ndarray | None) -> None:
+        """Load the blocks ``removed`` (n_blocks,) no more."""
+        self._removed, self._wet = removed, None
 
     def edges(self, load: EdgeTraction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Edges that ``load`` acts on, (n, 2) reference lengths times its profile at their two ends, and EDGE_FORCE rows for
@@ -131,7 +139,10 @@ class LoadMap:
             pieces.append(
                 pressed_edges(loads.water, time, edges, self.blocks.vertex_block, vertices, self.blocks.next_vertex)
             )
-        return points, np.concatenate(pieces) if pieces else np.empty(0, EDGE_FORCE)
+        edges = np.concatenate(pieces) if pieces else np.empty(0, EDGE_FORCE)
+        if self._removed is not None:
+            points, edges = points[~self._removed[points["block"]]], edges[~self._removed[edges["block"]]]
+        return points, edges
 
     def _wet_edges(self, water: WaterTable) -> np.ndarray:
         """The edges of moving blocks that water may reach."""

@@ -10,10 +10,12 @@ import numpy as np
 
 from ..model import OPEN, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
+from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
 from .contact_springs import end_of_step, over_a_step
 from .contacts import ContactFinder, ContactSet
 from .energy import StepEnergy, step_energies
+from .excavation import Excavations, until_next_event
 from .held import balanced, hold, with_rigid_motion
 from .imbalance import imbalance
 from .loads import AppliedForces, Inertia, LoadMap, generalised
@@ -63,6 +65,7 @@ class BlockSystem:
         self.settings = settings or DdaSettings()
         self.scheme = TimeScheme.of(self.settings)
         self._load_map = LoadMap(blocks)
+        self._excavations = Excavations(blocks)
 
         of = np.asarray(blocks.material, dtype=int)
         self.density = np.array([m.density for m in self.materials])[of]
@@ -72,20 +75,16 @@ class BlockSystem:
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
         self._finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus)
-        self._fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
-        self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
-        self._moving = np.flatnonzero(~self._fixed)
+        self._take_out(None)
         rigid = np.array([m.rigid for m in self.materials])[of] & ~self._fixed
         self._rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
         self._held = with_rigid(blocks.held, rigid)
-        self._turns = ~self._fixed if blocks.held is None else ~(self._fixed | blocks.held[:, 2])
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
         self._no_compliance = np.zeros((blocks.n_blocks, 3, 3))
         self._no_offset = np.zeros((blocks.n_blocks, 3))
-        self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
 
         vertices = blocks.vertices
         areas = blocks.areas()
@@ -115,6 +114,22 @@ class BlockSystem:
         settings = replace(self.settings, dynamic_factor=0.0)
         return BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings)
 
+    def removed(self, loads: Loads, time: float) -> np.ndarray | None:
+        """(n_blocks,) True for blocks that ``loads`` have taken out by ``time``; None before any is."""
+        return self._excavations.removed(loads, time)
+
+    def _take_out(self, removed: np.ndarray | None) -> None:
+        """Go on without the blocks ``removed`` (n_blocks,): they keep their place in all arrays, fixed and touching nothing."""
+        self._removed = removed
+        fixed = self.blocks.fixed if removed is None else self.blocks.fixed | removed
+        self._fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
+        self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
+        self._moving = np.flatnonzero(~self._fixed)
+        self._turns = ~self._fixed if self.blocks.held is None else ~(self._fixed | self.blocks.held[:, 2])
+        self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
+        self._finder.take_out(removed)
+        self._load_map.take_out(removed)
+
     def step(
         self,
         state: State,
@@ -133,6 +148,10 @@ class BlockSystem:
         dt = self.settings.time_step if dt is None else float(dt)
         if not dt > 0:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
+        removed = self.removed(loads, state.time)
+        if removed is not self._removed:
+            self._take_out(removed)
+        dt = until_next_event(loads, state.time, dt)
         vertices = np.ascontiguousarray(state.vertices)
         carried = self.settings.dynamic_factor * state.velocity
         carried[self._fixed] = 0.0
@@ -195,12 +214,17 @@ class BlockSystem:
         # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
         return min(dt, float(2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit))))
 
-    def _pattern(self, block: np.ndarray, other: np.ndarray, moments: np.ndarray) -> assembly.Pattern:
+    def _pattern(
+        self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
+    ) -> assembly.Pattern:
+        known = block
+        if linked is not None:
+            block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
         if int(self._free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self._free, block, other)
-        if self._sparse is None or self._sparse[0] is not block:
+        if self._sparse is None or self._sparse[0] is not known or len(self._sparse[1].upper) != len(block):
             kept = None if self._sparse is None else self._sparse[1].solver
-            self._sparse = block, assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
+            self._sparse = known, assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
         return self._sparse[1]
 
     def _settled(self, pattern, matrix, right, found, vectors, springs, gap, curved) -> Settled:
@@ -218,7 +242,7 @@ class BlockSystem:
         scheme = self.scheme
         time = state.time + dt
         acting = state.time + scheme.weight * dt if load_time is None else load_time
-        gravity = loads.gravity.at(acting)
+        gravity = felt_gravity(loads, state.time, acting, dt, scheme.static)
         points, edges = self._load_map.rows(loads, acting, vertices, state.rotation)
         centroid = np.ascontiguousarray(moments[:, 1:3])
         load = generalised(points, edges, centroid)
@@ -242,7 +266,12 @@ class BlockSystem:
             np.minimum(mass[found.block], mass[found.other]), weight, scheme.block_damping, dt,
         )  # fmt: skip
         n_free = len(self._moving)
-        pattern = self._pattern(found.block, found.other, moments) if n_free else None
+        end = time if load_time is None else load_time
+        actions = StepActions.of(
+            self.blocks, self._fixed, loads, state, self._load_map, moments, self._free, self._removed, end
+        )
+        linked = None if actions is None else actions.linked
+        pattern = self._pattern(found.block, found.other, moments, linked) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assemble_blocks(
             order, moments, density, self._stiffness, self.compliance, carried, stress, crack_strain, given,
@@ -253,27 +282,42 @@ class BlockSystem:
         if loads.viscous_boundaries and not static and n_free:
             middle = state.time + 0.5 * dt if load_time is None else load_time
             quiet = QuietEdges.of(
-                loads.viscous_boundaries, self.blocks, vertices, middle, self.density, self._stiffness
+                loads.viscous_boundaries, self.blocks, vertices, middle, self.density, self._stiffness, self._fixed
             )
             quiet.assemble(matrix, right, order, moments, dt)
         vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
         held = self._held
-        alone = static and self.blocks.n_blocks == 1 and n_free
+        alone = static and self.blocks.n_blocks == 1 and n_free and actions is None
         if alone and balanced(load[0], points, edges, self._mass[0] * gravity, moments[0]):
             held = with_rigid_motion(held)
+        if actions is not None:
+            held = actions.held(held)
         if held is not None and n_free:
             hold(held, matrix, right, vectors, found.block, found.other, order)
         if n_free:
-            settled = self._settled(pattern, matrix, right, found, vectors, springs, gap, curved)
+            if actions is None:
+                settled = self._settled(pattern, matrix, right, found, vectors, springs, gap, curved)
+                unknowns = settled.unknowns
+            else:
+                settled, unknowns = actions.settle(
+                    pattern, matrix, right, vectors, found, springs, gap,
+                    lambda pattern, matrix, right, found, gap: self._settled(
+                        pattern, matrix, right, found, vectors, springs, gap, curved
+                    ),
+                )  # fmt: skip
         else:
             zero = np.zeros(len(found))
             settled = Settled(
                 np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
             )
+            unknowns = settled.unknowns
 
         increment = np.zeros((self.blocks.n_blocks, 6))
-        increment[self._moving] = settled.unknowns[order[self._moving]]
+        increment[self._moving] = unknowns[order[self._moving]]
         increment[:, 2:] /= np.sqrt(moments[:, :1])
+        imposed = None if actions is None else actions.imposed
+        if imposed is not None:
+            increment += imposed.increment
         new_vertices, velocity, new_stress, new_crack, largest = advance(
             increment, carried, dt, static, vertices, self._start, moments, tangent, stress0, compliance, offset, given,
             crack_strain, self._turns,
@@ -284,6 +328,14 @@ class BlockSystem:
             load = load + generalised(points[:0], absorbed, centroid)
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
         velocity, kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
+        if imposed is not None:
+            imposed.correct_velocity(velocity)
+        rows = found.rows(settled)
+        reaction, acting_right, largest_force, acted = None, right, 0.0, {}
+        if actions is not None:
+            points, reaction, acted = actions.acted(settled, unknowns, rows, points, new_vertices)
+            acting_right, largest_force = actions.with_bolt_forces(right), actions.largest_bolt_force
+            load = generalised(points, edges, centroid) + actions.work_forces(reaction, rows, centroid)
         end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, weight)
         energy = StepEnergy._make(
             step_energies(
@@ -296,11 +348,10 @@ class BlockSystem:
             ).tolist()
         )  # fmt: skip
         residual, ratio = imbalance(
-            matrix, right, vectors, found.block, found.other, order, settled.unknowns, settled.normal_force,
-            settled.shear_force, acceleration, density, moments, gravity, load,
+            matrix, acting_right, vectors, found.block, found.other, order, settled.unknowns, settled.normal_force,
+            settled.shear_force, acceleration, density, moments, gravity, load, largest_force,
         )  # fmt: skip
 
-        rows = found.rows(settled)
         if len(self._rigid):
             new_stress[self._rigid] = mean_stress(
                 self._rigid, rows, load, moments, density, acceleration, carried[:, 2], increment[:, 2]
@@ -311,8 +362,10 @@ class BlockSystem:
         if scheme.weight != 1.0:
             memory = rows.copy()
             memory["shear_force"] = end_shear
+        if self._removed is not None:
+            new_stress[self._removed] = 0.0
         inertia = Inertia(density, gravity, acceleration, carried[:, 2], self._fixed)
-        forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), inertia)
+        forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), inertia, reaction)
         new_state = State(
             time=time,
             vertices=new_vertices,
@@ -322,6 +375,8 @@ class BlockSystem:
             crack_strain=new_crack,
             contacts=self._finder.carried(new_vertices, memory),
             acceleration=kept,
+            bolts=state.bolts if actions is None else actions.memory,
+            removed=self._removed,
         )
         closed = settled.state != OPEN
         statistics = {
@@ -335,6 +390,7 @@ class BlockSystem:
             "max_displacement_ratio": largest / self.half_height,
             "unbalanced": residual,
             "unbalanced_ratio": ratio,
+            **acted,
         }
         return StepResult(new_state, dt, rows, forces, acceleration, energy, statistics), largest
 

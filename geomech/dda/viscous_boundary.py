@@ -41,9 +41,10 @@ class QuietEdges:
         time: float,
         density: np.ndarray,
         stiffness: np.ndarray,
+        fixed: np.ndarray,
     ) -> QuietEdges:
         """Those that ``boundaries`` name, at ``time`` on the current ``vertices``; ``density`` (n_blocks,) kg/m³ and
-        ``stiffness`` (n_blocks, 3, 3) Pa. Raises ValueError for a name that no edge has."""
+        ``stiffness`` (n_blocks, 3, 3) Pa; not those of ``fixed`` (n_blocks,) blocks. Raises ValueError for a name that no edge has."""
         edge, incoming = [], []
         for boundary in boundaries:
             named = blocks.edges_named(boundary.edge_name)
@@ -52,7 +53,7 @@ class QuietEdges:
                 raise ValueError(
                     f"a viscous boundary is on edges named {boundary.edge_name!r}, but no edge has that name (names: {known})"
                 )
-            named = named[~blocks.fixed[blocks.vertex_block[named]]]
+            named = named[~fixed[blocks.vertex_block[named]]]
             wave = np.zeros(2) if boundary.incoming is None else boundary.incoming.at(time)
             edge.append(named)
             incoming.append(np.tile(wave, (len(named), 1)))

@@ -1,23 +1,31 @@
 """Plain arrays that the solvers share: blocks, cracks, materials, joint laws, loads, the state of a run."""
 
 from .blocks import Blocks
+from .bolt import BOLT, GROUND, Bolt, grouted_bolt
 from .cracks import Cracks
 from .damping import rayleigh_coefficients
 from .history import History, Wave, baseline_corrected, read_record
+from .imposed_motion import UNKNOWNS, BaseMotion, BlockMotion, PointMotion
 from .joint import JointLaw, Roughness
-from .loads import EdgeTraction, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
+from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
 from .material import Material
 from .motion import Motion
 from .problem import DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, State
 
 __all__ = [
+    "BOLT",
     "CONTACT",
+    "GROUND",
     "OPEN",
     "SLIP",
     "STICK",
     "TIP",
+    "UNKNOWNS",
+    "BaseMotion",
+    "BlockMotion",
     "Blocks",
+    "Bolt",
     "CrackFaces",
     "Cracks",
     "Cycle",
@@ -25,6 +33,7 @@ __all__ = [
     "DdmSettings",
     "EdgeTraction",
     "Event",
+    "Excavation",
     "GrowthSettings",
     "History",
     "JointLaw",
@@ -33,6 +42,7 @@ __all__ = [
     "Material",
     "Motion",
     "PointLoad",
+    "PointMotion",
     "Problem",
     "Roughness",
     "RunSettings",
@@ -42,6 +52,7 @@ __all__ = [
     "Wave",
     "baseline_corrected",
     "counted",
+    "grouted_bolt",
     "rayleigh_coefficients",
     "read_record",
 ]

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .bolt import Bolt
 from .history import History
+from .imposed_motion import BaseMotion, BlockMotion, PointMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +103,28 @@ class ViscousBoundary:
 
 
 @dataclass(frozen=True, eq=False)
+class Excavation:
+    """At ``time`` (s) ``blocks`` are taken out, and those whose reference centroid lies in ``polygon`` (n, 2).
+
+    Their contacts vanish, loads and bolts on them go, and the run goes on. With ``drained`` no water presses any more on
+    what lay against them.
+    """
+
+    time: float
+    blocks: tuple[int, ...] = ()
+    polygon: np.ndarray | None = None
+    drained: bool = True
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.time):
+            raise ValueError(f"an excavation needs a time, got {self.time!r} s")
+        if self.polygon is not None and (np.ndim(self.polygon) != 2 or len(self.polygon) < 3):
+            raise ValueError("the polygon of an excavation needs at least three points (x, y)")
+        if self.polygon is None and not self.blocks:
+            raise ValueError(f"the excavation at {self.time:g} s names no blocks and has no polygon")
+
+
+@dataclass(frozen=True, eq=False)
 class Loads:
     """Everything that acts on the blocks. ``gravity`` (2,) m/s² as a history; the scene's ramp is part of it."""
 
@@ -109,3 +133,8 @@ class Loads:
     point_loads: tuple[PointLoad, ...] = ()
     water: WaterTable | None = None
     viscous_boundaries: tuple[ViscousBoundary, ...] = ()
+    base: BaseMotion | None = None
+    block_motions: tuple[BlockMotion, ...] = ()
+    point_motions: tuple[PointMotion, ...] = ()
+    bolts: tuple[Bolt, ...] = ()
+    excavations: tuple[Excavation, ...] = ()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .blocks import Blocks
+from .bolt import BOLT
 from .cracks import Cracks
 from .motion import Motion
 
@@ -72,6 +73,8 @@ class State:
     crack_strain  (n_blocks, 3)     mean strain that the block's cracks carry, current axes
     contacts      CONTACT rows      open ones that are near included
     acceleration  (n_blocks, 6)     of the unknowns, as a time scheme that needs it has left it; None: begin anew
+    bolts         BOLT rows         one a bolt of the loads, empty before there are any
+    removed       (n_blocks,)       True: excavated; None before anything is
     """
 
     time: float
@@ -82,6 +85,8 @@ class State:
     crack_strain: np.ndarray
     contacts: np.ndarray
     acceleration: np.ndarray | None = None
+    bolts: np.ndarray = field(default_factory=lambda: np.empty(0, BOLT))
+    removed: np.ndarray | None = None
 
     @classmethod
     def at_rest(cls, blocks: Blocks) -> State:

@@ -1,0 +1,44 @@
+"""The loads of blocks that split, on their children."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..model import GROUND, Loads
+
+
+def on_children(loads: Loads, parent: np.ndarray, child: Callable[[int, tuple[float, float]], int]) -> Loads:
+    """``loads`` with the numbers of the blocks after a split.
+
+    ``parent`` (n_blocks,) is the block before it of every block after it; ``child(block, point)`` the part of ``block`` that
+    holds a point. What acts at a point goes with the part that has it, what moves or takes out a block as a whole does so to
+    all its parts.
+    """
+
+    def parts(block: int) -> list[int]:
+        return np.flatnonzero(parent == block).tolist()
+
+    base = loads.base
+    if base is not None and base.blocks is not None:
+        base = replace(base, blocks=tuple(part for b in base.blocks for part in parts(b)))
+    return replace(
+        loads,
+        point_loads=tuple(replace(p, block=child(p.block, p.at)) for p in loads.point_loads),
+        point_motions=tuple(replace(p, block=child(p.block, p.at)) for p in loads.point_motions),
+        block_motions=tuple(replace(m, block=part) for m in loads.block_motions for part in parts(m.block)),
+        bolts=tuple(
+            replace(
+                b,
+                block=child(b.block, b.start),
+                other=GROUND if b.other == GROUND else child(b.other, b.end),
+            )
+            for b in loads.bolts
+        ),
+        excavations=tuple(
+            replace(e, blocks=tuple(part for b in e.blocks for part in parts(b))) for e in loads.excavations
+        ),
+        base=base,
+    )

@@ -1,0 +1,53 @@
+"""Blocks that are taken out while a run goes on: which they are at a time, and when the next event is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import Blocks, Excavation, Loads
+from ..model.polygon import winding_number
+
+#: Times nearer than this part of their size are one.
+_SAME = 1e-12
+
+
+class Excavations:
+    """The excavations of loads on given blocks."""
+
+    def __init__(self, blocks: Blocks) -> None:
+        self._blocks = blocks
+        self._known: dict[tuple[Excavation, ...], np.ndarray] = {}
+
+    def removed(self, loads: Loads, time: float) -> np.ndarray | None:
+        """(n_blocks,) True for blocks that are gone in a step that begins at ``time``; None before anything is. The same array
+        as long as nothing more is taken out."""
+        past = tuple(e for e in loads.excavations if e.time <= time + _SAME * abs(time))
+        if not past:
+            return None
+        if past not in self._known:
+            out = np.zeros(self._blocks.n_blocks, bool)
+            for excavation in past:
+                out[self._taken(excavation)] = True
+            self._known[past] = out
+        return self._known[past]
+
+    def _taken(self, excavation: Excavation) -> list[int]:
+        n = self._blocks.n_blocks
+        for block in excavation.blocks:
+            if not 0 <= block < n:
+                raise ValueError(f"the excavation at {excavation.time:g} s takes block {block}, but there are {n}")
+        taken = list(excavation.blocks)
+        if excavation.polygon is not None:
+            loop = [np.asarray(excavation.polygon, dtype=float)]
+            centres = [self._blocks.area_moments(b)[1] for b in range(n)]
+            taken += [b for b, centre in enumerate(centres) if abs(winding_number(loop, centre)) > 0.5]
+        if not taken:
+            raise ValueError(f"no block's centre lies in the polygon of the excavation at {excavation.time:g} s")
+        return taken
+
+
+def until_next_event(loads: Loads, time: float, dt: float) -> float:
+    """``dt``, or the time left from ``time`` to the next excavation or installation of a bolt: a step does not pass one."""
+    coming = [e.time for e in loads.excavations] + [b.installation for b in loads.bolts]
+    left = [t - time for t in coming if t > time + _SAME * max(abs(time), abs(t))]
+    return min([dt, *left])
