@@ -245,13 +245,13 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, mends: list[Mend]):
     for k, e in zip(node[near].tolist(), edge[near].tolist()):
         a, b = nodes[edges[e]]
         along = b - a
-        foot = a + np.clip((nodes[k] - a) @ along / (along @ along), 0, 1) * along
+        foot = a + float((nodes[k] - a) @ along / (along @ along)) * along
         away = float(np.hypot(*(foot - nodes[k])))
-        if settled[k]:
+        # Beside an end it is a matter of corners, which have met where they may.
+        beside = min(float((foot - a) @ along), float((b - foot) @ along)) <= tolerance * float(np.hypot(*along))
+        if settled[k] or beside:
             continue
         if not firm[k] and (source[e] < n_outlines or degree[k] == 1):
-            if away <= 1e-3 * tolerance and e in through:
-                continue
             nodes[k] = foot
             settled[k] = True
         # The edge is led through the node; one that has been moved onto it lies on it but for round-off.

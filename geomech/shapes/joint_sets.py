@@ -1,0 +1,280 @@
+"""Joint sets by statistics: parallel sets with spacing, trace length and gap; Poisson traces, discs cut by the section,
+Poisson lines, Voronoi edges; terminations of one set on another. Reproducible from a seed.
+
+Angles are those of the traces in the section, counter-clockwise from x, in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .parts import Joint
+
+LAWS = ("constant", "normal", "uniform", "lognormal", "exponential")
+
+
+@dataclass(frozen=True)
+class Law:
+    """How a length or an angle is distributed: its ``mean`` and standard ``deviation`` (of the quantity itself, also for
+    "lognormal"; "exponential" has its mean for one)."""
+
+    mean: float
+    deviation: float = 0.0
+    law: str = "constant"
+
+    def __post_init__(self) -> None:
+        if self.law not in LAWS:
+            raise ValueError(f"no law {self.law!r}; there are {', '.join(LAWS)}")
+        if not self.deviation >= 0:
+            raise ValueError(f"a standard deviation must not be negative, got {self.deviation!r}")
+        if self.law in ("lognormal", "exponential") and not self.mean > 0:
+            raise ValueError(f"a {self.law} law needs a positive mean, got {self.mean!r}")
+
+    def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n,) values."""
+        if self.law == "exponential":
+            return rng.exponential(self.mean, n)
+        if self.law == "constant" or self.deviation == 0:
+            return np.full(n, float(self.mean))
+        if self.law == "normal":
+            return rng.normal(self.mean, self.deviation, n)
+        if self.law == "uniform":
+            half = math.sqrt(3) * self.deviation
+            return rng.uniform(self.mean - half, self.mean + half, n)
+        square = math.log1p((self.deviation / self.mean) ** 2)
+        return rng.lognormal(math.log(self.mean) - 0.5 * square, math.sqrt(square), n)
+
+    def lengths(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n,) values that are lengths: those below a hundredth of the mean are drawn again."""
+        values = self.sample(rng, n)
+        for _ in range(1000):
+            bad = values < 0.01 * self.mean
+            if not bad.any():
+                return values
+            values[bad] = self.sample(rng, int(bad.sum()))
+        raise ValueError(
+            f"a length of mean {self.mean:g} and deviation {self.deviation:g} ({self.law}) is hardly ever positive"
+        )
+
+
+def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
+    """Angle (rad, counter-clockwise) of the trace of a plane in a vertical section whose x axis points to azimuth ``section``.
+
+    ``dip`` and azimuths in rad, azimuths clockwise from north: tan α = −tan δ cos(dip direction − section), which falls to
+    the right where the plane dips to the right (Priest 1993, Discontinuity analysis, section 2.4).
+    """
+    if abs(dip - math.pi / 2) < 1e-12:
+        return math.pi / 2
+    return math.atan(-math.tan(dip) * math.cos(dip_direction - section))
+
+
+def parallel_set(
+    name: str,
+    region: np.ndarray,
+    angle: Law,
+    spacing: Law,
+    length: Law | None,
+    gap: Law | None,
+    rng: np.random.Generator,
+) -> Joint:
+    """Traces along parallel lines over ``region`` (n, 2): lines ``spacing`` apart, on each of them traces and gaps by turns
+    from a random start; without ``length`` a trace goes right through. Each line has its own angle about the region's middle
+    line of the set. The persistence is length / (length + gap)."""
+    middle, radius = _circle(region)
+    across = _unit(angle.mean + 0.5 * math.pi)
+    offsets = _renewal(spacing, 2 * radius, rng) - radius
+    angles = angle.sample(rng, len(offsets))
+    lines = []
+    for offset, turn in zip(offsets, angles):
+        along, centre = _unit(turn), middle + offset * across
+        for a, b in _intervals(length, gap, 2 * radius, rng):
+            lines.append(np.array([centre + (a - radius) * along, centre + (b - radius) * along]))
+    return Joint(name, tuple(_touching(lines, region)))
+
+
+def _renewal(spacing: Law, extent: float, rng: np.random.Generator) -> np.ndarray:
+    """Points ``spacing`` apart from 0 to ``extent``, the first a random part of a spacing in."""
+    mean = spacing.mean
+    steps = spacing.lengths(rng, int(2 * extent / mean) + 16)
+    points = np.cumsum(steps) - steps[0] * rng.random()
+    while points[-1] < extent:
+        points = np.concatenate([points, points[-1] + np.cumsum(spacing.lengths(rng, 64))])
+    return points[points < extent]
+
+
+def _intervals(
+    length: Law | None, gap: Law | None, extent: float, rng: np.random.Generator
+) -> list[tuple[float, float]]:
+    if length is None or gap is None or gap.mean == 0:
+        return [(0.0, extent)]
+    period = length.mean + gap.mean
+    n = int(2 * extent / period) + 8
+    start = -period * rng.random()
+    out: list[tuple[float, float]] = []
+    while start < extent:
+        for own, between in zip(length.lengths(rng, n), gap.lengths(rng, n)):
+            if start >= extent:
+                break
+            if start + own > 0:
+                out.append((max(start, 0.0), min(start + own, extent)))
+            start += own + between
+    return out
+
+
+def poisson_traces(
+    name: str, region: np.ndarray, angle: Law, length: Law, per_area: float, rng: np.random.Generator
+) -> Joint:
+    """Traces whose centres fall anywhere, ``per_area`` (P20, 1/m²) of them, each with its own angle and length."""
+    middle, radius = _circle(region)
+    reach = radius + 0.5 * (
+        length.mean + 4 * length.deviation + (6 * length.mean if length.law == "exponential" else 0.0)
+    )
+    n = rng.poisson(per_area * (2 * reach) ** 2)
+    centre = middle + rng.uniform(-reach, reach, (n, 2))
+    return Joint(name, tuple(_touching(_centred(centre, angle.sample(rng, n), length.lengths(rng, n)), region)))
+
+
+def discs(
+    name: str,
+    region: np.ndarray,
+    *,
+    dip: float,
+    dip_direction: float,
+    fisher: float,
+    diameter: Law,
+    per_volume_area: float,
+    section: float,
+    rng: np.random.Generator,
+) -> Joint:
+    """Discs about anywhere in space, cut by the vertical section with its x axis to azimuth ``section`` (Baecher, Lanney &
+    Einstein 1977): ``per_volume_area`` (P32, m²/m³) of joint, poles spread about the mean by Fisher's law with constant
+    ``fisher`` (0: all alike). Angles in rad, azimuths clockwise from north."""
+    middle, radius = _circle(region)
+    largest = diameter.mean + 5 * diameter.deviation + (8 * diameter.mean if diameter.law == "exponential" else 0.0)
+    reach = radius + 0.5 * largest
+    mean_area = 0.25 * math.pi * float(np.mean(diameter.lengths(np.random.default_rng(0), 20000) ** 2))
+    n = rng.poisson(per_volume_area / mean_area * (2 * reach) ** 2 * largest)
+    radii = 0.5 * diameter.lengths(rng, n)
+    centre = np.column_stack([rng.uniform(-reach, reach, (n, 2)), rng.uniform(-0.5 * largest, 0.5 * largest, n)])
+    pole = _fisher(_pole(dip, dip_direction, section), fisher, n, rng)
+    # The section is z = 0: a disc is cut along the line through its plane, as far as its rim reaches.
+    flat = np.hypot(pole[:, 0], pole[:, 1])
+    cut = (flat > 1e-12) & (np.abs(centre[:, 2]) < radii * flat)
+    radii, centre, pole, flat = radii[cut], centre[cut], pole[cut], flat[cut]
+    normal = pole[:, :2] / flat[:, None]
+    foot = centre[:, :2] + (centre[:, 2] * pole[:, 2] / flat)[:, None] * normal
+    half = np.sqrt(radii**2 - (centre[:, 2] / flat) ** 2)
+    along = np.column_stack([-normal[:, 1], normal[:, 0]])
+    lines = list(np.stack([foot - half[:, None] * along, foot + half[:, None] * along], axis=1) + middle)
+    return Joint(name, tuple(_touching(lines, region)))
+
+
+def poisson_lines(
+    name: str, region: np.ndarray, angle: Law | None, per_area_length: float, rng: np.random.Generator
+) -> Joint:
+    """Endless lines, ``per_area_length`` (P21, m/m²) of them, of ``angle`` or, without it, of all directions alike (Miles
+    1964): those that meet a circle of radius R are Poisson with mean 2 R P21, their distances from its middle uniform."""
+    middle, radius = _circle(region)
+    n = rng.poisson(2 * radius * per_area_length)
+    turn = rng.uniform(0, math.pi, n) if angle is None else angle.sample(rng, n)
+    across = np.column_stack([-np.sin(turn), np.cos(turn)])
+    centre = middle + rng.uniform(-radius, radius, n)[:, None] * across
+    return Joint(name, tuple(_touching(_centred(centre, turn, np.full(n, 2 * radius)), region)))
+
+
+def voronoi(name: str, region: np.ndarray, cell_area: float, rng: np.random.Generator) -> Joint:
+    """Edges of the Voronoi cells of points that fall anywhere, one on every ``cell_area`` m²."""
+    import shapely
+
+    middle, radius = _circle(region)
+    reach = radius + 4 * math.sqrt(cell_area)
+    n = rng.poisson((2 * reach) ** 2 / cell_area)
+    points = shapely.multipoints(middle + rng.uniform(-reach, reach, (n, 2)))
+    edges = shapely.get_parts(shapely.voronoi_polygons(points, only_edges=True))
+    pieces = shapely.get_parts(edges)
+    lines = [piece for part in pieces for piece in _pairs(shapely.get_coordinates(part))]
+    return Joint(name, tuple(_touching(lines, region)))
+
+
+def terminated(joint: Joint, on: Sequence[Joint], share: float, rng: np.random.Generator) -> Joint:
+    """``joint`` with the part ``share`` of its traces ended where they first meet a trace of ``on``, to either side of their
+    middle."""
+    import shapely
+
+    walls = shapely.linestrings([piece for other in on for line in other.lines for piece in _pairs(line)])
+    tree = shapely.STRtree(walls)
+    lines = []
+    for line, ends in zip(joint.lines, rng.random(len(joint.lines)) < share):
+        if ends and len(line) == 2:
+            line = _between(line, walls[tree.query(shapely.linestrings(line), predicate="intersects")])
+        lines.append(line)
+    return Joint(joint.name, tuple(lines))
+
+
+def _between(line: np.ndarray, walls: np.ndarray) -> np.ndarray:
+    import shapely
+
+    length = float(np.hypot(*(line[1] - line[0])))
+    at = shapely.get_coordinates(shapely.intersection(shapely.linestrings(line), walls))
+    t = (at - line[0]) @ (line[1] - line[0]) / length**2
+    low, high = max(t[t < 0.5], default=0.0), min(t[t >= 0.5], default=1.0)
+    return np.array([line[0] + low * (line[1] - line[0]), line[0] + high * (line[1] - line[0])])
+
+
+def _circle(region: np.ndarray) -> tuple[np.ndarray, float]:
+    """Middle and radius of a circle around ``region``."""
+    middle = 0.5 * (region.min(axis=0) + region.max(axis=0))
+    return middle, float(np.hypot(*(region - middle).T).max())
+
+
+def _unit(angle: float) -> np.ndarray:
+    return np.array([math.cos(angle), math.sin(angle)])
+
+
+def _centred(centre: np.ndarray, angle: np.ndarray, length: np.ndarray) -> list[np.ndarray]:
+    half = 0.5 * length[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    return list(np.stack([centre - half, centre + half], axis=1))
+
+
+def _pairs(line: np.ndarray) -> list[np.ndarray]:
+    return list(np.stack([line[:-1], line[1:]], axis=1))
+
+
+def _touching(lines: list[np.ndarray], region: np.ndarray) -> list[np.ndarray]:
+    """The parts of ``lines`` inside ``region``."""
+    import shapely
+
+    if not lines:
+        return []
+    area = shapely.Polygon(region)
+    shapely.prepare(area)
+    shapes = shapely.linestrings(np.array(lines))
+    inside = shapely.covers(area, shapes)
+    out = [line for line, whole in zip(lines, inside) if whole]
+    for part in shapely.get_parts(shapely.intersection(shapes[~inside], area)):
+        for piece in shapely.get_parts(part):
+            if piece.geom_type == "LineString" and piece.length > 0:
+                out.append(shapely.get_coordinates(piece))
+    return out
+
+
+def _pole(dip: float, dip_direction: float, section: float) -> np.ndarray:
+    """Unit normal, upwards, in the section's axes: x along it, y up, z horizontally across."""
+    to = dip_direction - section
+    return np.array([math.sin(dip) * math.cos(to), math.cos(dip), math.sin(dip) * math.sin(to)])
+
+
+def _fisher(mean: np.ndarray, concentration: float, n: int, rng: np.random.Generator) -> np.ndarray:
+    """(n, 3) unit vectors about ``mean`` by Fisher's law (1953); the polar angle by inversion, as Priest (1993), 3.6."""
+    if concentration == 0:
+        return np.tile(mean, (n, 1))
+    cosine = 1 + np.log1p(-rng.random(n) * -math.expm1(-2 * concentration)) / concentration
+    sine, turn = np.sqrt(np.maximum(0.0, 1 - cosine**2)), rng.uniform(0, 2 * math.pi, n)
+    aside = np.cross(mean, [0.0, 0.0, 1.0] if abs(mean[2]) < 0.9 else [1.0, 0.0, 0.0])
+    aside /= np.linalg.norm(aside)
+    other = np.cross(mean, aside)
+    return cosine[:, None] * mean + sine[:, None] * (np.cos(turn)[:, None] * aside + np.sin(turn)[:, None] * other)
