@@ -191,7 +191,8 @@ class CentralPath:
     def _left(self) -> tuple[np.ndarray, np.ndarray]:
         """The strength left against sliding either way, N: above and below S."""
         strength = self._mu * self._normal + self._base
-        return strength - self._shear, strength + self._shear
+        least = 1e-14 * strength
+        return np.maximum(strength - self._shear, least), np.maximum(strength + self._shear, least)
 
     def advance(self) -> int:
         """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
@@ -255,9 +256,7 @@ class CentralPath:
         return (normal * width + self._rough * (back * above + ahead * below)) / self._unit
 
     def _undecided(self) -> np.ndarray:
-        ratio = np.stack(
-            [self._kn * self._width / self._normal, *(self._ks * self._slip / np.maximum(self._left(), 1e-300))]
-        )
+        ratio = np.stack([self._kn * self._width / self._normal, *(self._ks * self._slip / self._left())])
         vague = (ratio < _CLEAR) & (ratio > 1.0 / _CLEAR)
         return vague[0] | (vague[1:].any(axis=0) & self._rough & (ratio[0] < 1.0))
 

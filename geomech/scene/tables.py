@@ -282,7 +282,9 @@ class DdaTable(Table):
         0.0, description="share of the velocity carried from step to step: 0 static, 1 dynamic"
     )
     damping: NotNegative = Field(
-        0.05, description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration"
+        0.4,
+        description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration (below 0.3 a "
+        "block that should stick may creep; waves that cross many blocks want less)",
     )
     newmark: Pair = Field(
         (0.5, 1.0),
