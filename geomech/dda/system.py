@@ -250,6 +250,7 @@ class BlockSystem:
         # Mass stays, whatever the strain does to the area.
         density = self._mass / moments[:, 0]
         static = scheme.static
+        begun, heavier = scheme.begun(carried, state.acceleration, dt)
         compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
         offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
@@ -274,8 +275,8 @@ class BlockSystem:
         pattern = self._pattern(found.block, found.other, moments, linked) if n_free else None
         order = self._free if pattern is None else pattern.order
         matrix, right, tangent, stress0 = assemble_blocks(
-            order, moments, density, self._stiffness, self.compliance, carried, stress, crack_strain, given,
-            compliance, offset, gravity, load, dt, scheme.weight, scheme.block_damping, scheme.mass_damping,
+            order, moments, density, self._stiffness, self.compliance, begun, stress, crack_strain, given,
+            compliance, offset, gravity, load, dt, heavier, scheme.weight, scheme.block_damping, scheme.mass_damping,
             scheme.stiffness_damping, n_free,
         )  # fmt: skip
         quiet = None
@@ -328,6 +329,8 @@ class BlockSystem:
             load = load + generalised(points[:0], absorbed, centroid)
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
         velocity, kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
+        if heavier != 1.0:
+            acceleration = 2.0 * heavier * (increment - begun * dt) / (dt * dt)
         if imposed is not None:
             imposed.correct_velocity(velocity)
         rows = found.rows(settled)

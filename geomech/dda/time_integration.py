@@ -11,6 +11,11 @@ to be kept, and the energy of a step with constant loads changes by −(θ−½)
 blocks' own included): it never grows. A contact counts at the start of a step only if it was closed there, and not at all
 if its weighted force would pull; met or left within a step it loses energy besides, after the idea of Kane, Repetto, Ortiz
 & Marsden (1999), that what comes and goes must act implicitly.
+
+The α-scheme of Wood, Bossak & Zienkiewicz (1981), (1−α) a₁ + α a₀ = M⁻¹ f₁ with all forces f₁ at the end of the step, damps
+what the step does not resolve and leaves the rest alone: with the constants of Chung & Hulbert (1993), α = (ϱ−1)/(ϱ+1),
+γ = ½−α, β = ¼(1−α)², it is of second order and every |λ| falls to the spectral radius ϱ as ω dt → ∞. It is the step above with
+(ā − c a₀)/w in place of ā and θ = 1, w = 1/(1+ϱ), c = 1−w. Contact forces are in a₀ too: a bounce may gain some energy.
 Damping forces follow the mean velocity d/dt of the step: they take dᵀD d/dt > 0 at any step.
 """
 
@@ -31,12 +36,14 @@ GROUND_RATIO = 1e-11
 @dataclass(frozen=True)
 class TimeScheme:
     """Newmark's (1959) β and γ, as ``weight`` θ = 2β of the forces at the end of a step and ``memory`` κ = (2β−γ)/(2β) of
-    the acceleration at its start. ``static``: nothing is carried from step to step, and all forces stand at its end.
+    the acceleration at its start; ``end`` is 2β too, also in the α-scheme, where θ = 1 and ``recall`` is c. ``static``: nothing is carried from step to step, and all forces stand at its end.
     ``mass_damping`` 1/s and ``stiffness_damping`` s are Rayleigh's, ``block_damping`` the fraction of critical damping of
     each block's own vibration (and of its contacts'). Raises ValueError for what is not unconditionally stable."""
 
     weight: float = 1.0
     memory: float = 0.0
+    end: float = 1.0
+    recall: float = 0.0
     static: bool = False
     block_damping: float = 0.0
     mass_damping: float = 0.0
@@ -50,6 +57,9 @@ class TimeScheme:
                 f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: it takes 2β ≥ γ ≥ ½ "
                 "(trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
             )
+        radius = settings.spectral_radius
+        if radius is not None and not 0 <= radius <= 1:
+            raise ValueError(f"the spectral radius at high frequencies is from 0 to 1, got {radius!r}")
         if not 0 <= settings.dynamic_factor <= 1:
             raise ValueError(f"the dynamic factor is from 0 (static) to 1 (dynamic), got {settings.dynamic_factor!r}")
         for name in ("damping", "rayleigh_mass", "rayleigh_stiffness"):
@@ -57,13 +67,25 @@ class TimeScheme:
                 raise ValueError(f"{name} must not be negative, got {getattr(settings, name)!r}")
         if settings.dynamic_factor == 0.0:
             return cls(static=True)
+        if radius is not None:
+            alpha = (radius - 1) / (radius + 1)
+            beta, gamma = 0.25 * (1 - alpha) ** 2, 0.5 - alpha
         return cls(
-            weight=2 * beta,
+            weight=2 * beta if radius is None else 1.0,
+            end=2 * beta,
+            recall=0.0 if radius is None else radius / (1 + radius),
             memory=(2 * beta - gamma) / (2 * beta),
             block_damping=settings.damping,
             mass_damping=settings.rayleigh_mass,
             stiffness_damping=settings.rayleigh_stiffness,
         )
+
+    def begun(self, carried: np.ndarray, before: np.ndarray | None, dt: float) -> tuple[np.ndarray, float]:
+        """Velocity (n_blocks, 6) that a step begins with, and by how much inertia counts more, 1/w; with no acceleration from
+        ``before`` it is a step of Shi's."""
+        if self.recall == 0.0 or before is None:
+            return carried, 1.0
+        return carried + 0.5 * self.recall * dt * before, 1.0 / (1.0 - self.recall)
 
     def corrected(
         self, velocity: np.ndarray, before: np.ndarray | None, mean: np.ndarray, turn: np.ndarray, dt: float
@@ -71,11 +93,11 @@ class TimeScheme:
         """Velocity with what the acceleration ``before`` the step (None: that of the step) has to say, and the acceleration
         after it; None where the scheme keeps none. All (n_blocks, 6); ``mean`` ā on the axes before the step, ``turn``
         (n_blocks,) rad the rotation over it, which ``velocity`` has made already."""
-        if self.memory == 0.0:
+        if self.memory == 0.0 and self.recall == 0.0:
             return velocity, None
         before = mean if before is None else before
         change = _turned(before - mean, turn)
-        return velocity + self.memory * dt * change, _turned(mean - (1 - self.weight) * before, turn) / self.weight
+        return velocity + self.memory * dt * change, _turned(mean - (1 - self.end) * before, turn) / self.end
 
 
 def _turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
@@ -116,6 +138,7 @@ def assemble_blocks(
     gravity,
     load,
     dt,
+    heavier,
     weight,
     block_damping,
     mass_damping,
@@ -124,12 +147,12 @@ def assemble_blocks(
 ):
     """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
 
-    Inertia and elasticity as in the head of this file, with ``weight`` θ and σ₁ = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack
+    Inertia and elasticity as in the head of this file, with velocity ``carried``, ``heavier`` 1/w, ``weight`` θ and σ₁ = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack
     strain); ∫ Tᵀρg; the strain rows' share ρω²∫xx, ∫yy, ∫xy of a spinning block; the generalised forces ``load`` (n_blocks, 6)
     of whatever else acts; and damping: a viscous stress ∝ C Δε/dt that gives a block's own vibration (taken as that of a
     square, ω² = 12 C₁₁/(ρ h²)) the part ``block_damping`` of critical damping, and Rayleigh's two.
     """
-    inertia = 2.0 / (dt * dt) + mass_damping / dt
+    inertia = 2.0 * heavier / (dt * dt) + mass_damping / dt
     n_blocks = order.shape[0]
     matrix = np.zeros((n, 6, 6))
     right = np.zeros((n, 6))
@@ -172,7 +195,7 @@ def assemble_blocks(
         for k in range(6):
             for m in range(6):
                 matrix[row, k, m] = inertia * rho * mass[k, m]
-                right[row, k] += 2.0 * rho * mass[k, m] * (carried[b, m] * (1.0 if m < 2 else h)) / dt
+                right[row, k] += 2.0 * heavier * rho * mass[k, m] * (carried[b, m] * (1.0 if m < 2 else h)) / dt
         if rho == 0.0:
             for k in range(3):
                 matrix[row, k, k] += GROUND_RATIO * stiffness[b, 0, 0]

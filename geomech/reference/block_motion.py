@@ -51,6 +51,19 @@ def newmark_amplification(omega_dt: float, beta: float, gamma: float) -> np.ndar
     return np.linalg.solve(new, old)
 
 
+def bossak_amplification(omega_dt: float, radius: float) -> np.ndarray:
+    """(3, 3) what a step of the α-scheme of Wood, Bossak & Zienkiewicz (1981) does to (x, v dt, a dt²), Ω = ω dt.
+
+    Newmark's displacement and velocity with (1−α) a₁ + α a = −ω² x₁; α = (ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)² give it the
+    ``radius`` ϱ as Ω → ∞ (Chung & Hulbert 1993).
+    """
+    alpha = (radius - 1) / (radius + 1)
+    beta, gamma = 0.25 * (1 - alpha) ** 2, 0.5 - alpha
+    new = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [omega_dt**2, 0.0, 1.0 - alpha]])
+    old = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [0.0, 0.0, -alpha]])
+    return np.linalg.solve(new, old)
+
+
 def apparent_oscillation(amplification: np.ndarray) -> tuple[float, float]:
     """(fraction of critical damping, frequency · dt) that a scheme's ``amplification`` gives an undamped oscillator.
 

@@ -184,6 +184,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
         time_step=d.time_step_s,
         dynamic_factor=d.dynamic_factor,
         newmark=d.newmark,
+        spectral_radius=d.spectral_radius,
         equilibrium=d.equilibrium,
         unbalanced_tolerance=d.unbalanced_tolerance,
         damping=d.damping,

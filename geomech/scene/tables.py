@@ -291,6 +291,11 @@ class DdaTable(Table):
         description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation; "
         "2β ≥ γ ≥ 0.5",
     )
+    spectral_radius: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None,
+        description="in place of `newmark`: a second-order scheme that damps to this part a step what the step does not "
+        "resolve; 1 not at all, 0 at once",
+    )
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
         description='when static equilibrium is sought, whatever the time step: "" never, "start" before the run begins, '

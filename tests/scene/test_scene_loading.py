@@ -128,6 +128,7 @@ time_step_s = 0.01
 dynamic_factor = 0.9
 damping = 0.1
 newmark = [0.25, 0.5]
+spectral_radius = 0.7
 equilibrium = "start"
 unbalanced_tolerance = 1e-5
 rayleigh_fractions = [0.02, 0.03]
@@ -193,6 +194,7 @@ def test_every_setting_arrives(scene_file):
         "dynamic_factor": 0.9,
         "damping": 0.1,
         "newmark": (0.25, 0.5),
+        "spectral_radius": 0.7,
         "equilibrium": "start",
         "unbalanced_tolerance": 1e-5,
         "rayleigh_mass": mass,
