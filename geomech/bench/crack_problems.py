@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..ddm.estimate import factors
 from ..model import Cracks, DdmSettings, Material
 from ..reference import crack_arrays, fracture, two_cracks
 
@@ -73,10 +74,6 @@ class CrackProblem:
     def error(self, found: np.ndarray) -> float:
         """Largest error of a K, relative to the largest K."""
         return float(np.abs(found - self.reference).max() / np.abs(self.reference).max())
-
-
-def factors(solution: Solution) -> np.ndarray:
-    return np.column_stack([solution.tips["k_i"], solution.tips["k_ii"]])
 
 
 def rectangle(half_width: float, half_height: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,6 +94,19 @@ def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict, histo
         )
         for b, body in bodies.items()
     }
+
+
+def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
+    """child → what the faces of its ``cracks`` remember (`ddm.FaceMemory`), from that of the parents, ``parent`` (n_children,).
+    Children keep their parent's reference coordinates, and so its memory; the work done by friction so far goes on with
+    one of them, or a sum over blocks would count it twice."""
+    found, told = {}, set()
+    for child in np.unique(cracks.block).tolist():
+        block = int(parent[child])
+        if block in history:
+            found[child] = replace(history[block], work=0.0) if block in told else history[block]
+            told.add(block)
+    return found
 
 
 def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[int, np.ndarray]) -> np.ndarray:

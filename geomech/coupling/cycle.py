@@ -18,7 +18,7 @@ from .. import dda
 from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
 from ..model.polygon import winding_number
-from .bodies import boundary_loads, elastic_bodies, solve_bodies, tip_rows
+from .bodies import boundary_loads, elastic_bodies, inherited, solve_bodies, tip_rows
 from .compliance import crack_response
 from .inherited_loads import on_children
 from .mean_stress import rotated_mean_stress
@@ -355,9 +355,7 @@ class Coupling:
         self.problem = replace(self.problem, loads=on_children(self.problem.loads, split.parent, child))
         if self.removed is not None:
             self.removed = self.removed[split.parent]
-        # Children keep the reference coordinates of their parent, and so its faces' memory.
-        parents = enumerate(split.parent.tolist())
-        self.history = {child: self.history[parent] for child, parent in parents if parent in self.history}
+        self.history = inherited(self.history, split.parent, split.cracks)
         self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
         self.budget = self.budget.cut()
         self._take_blocks()

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -139,7 +140,7 @@ class Body:
         g_old, same_boundary = system.at_old, system.unchanged
         c_old = c.found_in(old.faces if old else None)
         self.counts["elements"] = g.n + c.n
-        self.counts["elements_new"] = int((g_old < 0).sum() + (c_old < 0).sum())
+        self.counts["elements_new"] += int((g_old < 0).sum() + (c_old < 0).sum())
         if not same_boundary:
             self.counts["boundary_assemblies"] = self.counts["boundary_factorisations"] = int(g.n > 0)
         self.work.boundary_assemblies += self.counts["boundary_assemblies"]
@@ -241,9 +242,10 @@ class Body:
             if self.settings.solver != "auto" or self.faces.n_unknowns > FACTORABLE:
                 raise
             _log.info("%s; factored instead", failure)
+            iterated = copy(self)
             self.compressed, self._factored_after_all = False, True
             vars(self).pop("face_equations", None)
-            self._assemble(None)
+            self._assemble(iterated)
             return self._solved(load, warm, equilibrium_tolerance, history)
 
     def _solved(
@@ -275,7 +277,7 @@ class Body:
             check_equilibrium(applied, self, equilibrium_tolerance)
         n_g, uniform = self.boundary.n_unknowns, applied.particular.uniform
         rest = np.zeros(n_g + self.faces.n_unknowns)
-        if uniform.any() and (self.outlined or not self.loops):
+        if uniform.any() and len(self.loops) == self.outlined:  # else it is among the unit loads
             rest[n_g:] = on_elements(self.faces, uniform)
         if not applied.plain:
             tol = 2 * OFF * self._extent

@@ -52,7 +52,7 @@ class BodyLoad:
     body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
     about                (2,)       m; the centroid when left out
     remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
-                                    that carry it act on the boundary in addition to ``tractions``
+                                    that carry it act on the outline in addition to ``tractions``. Holes are free of it
     crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a `Pressure`,
                          or a function of points (n, 2) to (n,)
     hole_pressure        the same in all holes, or of each: a number, Pa, or a `Pressure`

@@ -102,7 +102,7 @@ class UnitLoads:
         sizes: dict[str | int, np.ndarray] = {}
         if particular.force.any() or particular.gradient.any():
             sizes["force"] = np.concatenate([particular.force, particular.gradient.ravel()])
-        if len(self.mesh.edges) and self.in_plane and particular.uniform.any():
+        if self.n_holes and particular.uniform.any():
             sizes["remote"] = particular.uniform
         for hole, pressure in enumerate(load.hole_pressures(self.n_holes)):
             size = np.array([pressure.at(self._centre(hole)), *pressure.gradient])
@@ -208,8 +208,8 @@ class UnitLoads:
     def _edge_load(self, name: str | int) -> UnitLoad:
         """What acts on whole edges.
 
-        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy; "remote": the three stresses of the infinite plane,
-        which its holes leave without traction; a number: pressure in that hole, constant and growing with x and with y
+        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy; "remote": the three uniform stresses of the plane
+        or the body, which holes leave without traction; a number: pressure in that hole, constant and growing with x and with y
         from its centre.
         """
         densities = self._edge_densities(name)
@@ -221,7 +221,10 @@ class UnitLoads:
 
     def _edge_densities(self, name: str | int) -> np.ndarray:
         if not isinstance(name, int):
-            return np.stack([edge_densities(self.mesh.edges, unit) for unit in self._particular(name)], axis=-1)
+            out = np.stack([edge_densities(self.mesh.edges, unit) for unit in self._particular(name)], axis=-1)
+            if name == "remote" and not self.in_plane:
+                out[self.mesh.edge_loop == 0] = 0.0  # the outline bears it
+            return out
         a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
         densities = np.zeros((len(a), 2, 3, 3))
         here, centre = self._hole(name), self._centre(name)

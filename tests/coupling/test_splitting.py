@@ -1,14 +1,18 @@
 """Blocks cut by cracks: conservation against polygon integrals done here by triangles, geometry against Shapely."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
 import shapely.ops
 
+from geomech.coupling.bodies import inherited
 from geomech.coupling.splitting import split_blocks
+from geomech.ddm.face_laws import FaceMemory
 from geomech.ddm.growth import advance
+from geomech.ddm.influence import ElementSet
 from geomech.model import CONTACT, OPEN, STICK, TIP, Blocks, Cracks, GrowthSettings, State
 
 DENSITY = 2700.0
@@ -245,6 +249,19 @@ def test_dangling_cracks_go_to_their_child():
     # The mouth of the crack that ends inside is no corner of its block.
     assert split.blocks.n_vertices == 4 + 6
     assert_conserved(blocks, state, split)
+
+
+def test_work_done_by_friction_is_not_counted_twice():
+    """Cracks on both sides of a cut remember what their parent's faces did; the sum of the work stays."""
+    blocks = Blocks.from_polygons([SQUARE, SQUARE + 10])
+    nodes = [[2, 0], [2, 3], [0.5, 1], [1.5, 1], [3, 2], [3.5, 2.5], [11, 11], [12, 12]]
+    cracks = network(nodes, [[0, 1], [2, 3], [4, 5], [6, 7]], crack=[0, 1, 2, 3], block=[0, 0, 0, 1], surface=[0, 1])
+    split = split_blocks(blocks, moving(blocks), cracks)
+    faces = ElementSet(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, int), np.zeros(0, int), 4, "chebyshev")
+    history = {b: replace(FaceMemory.none(faces), work=work) for b, work in ((0, 5.0), (1, 7.0))}
+    after = inherited(history, split.parent, split.cracks)
+    assert {b: memory.work for b, memory in after.items()} == {0: 5.0, 1: 0.0, 2: 7.0}
+    assert all(memory.elements is faces for memory in after.values())
 
 
 def test_other_blocks_are_left_as_they_are():

@@ -100,6 +100,27 @@ def test_remote_stress_on_a_body_is_tractions_on_its_boundary():
     assert np.allclose(by_field.displacement(p), by_traction.displacement(p), atol=1e-9 / ROCK.youngs_modulus)
 
 
+def test_remote_stress_leaves_holes_free():
+    """As in the infinite plane: it is the tractions on the outline, and K of a crack beside the hole is theirs. The crack is
+    added afterwards as well, as growth does."""
+    hole = 0.3 * np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
+    stress, cracks = np.array([1.0, 2.0, 0.5]), line([0.45, -0.1], [0.7, 0.2], aperture=OPEN)
+    load = ddm.BodyLoad(remote_stress=stress)
+    before = ddm.Body([rectangle(1, 1), hole], Cracks.from_polylines([]), ROCK)
+    for _ in range(3):
+        before.solve(load)
+    by_traction = ddm.Body([rectangle(1, 1), hole], cracks, ROCK).solve(uniform_load([rectangle(1, 1)], stress))
+    for previous in (None, before):
+        by_field = ddm.Body([rectangle(1, 1), hole], cracks, ROCK, previous=previous).solve(load)
+        for name in ("k_i", "k_ii"):
+            np.testing.assert_allclose(by_field.tips[name], by_traction.tips[name], rtol=1e-8)
+        at = np.array([[0.5, 0.5], [-0.7, 0.2]])
+        np.testing.assert_allclose(by_field.stress(at), by_traction.stress(at), rtol=1e-7)
+        wall = by_field.stress(np.array([[0.15, 0.15]]))[0]
+        across = np.array([wall[0] + wall[2], wall[1] + wall[2]])  # σ n √2 there
+        assert np.abs(across).max() < 1e-2  # near the middle of a side between two corners
+
+
 def test_hole_in_tension():
     """Kirsch (1898): 3σ beside a circular hole and σ(1 + 1/8 + 3/32) one radius away. The middle of a facet of an n-gon
     sees O(1/n) less, so n = 48 and 96 are extrapolated; 1 % for the plate, which is only twenty radii wide."""
