@@ -2,8 +2,8 @@
 
 Most of a crack network's stiffness lies within cracks and between neighbours. The elements are cut into patches; each,
 with the rest of the cracks that it cuts, is solved for exactly and its own unknowns are kept of that (restricted additive
-Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 15 to 40 products for networks of any size; a crack
-that is cut by many patches takes more, as nothing but the iteration carries its ends' news to one another.
+Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 15 to 40 products for networks of any size. Cracks
+that many patches cut have a few coarse elements besides (`coarse`), which carry their ends' news to one another.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .coarse import CoarseLevel
 from .crack_system import Rows
 from .factor import Factor
 from .hierarchical import Compressed, Tree
@@ -202,6 +203,7 @@ class IterativeCrackSystem:
         self.products = 0
         self._per = elements.per
         self._patches = Patches(elements, crack, nu, tol)
+        self._coarse = CoarseLevel(elements, crack, nu, tol)
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def opened(self, right: np.ndarray) -> np.ndarray:
@@ -234,9 +236,14 @@ class IterativeCrackSystem:
             out[rows.held] = 0.0
             return out
 
+        def roughly(v: np.ndarray) -> np.ndarray:
+            smooth, rest = self._coarse.split(v)
+            return smooth + self._patches.solve(rest)
+
         self._patches.change(rows)
+        self._coarse.change(rows.held)
         right = np.where(rows.held, 0.0, right)
-        w, n = gmres(times, right, self._patches.solve, self._guess(right, rows.held))
+        w, n = gmres(times, right, roughly, self._guess(right, rows.held))
         self.products += n
         self._last = right, w
         return w

@@ -98,7 +98,7 @@ def test_growth_may_cross_from_dense_to_compressed():
 
 
 def test_a_load_that_comes_again_costs_no_iterations():
-    body = ddm.Body(PLANE, network(5), ROCK, DdmSettings(solver="compressed"))
+    body = ddm.Body(PLANE, network(5), ROCK, DdmSettings(order=2, solver="compressed"))
     body.solve(ddm.BodyLoad(remote_stress=[0.0, 1e6, 0.0], crack_pressure=2e6))
     before = body.crack_system.products
     body.solve(ddm.BodyLoad(remote_stress=[0.0, 2e6, 0.0], crack_pressure=4e6))
@@ -118,7 +118,7 @@ def test_a_part_cut_off_is_refused():
     segments = np.column_stack([np.arange(4), np.roll(np.arange(4), -1)])
     four = np.zeros(4, int)
     ring = Cracks(ring, segments, four, four, four, np.full(4, np.inf), np.zeros(4, bool), ("ring",))
-    body = ddm.Body(PLANE, ring, ROCK, DdmSettings(solver="compressed"))
+    body = ddm.Body(PLANE, ring, ROCK, DdmSettings(order=2, solver="compressed"))
     with pytest.raises(np.linalg.LinAlgError, match="cut a part"):
         body.solve(ddm.BodyLoad(remote_stress=[0.0, 1e6, 2e5]))
 
@@ -152,3 +152,29 @@ def test_what_the_iteration_does_not_solve_is_factored_after_all(monkeypatch):
     assert not body.compressed and not ddm.Body(PLANE, cracks, ROCK, previous=body).compressed
     with pytest.raises(NotSolved):
         ddm.Body(PLANE, cracks, ROCK, DdmSettings(solver="compressed")).solve(load)
+
+
+def test_long_cracks_talk_from_end_to_end(monkeypatch):
+    """Two parallel cracks of 300 elements, cut by sixteen patches: coarse elements save half of the products (51 → 25), and do not
+    change the answer (residuals of 1e-11). A crack that winds has none, and is solved as before."""
+    from geomech.ddm import coarse
+
+    x = np.array([-10.0, 10.0])
+    lines = [np.column_stack([x, 0.3 * x + 1.5 * k]) for k in range(2)]
+    cracks, load = Cracks.from_polylines(lines, aperture=np.inf), ddm.BodyLoad(remote_stress=[0.2e6, 1e6, 0.3e6])
+    products, k = {}, {}
+    for longest in (coarse.LONG, 10**9):
+        with monkeypatch.context() as patch:
+            patch.setattr(coarse, "LONG", longest)
+            body = ddm.Body([], cracks, ROCK, DdmSettings(order=2, solver="compressed", elements_per_crack=300))
+            solution = body.solve(load)
+        k[longest] = np.stack([solution.tips["k_i"], solution.tips["k_ii"]])
+        products[longest] = body.crack_system.products
+    with_them, without = products.values()
+    assert with_them < 0.7 * without
+    one, other = k.values()
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-8 * np.abs(other).max())
+    x = np.linspace(-10, 10, 201)
+    winding = Cracks.from_polylines([np.column_stack([x, np.sin(2 * x)])], aperture=np.inf)
+    body = ddm.Body([], winding, ROCK, DdmSettings(order=2, solver="compressed"))
+    assert body.crack_system._coarse.n == 0 and body.faces.n >= coarse.LONG
