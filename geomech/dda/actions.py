@@ -57,6 +57,8 @@ class StepActions:
             self.bolts, self.memory = BoltSet.of(
                 loads.bolts, state.bolts, state.time, point_at, order, moments, removed
             )
+        #: (n_contacts,) m: what the fixed blocks' motion makes of the contacts' motion along their edges.
+        self.along = np.zeros(0)
         self._motion = np.zeros((0 if self.bolts is None else len(self.bolts.number), 2))
 
     @classmethod
@@ -101,6 +103,7 @@ class StepActions:
         if self.bolts is not None:
             self.bolts.stiffen_turning(matrix, self.order, self.moments)
         shift = np.zeros((len(found), 2))
+        self.along = shift[:, 1]
         if self.imposed is not None:
             point = found.geometry[:, 5:7]
             normal = found.geometry[:, 1:3]

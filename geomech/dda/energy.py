@@ -104,6 +104,19 @@ def _stored(stiffness, gap, limit, bonded):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def sliding(vectors, unknowns, order, block, other):
+    """(n,) m: motion of every contact along its edge, from ``vectors`` (n, 2, 12) and scaled ``unknowns`` (n_free, 6)."""
+    out = np.zeros(block.shape[0])
+    for c in range(out.shape[0]):
+        for side in range(2):
+            i = order[block[c]] if side == 0 else order[other[c]]
+            if i >= 0:
+                for a in range(6):
+                    out[c] += vectors[c, 1, 6 * side + a] * unknowns[i, a]
+    return out
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def step_energies(
     increment,
     old_velocity,
@@ -133,6 +146,7 @@ def step_energies(
     gap,
     lifted,
     slip,
+    sliding,
     normal_force,
     shear_force0,
     shear_force,
@@ -148,9 +162,9 @@ def step_energies(
     Blocks: ``increment``, ``carried``, ``acceleration``, ``load`` (n_blocks, 6) as solved with, ``old_velocity`` and
     ``velocity`` before and after the step, ``old_stress``, ``tangent``, ``stress0`` with σ′ = tangent Δε + stress0; ``weight``
     θ and dampings of the time scheme. Contacts (n,): states and bonds before and after, gaps from where the faces meet,
-    ``lifted`` and ``slip`` in the step (m); forces that acted over the step, and shear forces at its two ends (N);
-    ``normal`` N/m, the spring without dashpot, and ``shear``, that of the step (``theta`` times the spring); ``closure``
-    (n_laws,) m.
+    ``lifted``, ``slip`` and motion along the edge (``sliding``) in the step (m); forces that acted over the step, and shear
+    forces at its two ends (N); ``normal`` N/m, the spring without dashpot, and ``shear``, that of the step (``theta`` times
+    the spring), 0 where a multiplier holds and nothing is stored; ``closure`` (n_laws,) m.
     """
     kinetic = elastic = contact = before = fallen = loads = spin = cracks = 0.0
     friction = viscous = bond = scheme = lost = overlap = 0.0
@@ -207,26 +221,24 @@ def step_energies(
         drag = stiffness_damping + 2.0 * block_damping * np.sqrt(density[b] * area / (12.0 * stiffness[b, 0, 0]))
         viscous += drag / dt * area * quadratic
     for i in range(state.shape[0]):
-        kn, ks, g0, g1, limit = normal[i], shear[i] / theta[i], gap0[i], gap[i], closure[law[i]]
-        s0, s1 = shear_force0[i], end_shear[i]
+        kn, g0, g1, limit = normal[i], gap0[i], gap[i], closure[law[i]]
+        give = theta[i] / shear[i] if shear[i] > 0.0 else 0.0
         phi0 = phi1 = given = rubbed = drag = done = 0.0
         if was_state[i] != OPEN:
-            phi0 = _stored(kn, g0, limit, was_bonded[i]) + 0.5 * s0 * s0 / ks
+            phi0 = _stored(kn, g0, limit, was_bonded[i]) + 0.5 * give * shear_force0[i] * shear_force0[i]
         before += phi0
         if state[i] != OPEN:
             pushed, sheared = normal_force[i], shear_force[i]
             if was_state[i] == OPEN and g0 < 0.0:
                 given = _stored(kn, g0, limit, 0)
-            phi1 = _stored(kn, g1, limit, bonded[i]) + 0.5 * s1 * s1 / ks
-            motion = g1 - g0 + lifted[i]
-            along = (s0 - sheared) / shear[i]
+            phi1 = _stored(kn, g1, limit, bonded[i]) + 0.5 * give * end_shear[i] * end_shear[i]
+            done = pushed * (g1 - g0 + lifted[i]) + sheared * sliding[i]
             if state[i] == SLIP:
-                along += slip[i]
-                rubbed = -sheared * slip[i] - pushed * lifted[i]
-            done = pushed * motion + sheared * along
-            start = g0 if was_state[i] != OPEN and was_bonded[i] > 0 else min(g0, 0.0)
-            spring = -theta[i] * _push(kn, g1, limit) - (1.0 - theta[i]) * _push(kn, start, limit)
-            drag = -(pushed + spring) * (g1 - g0)
+                rubbed = -sheared * (slip[i] if give > 0.0 else sliding[i]) - pushed * lifted[i]
+            if kn > 0.0:
+                start = g0 if was_state[i] != OPEN and was_bonded[i] > 0 else min(g0, 0.0)
+                spring = -theta[i] * _push(kn, g1, limit) - (1.0 - theta[i]) * _push(kn, start, limit)
+                drag = -(pushed + spring) * (g1 - g0)
         rest = given - done - (phi1 - phi0) - rubbed - drag
         contact += phi1
         overlap += given

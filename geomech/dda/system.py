@@ -14,7 +14,7 @@ from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
 from .contact_springs import end_of_step, over_a_step
 from .contacts import ContactFinder, ContactSet
-from .energy import StepEnergy, step_energies
+from .energy import StepEnergy, sliding, step_energies
 from .excavation import Excavations, until_next_event
 from .held import balanced, hold, with_rigid_motion
 from .imbalance import imbalance
@@ -236,6 +236,14 @@ class BlockSystem:
             return solve(found, gap)
         return settle_augmented(solve, found, springs, gap, self._finder.on_penalty(found), self._tolerance)
 
+    def _real_springs(self, found: ContactSet, settled: Settled) -> tuple[np.ndarray, np.ndarray]:
+        """Contact springs that store energy, normal and shear: what multipliers hold does not."""
+        normal, shear = found.springs.normal, settled.springs.shear
+        if not self._tolerance:
+            return normal, shear
+        held = self._finder.on_penalty(found)
+        return np.where(held[0], 0.0, normal), np.where(held[1], 0.0, shear)
+
     def _attempt(
         self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
     ) -> tuple[StepResult, float]:
@@ -340,13 +348,16 @@ class BlockSystem:
             acting_right, largest_force = actions.with_bolt_forces(right), actions.largest_bolt_force
             load = generalised(points, edges, centroid) + actions.work_forces(reaction, rows, centroid)
         end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, weight)
+        slid = sliding(vectors, settled.unknowns, order, found.block, found.other)
+        if actions is not None and n_free:
+            slid += actions.along
         energy = StepEnergy._make(
             step_energies(
                 increment, state.velocity, carried, velocity, acceleration, dt, gravity, load, scheme.weight,
                 scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, density, moments, self._fixed, stress,
                 tangent, stress0, self.compliance, self._stiffness, found.state, settled.state, found.bonded, settled.bonded,
-                found.gap, settled.gap, settled.lifted, settled.slip, settled.normal_force, found.shear,
-                settled.shear_force, end_shear, found.springs.normal, settled.springs.shear,
+                found.gap, settled.gap, settled.lifted, settled.slip, slid, settled.normal_force, found.shear,
+                settled.shear_force, end_shear, *self._real_springs(found, settled),
                 weight if isinstance(weight, np.ndarray) else np.full(len(found), weight), found.law, self._finder.closure,
             ).tolist()
         )  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
+from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, Roughness, State
 
 GRAVITY = 9.81
 WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
@@ -154,6 +154,31 @@ def test_the_geometry_update_is_all_that_is_left_of_the_budget_of_a_wall_that_fa
     assert budget.friction > 0.1 * budget.gravity_work
     # 4e-5 here, and no less with shorter steps: more corners are then seen to meet.
     assert abs(budget.residual) < 1e-4 * budget.gravity_work
+
+
+@pytest.mark.parametrize(
+    ("law", "settings"),
+    [
+        (JointLaw("joint", 0.6), {"newmark": (0.25, 0.5)}),
+        (JointLaw("joint", 0.6), {"newmark": (0.36, 0.6), "damping": 0.0}),
+        (JointLaw("joint", 0.6), {"rayleigh_mass": 2.0, "rayleigh_stiffness": 1e-5}),
+        (JointLaw("joint", 0.6), {"contact": "augmented", "normal_penalty": 1e10}),
+        (JointLaw("dilates", 0.6, dilation_angle=0.1), {}),
+        (JointLaw("closes", 0.6, normal_stiffness=1e10, max_closure=1e-4), {}),
+        (JointLaw("rough", 0.5, roughness=Roughness(10.0, 50e6)), {}),
+        (JointLaw("bonded", 0.5, cohesion=1e4, tensile_strength=5e3), {}),
+    ],
+    ids=["trapezoidal", "newmark", "rayleigh", "augmented", "dilation", "closure", "rough", "bonded"],
+)
+def test_every_scheme_and_law_closes_its_balance(law, settings):
+    blocks = wall(3, 2)
+    settings = DdaSettings(dynamic_factor=1.0, max_displacement_ratio=0.02, **settings)
+    system = dda.BlockSystem(blocks, [ROCK], [law], settings=settings)
+    _, budget = marched(system, State.at_rest(blocks), Loads(gravity=History.constant([7.0, -GRAVITY])), 2e-3, 0.06)
+    assert budget.friction > 0.0 and abs(budget.residual) < 1e-2 * budget.gravity_work
+    assert budget.start == 0.0
+    total = budget.last.stored + budget.losses - budget.work - budget.overlap
+    assert total == pytest.approx(budget.residual, abs=1e-11 * budget.turnover)
 
 
 def test_energy_from_nowhere_is_reported(caplog):
