@@ -7,7 +7,7 @@ import pytest
 from block_problems import GRAVITY, WEIGHT, march, moved, rectangle, settled, system_of, turned
 
 from geomech import dda
-from geomech.model import OPEN, EdgeTraction, History, JointLaw, Loads, Material, State
+from geomech.model import OPEN, History, JointLaw, Loads, Material, State, WaterTable
 from geomech.reference import rock_slopes, toppling_slope
 
 
@@ -32,15 +32,13 @@ def stays(strong: dda.BlockSystem, weak: dda.BlockSystem, loads: Loads = WEIGHT,
 DIP = np.radians(35)
 
 
-def slab(law: JointLaw, sides_deg: float = 90.0) -> dda.BlockSystem:
-    """A slab 4 m along a plane that dips 35°, 2 m high, its sides at ``sides_deg`` from the horizontal: upright, its
-    weight passes the middle of its base, so that the joint is strained evenly."""
-    along = np.array([np.cos(DIP), np.sin(DIP)])
-    up = 2.0 * np.array([1 / np.tan(np.radians(sides_deg)), 1.0])
+def slab(law: JointLaw) -> dda.BlockSystem:
+    """A slab 4 m along a plane that dips 35°, 2 m high; its sides are upright, so that its weight passes the middle of its
+    base and presses both ends alike."""
+    along, up = np.array([np.cos(DIP), np.sin(DIP)]), np.array([0.0, 2.0])
     block = np.array([0 * along, 4 * along, 4 * along + up, up])
-    names = [[[""] * 4], [["base", "back", "", ""]]]
     return system_of(
-        [turned(rectangle(-3, -2, 8, 0), DIP), block], [law], names=names,
+        [turned(rectangle(-3, -2, 8, 0), DIP), block], [law],
         rock=Material("rock", 50e9, 0.0, density=2600.0),
     )  # fmt: skip
 
@@ -71,29 +69,30 @@ def test_plane_failure_by_strength_reduction(cohesion):
     assert factor == pytest.approx(expected, rel=2e-3)
 
 
-@pytest.mark.parametrize(("uplift", "thrust"), [(30e3, 0.0), (0.0, 20e3), (40e3, 15e3)])
-def test_plane_failure_with_water_in_the_plane_and_behind(uplift, thrust):
-    # Water forces as tractions on the slab's base and back (Hoek & Bray's U and V, constant along each).
+@pytest.mark.parametrize("depth", [0.6, 1.2, 1.8])
+def test_plane_failure_with_water_in_the_plane_and_behind(depth):
+    """Water stands ``depth`` deep in a tension crack behind the slab and drains along the plane to the toe, where it comes
+    out: V = ½ γw z², U = ½ γw z A (Hoek & Bray 1981). The piezometric line is straight from the crack to the toe."""
     weight = 2600 * GRAVITY * 2 * 4 * np.cos(DIP)
-    press = uplift / 4.0 * np.array([-np.sin(DIP), np.cos(DIP)])
-    water = (
-        EdgeTraction("base", History.constant(press)),
-        EdgeTraction("back", History.constant([-thrust / 2.0, 0.0])),
-    )
-    loads = Loads(gravity=WEIGHT.gravity, edge_tractions=water)
+    toe, heel = np.zeros(2), 4 * np.array([np.cos(DIP), np.sin(DIP)])
+    water = WaterTable(np.array([toe, heel + [0.0, depth]]), unit_weight=9810.0)
+    loads = Loads(gravity=WEIGHT.gravity, water=water)
+    uplift, thrust = 0.5 * 9810 * depth * 4, 0.5 * 9810 * depth**2
     expected = np.degrees(
         np.arctan(
             (weight * np.sin(DIP) + thrust * np.cos(DIP)) / (weight * np.cos(DIP) - uplift - thrust * np.sin(DIP))
         )
     )
+    factor = rock_slopes.plane_failure_factor(weight, DIP, 4.0, 0.0, np.radians(expected), uplift, thrust)
+    assert factor == pytest.approx(1.0)
 
     def stands(friction_deg):
         return stays(slab(JointLaw("strong", np.radians(75))), slab(JointLaw("plane", np.radians(friction_deg))), loads)
 
     found = limit(stands, 30, 70)
-    factor = rock_slopes.plane_failure_factor(weight, DIP, 4.0, 0.0, np.radians(expected), uplift, thrust)
-    assert factor == pytest.approx(1.0)
-    print(f"U = {uplift / 1e3:g}, V = {thrust / 1e3:g} kN: friction needed {found:.4f}°, should be {expected:.4f}°")
+    print(
+        f"z = {depth} m, U = {uplift / 1e3:.1f}, V = {thrust / 1e3:.1f} kN: {found:.4f}° needed, should be {expected:.4f}°"
+    )
     assert found == pytest.approx(expected, abs=0.02)
 
 
