@@ -27,44 +27,55 @@ def voussoirs(n: int, ratio: float, radius: float = 1.0) -> list[np.ndarray]:
     return [np.array([inner * a, outer * a, outer * b, inner * b]) for a, b in itertools.pairwise(rays)]
 
 
-def arch_stands(n: int, ratio: float) -> bool:
-    """Whether ``n`` rigid voussoirs that neither slide nor pull can be in equilibrium under their own weight.
+def least_pull(n: int, ratio: float) -> float:
+    """Least tension, over all equilibria of ``n`` rigid voussoirs under their own weight, that some joint's corner must carry.
 
+    In units of the weight per area times R²; negative: the arch stands, and its corners can all be pressed by as much.
     Heyman's (1966) safe theorem as a linear program (Livesley 1978, "Limit analysis of structures formed from rigid
     blocks", International Journal for Numerical Methods in Engineering 12, 1853-1871): at each joint two corner forces
-    N ≥ 0 and a shear of any size, three equations of equilibrium a voussoir.
+    N and a shear of any size, three equations of equilibrium a voussoir; the least s with all N ≥ −s.
     """
     from scipy.optimize import linprog
+    from scipy.sparse import csr_array
 
-    equations, right = np.zeros((3 * n, 3 * (n + 1))), np.zeros(3 * n)
-    for k, corners in enumerate(voussoirs(n, ratio)):
-        x, y = corners.T
-        u, v = np.roll(x, -1), np.roll(y, -1)
-        cross = x * v - u * y
-        area = 0.5 * cross.sum()
-        rows = slice(3 * k, 3 * k + 3)
-        right[rows] = 0.0, area, np.sum((x + u) * cross) / 6.0  # weight ρg = 1 carried, and its moment
-        for joint, sign, inner, outer in ((k, 1.0, corners[0], corners[1]), (k + 1, -1.0, corners[3], corners[2])):
-            radial = (outer - inner) / np.hypot(*(outer - inner))
-            push = sign * np.array([-radial[1], radial[0]])
-            for column, (at, force) in enumerate(((inner, push), (outer, push), (inner, sign * radial))):
-                moment = at[0] * force[1] - at[1] * force[0]
-                equations[rows, 3 * joint + column] += (*force, moment)
-    bounds = [(0, None), (0, None), (None, None)] * (n + 1)
-    return linprog(np.zeros(3 * (n + 1)), A_eq=equations, b_eq=right, bounds=bounds, method="highs").status == 0
+    corners = np.array(voussoirs(n, ratio))
+    x, y = corners[:, :, 0], corners[:, :, 1]
+    u, v = np.roll(x, -1, axis=1), np.roll(y, -1, axis=1)
+    cross = x * v - u * y
+    right = np.zeros((n, 3))
+    right[:, 1], right[:, 2] = 0.5 * cross.sum(axis=1), np.sum((x + u) * cross, axis=1) / 6.0  # weight, and its moment
+    equations = np.zeros((n, 3, 3 * (n + 1) + 1))
+    voussoir = np.arange(n)
+    for sign, joint, inner, outer in (
+        (1.0, voussoir, corners[:, 0], corners[:, 1]),
+        (-1.0, voussoir + 1, corners[:, 3], corners[:, 2]),
+    ):
+        radial = sign * (outer - inner) / np.hypot(*(outer - inner).T)[:, None]
+        push = np.stack([-radial[:, 1], radial[:, 0]], axis=1)
+        for column, (at, force) in enumerate(((inner, push), (outer, push), (inner, radial))):
+            moment = at[:, 0] * force[:, 1] - at[:, 1] * force[:, 0]
+            equations[voussoir, :, 3 * joint + column] = np.column_stack([force, moment])
+            if column < 2:
+                # N + s ≥ 0 is the unknown: the −s of all corners goes into the last column.
+                equations[:, :, -1] -= np.column_stack([force, moment])
+    bounds = [(0, None), (0, None), (None, None)] * (n + 1) + [(None, None)]
+    cost = np.zeros(3 * (n + 1) + 1)
+    cost[-1] = 1.0
+    found = linprog(
+        cost, A_eq=csr_array(equations.reshape(3 * n, -1)), b_eq=right.ravel(), bounds=bounds, method="highs"
+    )
+    return float(found.x[-1])
 
 
 def thinnest_arch(n: int) -> float:
-    """t/R below which an arch of ``n`` voussoirs falls, by bisection of `arch_stands`.
+    """t/R below which an arch of ``n`` voussoirs falls: the root of `least_pull`.
 
     Hinges form at joints only, so few voussoirs stand at less: 0.1041 (6), 0.1015 (9), 0.1049 (12), 0.1070 (25), 0.1074 (50);
     Milankovitch's 0.1075 is the limit of many.
     """
-    low, high = 0.02, 0.2
-    while high - low > 1e-7:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if arch_stands(n, middle) else (middle, high)
-    return 0.5 * (low + high)
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda ratio: least_pull(n, ratio), 0.05, 0.2, xtol=1e-9))
 
 
 def three_hinge_thrust(span: float, thickness: float, unit_weight: float) -> float:
@@ -101,33 +112,3 @@ def two_block_beam(
         arm = -(math.cos(turn) * a[0] - math.sin(turn) * a[1])
         thrust = weight * arm / rise
     return thrust, thickness - rise
-
-
-def voussoir_beam(
-    span: float, thickness: float, unit_weight: float, youngs_modulus: float
-) -> tuple[float, float, float]:
-    """(greatest compression Pa, sag of the middle m, part of the thickness that the arch takes) of a jointed beam.
-
-    Elastic compression arch in a beam without tensile strength: Evans (1941), Beer & Meek (1982), iteration of
-    Diederichs & Kaiser (1999), "Stability of large excavations in laminated hard rock masses: the voussoir analogue
-    revisited", International Journal of Rock Mechanics and Mining Sciences 36, 97-117. Raises ValueError when it buckles.
-    """
-    best: tuple[float, float, float] | None = None
-    for part in np.linspace(0.01, 1.0, 991):
-        start = thickness * (1.0 - 2.0 * part / 3.0)
-        length = span + 8.0 * start**2 / (3.0 * span)
-        arm = start
-        for _ in range(1000):
-            compression = unit_weight * span**2 / (4.0 * part * arm)
-            shortening = compression / 3.0 * (2.0 / 3.0 + part) * length / youngs_modulus
-            square = start**2 - 3.0 * span * shortening / 8.0
-            if square <= 0:
-                break
-            before, arm = arm, math.sqrt(square)
-            if abs(arm - before) < 1e-12 * thickness:
-                if best is None or compression < best[0]:
-                    best = compression, start - arm, float(part)
-                break
-    if best is None:
-        raise ValueError(f"a beam of {span:g} m span and {thickness:g} m thickness buckles under its weight")
-    return best

@@ -67,7 +67,7 @@ def draw(path: Path, thinnest: dict[int, float], standing: Seen, falling: Seen, 
         axes.legend(frameon=False, fontsize=9, loc="lower center")
         axes.axis("off")
     axes = lower.subplots()
-    number = np.r_[4:31, 32:61:4]
+    number = np.arange(4, 51)
     axes.axhline(masonry.MILANKOVITCH_RATIO, color=HINGE, lw=1.2)
     axes.text(
         60, masonry.MILANKOVITCH_RATIO + 2e-4, "Milankovitch (1907)", color=HINGE, fontsize=9, ha="right", va="bottom"

@@ -11,7 +11,7 @@ from arch import arch, fall, rest, seen, thinnest
 from compare_masonry_arch import draw, from_crown, hinges, report
 
 NUMBERS = (6, 9, 12, 16, 25, 40)
-VOUSSOIRS, STANDING, FALLING, SECONDS = 24, 0.12, 0.10, 1.3  # of the two arches that are drawn
+VOUSSOIRS, STANDING, FALLING, SECONDS = 24, 0.12, 0.1, 1.3  # of the two arches that are drawn
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
@@ -24,7 +24,7 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     text = report(limits, from_crown(hinges(falling), VOUSSOIRS))
     Path(out).mkdir(parents=True, exist_ok=True)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
-    titles = (f"$t/R$ = {STANDING:g} stands", f"$t/R$ = {FALLING:g}, {SECONDS:g} s after its centring is struck")
+    titles = (f"$t/R$ = {STANDING:.2f} stands", f"$t/R$ = {FALLING:.2f}, {SECONDS:g} s after its centring is struck")
     draw(Path(out) / "masonry_arch.png", limits, standing, falling, titles)
     if not quiet:
         print(text)

@@ -20,12 +20,21 @@ What this does and does not say
     for the tops; weights and forces of the table go with 5 m."""
 
 
-def report(limit: float, table: tuple[np.ndarray, np.ndarray, np.ndarray], friction: float, modes: list[str]) -> str:
-    """``table`` = (R, S, P) of the blocks just above the limit, ``modes`` of what they do at ``friction``."""
+def report(
+    limit: float,
+    table: tuple[np.ndarray, np.ndarray, np.ndarray],
+    friction: float,
+    modes: list[str],
+    safety: tuple[float, float],
+) -> str:
+    """``table`` = (R, S, P) of the blocks just above the limit, ``modes`` of what they do at ``friction``; ``safety``: tan φ of a
+    slope that stands, and its factor of safety."""
     normal, shear, push = table
     rows = [
         f"least friction that holds the slope: tan φ = {limit:.4f}",
         f"published {published.LIMIT_FRICTION}; limit equilibrium, repeated here: {published.limit_friction():.4f}",
+        f"factor of safety at tan φ = {safety[0]:g} by strength reduction: {safety[1]:.3f} "
+        + f"(over the published limit: {safety[0] / published.LIMIT_FRICTION:.3f})",
         "",
         "block   height      R published        S published        P published    at tan φ = " + f"{friction:g}",
         "            m      kN        kN       kN        kN       kN        kN",

@@ -8,9 +8,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 from compare_toppling_slope import draw, report
-from toppling import at_rest, forces, last, limit_friction, modes, run, slope
+from toppling import at_rest, factor_of_safety, forces, last, limit_friction, modes, run, slope
 
 FRICTION, SECONDS = 0.65, 3.0  # of the slope that comes down
+SAFE = 0.95  # tan φ of a slope whose factor of safety is asked for
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
@@ -23,7 +24,7 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     early = last(run(falling, rest, 0.5)).state
     fallen = last(run(falling, early, SECONDS)).state
     done = modes(falling, rest, early)
-    text = report(limit, table, FRICTION, done)
+    text = report(limit, table, FRICTION, done, (SAFE, factor_of_safety(SAFE)))
     Path(out).mkdir(parents=True, exist_ok=True)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
     outlines = [

@@ -58,6 +58,12 @@ def limit_friction(rest: State, low: float = 0.75, high: float = 0.83) -> float:
     return high
 
 
+def factor_of_safety(friction: float) -> float:
+    """By strength reduction from ``friction`` = tan φ."""
+    system = slope(friction)
+    return dda.factor_of_safety(system.blocks, system.materials, system.joints, WEIGHT).factor
+
+
 def forces(result: dda.StepResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(R, S, P), each (16,) kN of blocks 1 … 16: base normal and shear (up the dip), and the push of the block above."""
     rows = result.contacts[result.contacts["state"] != OPEN]

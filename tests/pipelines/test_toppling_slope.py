@@ -22,9 +22,9 @@ def seen(tmp_path_factory):
     out, seen = tmp_path_factory.mktemp("toppling"), {}
     written = study.report
 
-    def keep(limit, table, friction, modes):
-        seen.update(limit=limit, table=table, modes=modes)
-        return written(limit, table, friction, modes)
+    def keep(limit, table, friction, modes, safety):
+        seen.update(limit=limit, table=table, modes=modes, safety=safety)
+        return written(limit, table, friction, modes, safety)
 
     study.report = keep
     try:
@@ -37,6 +37,12 @@ def seen(tmp_path_factory):
 def test_limit_friction_is_the_published_one(seen):
     # Elastic columns, E = 100 GPa, take 0.0011 more than rigid ones; bisection to 2e-4, and what creeps past 2.5 s.
     assert seen["limit"] == pytest.approx(published.LIMIT_FRICTION, abs=2.5e-3)
+
+
+def test_factor_of_safety_is_what_the_limit_says(seen):
+    # Coulomb friction leaves the forces open: weakened step by step, the slope goes some thousandths earlier.
+    friction, factor = seen["safety"]
+    assert factor == pytest.approx(friction / published.LIMIT_FRICTION, rel=8e-3)
 
 
 def test_forces_at_the_limit_are_the_published_ones(seen):

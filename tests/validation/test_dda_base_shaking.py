@@ -62,7 +62,7 @@ def sliding_case(name: str) -> tuple[float, float, np.ndarray, np.ndarray]:
         "sine on the level",
         pytest.param("sine on an incline", marks=pytest.mark.slow),
         pytest.param("El Centro on the level", marks=pytest.mark.slow),
-        "El Centro on an incline",
+        pytest.param("El Centro on an incline", marks=pytest.mark.slow),
     ],
 )
 def test_block_slides_on_a_shaken_base_as_newmark_says(case):
@@ -133,17 +133,17 @@ def test_free_rocking_falls_in_a_quarter_period():
 
 
 def test_rocking_loses_at_impacts_what_housner_says():
-    """θ(t) through three impacts: each keeps 1 − 1.5 sin²α of the angular velocity; nothing is tuned."""
+    """θ(t) through two impacts: each keeps 1 − 1.5 sin²α of the angular velocity; nothing is tuned."""
     alpha, radius = np.radians(15), 1.0
     tilt = 0.5 * alpha
-    times = np.linspace(0, 2.0, 2001)
+    times = np.linspace(0, 1.5, 1501)
     expected = exact.rocking(times, 0 * times, alpha, radius, start=tilt)
     errors = []
-    for dt in (4e-3, 1e-3):
+    for dt in (8e-3, 2e-3):
         system = rocking_block(alpha, radius, tilt)
-        rows = rocked(system, State.at_rest(system.blocks), WEIGHT, 2.0, dt, tilt)
+        rows = rocked(system, State.at_rest(system.blocks), WEIGHT, 1.5, dt, tilt)
         errors.append(np.abs(rows[:, 1] - np.interp(rows[:, 0], times, expected)).max() / tilt)
-    print("rocking through three impacts, error of θ/θ₀ at dt = 4, 1 ms:", " ".join(f"{e:.3f}" for e in errors))
+    print("rocking through two impacts, error of θ/θ₀ at dt = 8, 2 ms:", " ".join(f"{e:.3f}" for e in errors))
     # A landing takes a step, and its contact gives: first order in dt, and what the elastic block keeps of the shock.
     assert errors[1] < 0.06
     assert errors[1] < 0.5 * errors[0]

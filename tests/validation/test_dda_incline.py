@@ -64,15 +64,15 @@ def test_sliding_is_right_at_any_step_and_any_penalty():
     # remains is the elastic shear let go (W/E over the path): no part of it may come from dt or from the penalty.
     rows = []
     acceleration = block_motion.incline_acceleration(SLOPE, np.radians(15))
-    for penalty in (1e10, 1e11, 4e11, 1e13):
+    for penalty in (1e10, 4e11, 1e13):
         state = settled(block_on_slope(35, normal_penalty=penalty, shear_penalty=penalty))
         system = block_on_slope(15, normal_penalty=penalty, shear_penalty=penalty)
         row = []
-        for dt in (2e-2, 5e-3, 1e-3):
+        for dt in (2e-2, 2e-3):
             end = march(system, state, WEIGHT, 0.5, dt)
             row.append((travel(system, end) - travel(system, state)) / (0.5 * acceleration * 0.25) - 1)
         rows.append(row)
-        print(f"penalty {penalty:8.0e} Pa, error at dt = 20, 5, 1 ms: " + " ".join(f"{e:9.2e}" for e in row))
+        print(f"penalty {penalty:8.0e} Pa, error at dt = 20, 2 ms: " + " ".join(f"{e:9.2e}" for e in row))
     errors = np.array(rows)
     assert np.abs(errors).max() < 1e-7
     assert np.ptp(errors) < 1e-8
