@@ -1,4 +1,4 @@
-"""Which vertices may touch which edges: broad phase by sorted boxes, narrow phase by the entrance-edge rule.
+"""Which vertices may touch which edges of two blocks that are near each other: the entrance-edge rule.
 
 A vertex meets the interior of an edge when its corner points away from the edge. Where two corners meet, the lines
 through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
+from .near_pairs import boxes
 
 # Corners and edges that interpenetrate by less than this angle (sine, about 3°) still count as touching face to face.
 _ANGLE = 0.05
@@ -81,20 +83,19 @@ def _join_partners(table, row, other):
             return
 
 
-def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, window, old_keys) -> np.ndarray:
-    """(n_contacts, 4): vertex, edge, and up to two partner rows (−1: none), for all pairs nearer than ``window`` (m).
+def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, pairs, window, old_keys) -> np.ndarray:
+    """(n_contacts, 4): vertex, edge, and up to two partner rows (−1: none), for all of the ``pairs`` (k, 2) of blocks, the
+    lower number first, that are nearer than ``window`` (m), pair by pair.
 
     ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
     representations of a corner on a corner is kept, so that contacts do not change names on round-off.
     """
-    first = vertex_start[:-1]
-    box = np.hstack([np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)])
-    order = np.argsort(box[:, 0], kind="stable")
+    box = boxes(vertices, vertex_start[:-1])
     room = 32 + 8 * len(box)
     while True:
         table = np.empty((room, 4), np.int64)
-        count = _sweep(
-            table, box, order, vertices, next_vertex, previous_vertex, vertex_start, fixed, float(window), old_keys
+        count = _look_at(
+            table, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, float(window), old_keys
         )
         if count >= 0:
             return table[:count]
@@ -102,12 +103,11 @@ def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, fixed, w
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_start, fixed, window, old_keys):
-    """Fill ``table`` with the contacts and return their number, or −1 when it has no room for them.
+def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, window, old_keys):
+    """Fill ``table`` with the contacts of ``pairs`` and return their number, or −1 when it has no room for them.
 
-    ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y; ``order`` sorts them by least x.
+    ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y.
     """
-    n_blocks = vertex_start.shape[0] - 1
     n_vertices = vertices.shape[0]
     convex = np.empty(n_vertices, np.bool_)
     for i in range(n_vertices):
@@ -124,112 +124,109 @@ def _sweep(table, box, order, vertices, next_vertex, previous_vertex, vertex_sta
         (4, 6)
     )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside
     twin = np.empty(4, np.int64)  # the other end of the same face
-    for p in range(n_blocks):
-        for q in range(p + 1, n_blocks):
-            a, b = min(order[p], order[q]), max(order[p], order[q])
-            if box[order[q], 0] > box[order[p], 2] + window:
-                break
-            if fixed[a] and fixed[b]:
+    for pair in range(pairs.shape[0]):
+        a, b = pairs[pair, 0], pairs[pair, 1]
+        if box[a, 0] > box[b, 2] + window or box[b, 0] > box[a, 2] + window:
+            continue
+        if box[a, 1] > box[b, 3] + window or box[b, 1] > box[a, 3] + window:
+            continue
+        first = count
+        # The strip both boxes share, widened: nothing outside it can be in reach.
+        x_lo, x_hi = max(box[a, 0], box[b, 0]) - window, min(box[a, 2], box[b, 2]) + window
+        y_lo, y_hi = max(box[a, 1], box[b, 1]) - window, min(box[a, 3], box[b, 3]) + window
+        # 1. Corner to corner.
+        for v in range(vertex_start[a], vertex_start[a + 1]):
+            if not convex[v] or not (x_lo <= vertices[v, 0] <= x_hi and y_lo <= vertices[v, 1] <= y_hi):
                 continue
-            if box[a, 1] > box[b, 3] + window or box[b, 1] > box[a, 3] + window:
-                continue
-            first = count
-            # The strip both boxes share, widened: nothing outside it can be in reach.
-            x_lo, x_hi = max(box[a, 0], box[b, 0]) - window, min(box[a, 2], box[b, 2]) + window
-            y_lo, y_hi = max(box[a, 1], box[b, 1]) - window, min(box[a, 3], box[b, 3]) + window
-            # 1. Corner to corner.
-            for v in range(vertex_start[a], vertex_start[a + 1]):
-                if not convex[v] or not (x_lo <= vertices[v, 0] <= x_hi and y_lo <= vertices[v, 1] <= y_hi):
+            for w in range(vertex_start[b], vertex_start[b + 1]):
+                dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
+                if dx * dx + dy * dy > 2.25 * window * window or not convex[w]:
                     continue
-                for w in range(vertex_start[b], vertex_start[b + 1]):
-                    dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
-                    if dx * dx + dy * dy > 2.25 * window * window or not convex[w]:
+                n_lines = 0
+                for c in range(4):
+                    # Vertices of the later block stand first: at an exact tie they own the contact.
+                    if c < 2:
+                        vertex, edge, sign = w, (v if c == 0 else previous_vertex[v]), -1.0
+                    else:
+                        vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
+                    feasible, nx, ny, gap, along, length = _against(
+                        vertices, next_vertex, previous_vertex, vertex, edge
+                    )
+                    if not feasible:
                         continue
-                    n_lines = 0
-                    for c in range(4):
-                        # Vertices of the later block stand first: at an exact tie they own the contact.
-                        if c < 2:
-                            vertex, edge, sign = w, (v if c == 0 else previous_vertex[v]), -1.0
-                        else:
-                            vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
-                        feasible, nx, ny, gap, along, length = _against(
-                            vertices, next_vertex, previous_vertex, vertex, edge
-                        )
-                        if not feasible:
-                            continue
-                        nx, ny = sign * nx, sign * ny
-                        outside = max(0.0, -along, along - length)
-                        inside = min(along, length - along)
-                        same = -1
-                        for k in range(n_lines):
-                            if pick[k, 0] * nx + pick[k, 1] * ny > 1.0 - _PARALLEL:
-                                same = k
-                        if same >= 0 and twin[same] >= 0:
-                            continue
-                        if same >= 0 and min(inside, pick[same, 5]) > _ENDS * max(length, pick[same, 4]):
-                            k = n_lines
-                            n_lines += 1
-                            twin[k], twin[same] = same, k
-                        elif same >= 0:
-                            near = 1e-9 * max(length, pick[same, 4])
-                            better = outside < pick[same, 3] - near
-                            if abs(outside - pick[same, 3]) <= near:
-                                better = (
-                                    _place(old_keys, vertex * n_vertices + edge) >= 0
-                                    and _place(old_keys, pick_vertex[same] * n_vertices + pick_edge[same]) < 0
-                                )
-                            if not better:
-                                continue
-                            k = same
-                        else:
-                            k = n_lines
-                            n_lines += 1
-                            twin[k] = -1
-                        pick_vertex[k], pick_edge[k] = vertex, edge
-                        pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
-                        pick[k, 5] = inside
-                    widest = -np.inf
+                    nx, ny = sign * nx, sign * ny
+                    outside = max(0.0, -along, along - length)
+                    inside = min(along, length - along)
+                    same = -1
                     for k in range(n_lines):
-                        widest = max(widest, pick[k, 2])
-                    if widest > window:
+                        if pick[k, 0] * nx + pick[k, 1] * ny > 1.0 - _PARALLEL:
+                            same = k
+                    if same >= 0 and twin[same] >= 0:
                         continue
-                    if count + 4 > table.shape[0]:
+                    if same >= 0 and min(inside, pick[same, 5]) > _ENDS * max(length, pick[same, 4]):
+                        k = n_lines
+                        n_lines += 1
+                        twin[k], twin[same] = same, k
+                    elif same >= 0:
+                        near = 1e-9 * max(length, pick[same, 4])
+                        better = outside < pick[same, 3] - near
+                        if abs(outside - pick[same, 3]) <= near:
+                            better = (
+                                _place(old_keys, vertex * n_vertices + edge) >= 0
+                                and _place(old_keys, pick_vertex[same] * n_vertices + pick_edge[same]) < 0
+                            )
+                        if not better:
+                            continue
+                        k = same
+                    else:
+                        k = n_lines
+                        n_lines += 1
+                        twin[k] = -1
+                    pick_vertex[k], pick_edge[k] = vertex, edge
+                    pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
+                    pick[k, 5] = inside
+                widest = -np.inf
+                for k in range(n_lines):
+                    widest = max(widest, pick[k, 2])
+                if widest > window:
+                    continue
+                if count + 4 > table.shape[0]:
+                    return -1
+                for k in range(n_lines):
+                    rows[k] = -1
+                    if pick[k, 2] < -window:
+                        continue
+                    row = _add(table, count, first, pick_vertex[k], pick_edge[k])
+                    count = max(count, row + 1)
+                    for m in range(k):
+                        if rows[m] >= 0 and twin[k] != m:
+                            _join_partners(table, row, rows[m])
+                            _join_partners(table, rows[m], row)
+                    rows[k] = row
+        # 2. Corner to edge, and corner into a re-entrant corner.
+        for role in range(2):
+            i, j = (a, b) if role == 0 else (b, a)
+            for v in range(vertex_start[i], vertex_start[i + 1]):
+                x, y = vertices[v, 0], vertices[v, 1]
+                if not convex[v] or not (x_lo <= x <= x_hi and y_lo <= y <= y_hi):
+                    continue
+                for edge in range(vertex_start[j], vertex_start[j + 1]):
+                    end = next_vertex[edge]
+                    if (
+                        min(vertices[edge, 0], vertices[end, 0]) > x + window
+                        or max(vertices[edge, 0], vertices[end, 0]) < x - window
+                        or min(vertices[edge, 1], vertices[end, 1]) > y + window
+                        or max(vertices[edge, 1], vertices[end, 1]) < y - window
+                    ):
+                        continue
+                    feasible, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
+                    if not feasible or abs(gap) > window or along < -window or along > length + window:
+                        continue
+                    if (along <= window and convex[edge]) or (along >= length - window and convex[end]):
+                        continue  # corner to corner, done above
+                    if count == table.shape[0]:
                         return -1
-                    for k in range(n_lines):
-                        rows[k] = -1
-                        if pick[k, 2] < -window:
-                            continue
-                        row = _add(table, count, first, pick_vertex[k], pick_edge[k])
-                        count = max(count, row + 1)
-                        for m in range(k):
-                            if rows[m] >= 0 and twin[k] != m:
-                                _join_partners(table, row, rows[m])
-                                _join_partners(table, rows[m], row)
-                        rows[k] = row
-            # 2. Corner to edge, and corner into a re-entrant corner.
-            for role in range(2):
-                i, j = (a, b) if role == 0 else (b, a)
-                for v in range(vertex_start[i], vertex_start[i + 1]):
-                    x, y = vertices[v, 0], vertices[v, 1]
-                    if not convex[v] or not (x_lo <= x <= x_hi and y_lo <= y <= y_hi):
-                        continue
-                    for edge in range(vertex_start[j], vertex_start[j + 1]):
-                        end = next_vertex[edge]
-                        if (
-                            min(vertices[edge, 0], vertices[end, 0]) > x + window
-                            or max(vertices[edge, 0], vertices[end, 0]) < x - window
-                            or min(vertices[edge, 1], vertices[end, 1]) > y + window
-                            or max(vertices[edge, 1], vertices[end, 1]) < y - window
-                        ):
-                            continue
-                        feasible, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
-                        if not feasible or abs(gap) > window or along < -window or along > length + window:
-                            continue
-                        if (along <= window and convex[edge]) or (along >= length - window and convex[end]):
-                            continue  # corner to corner, done above
-                        if count == table.shape[0]:
-                            return -1
-                        count = max(count, _add(table, count, first, v, edge) + 1)
+                    count = max(count, _add(table, count, first, v, edge) + 1)
     return count
 
 

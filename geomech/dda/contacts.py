@@ -13,6 +13,7 @@ from ..model import CONTACT, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import JointTable, Springs, contact_springs, penalties
 from .curved_joints import CurvedJoints
+from .near_pairs import NearPairs
 
 if TYPE_CHECKING:
     from .open_close import Settled
@@ -119,6 +120,7 @@ class ContactFinder:
         """Find no more contacts of the blocks ``removed`` (n_blocks,)."""
         self._removed = removed
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
+        self._near = NearPairs(self._start, self._fixed)
 
     def find(self, state: State, vertices: np.ndarray, window: float) -> ContactSet:
         """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it."""
@@ -128,7 +130,9 @@ class ContactFinder:
             window += max(0.0, float(old["lift"].max()))
         keys = old["vertex"] * len(vertices) + old["edge"]
         rank = np.argsort(keys, kind="stable")
-        table = find_contacts(vertices, self._next, self._previous, self._start, self._fixed, window, keys[rank])
+        table = find_contacts(
+            vertices, self._next, self._previous, self._start, self._near.of(vertices, window), window, keys[rank]
+        )
         geometry, mate, parent = describe_contacts(
             table, vertices, self._next, self._previous, window,
             np.ascontiguousarray(old["vertex"]), np.ascontiguousarray(old["edge"]),

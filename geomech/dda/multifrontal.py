@@ -110,7 +110,23 @@ def _invert(a, swapped):
 
 @_jit
 def _eliminate(
-    fronts, data, pivots, reach, seat, entries, entry, row, column, stack, at, child, sibling, room, factors, units
+    fronts,
+    data,
+    pivots,
+    reach,
+    seat,
+    entries,
+    entry,
+    row,
+    column,
+    stack,
+    kept,
+    at,
+    child,
+    sibling,
+    room,
+    factors,
+    units,
 ):
     """Eliminate ``fronts``, ascending; False if one is singular. ``child`` and ``sibling`` chain the children of a front;
     ``units`` are 1, −1, 0."""
@@ -122,7 +138,11 @@ def _eliminate(
         m = p + b
         upper = factors[at[f] : at[f] + p * m].reshape((p, m))
         lower = factors[at[f] + p * m : at[f + 1]].reshape((b, p))
-        rest = np.zeros((b, b), factors.dtype)
+        if kept:
+            rest = room[stack[f] : stack[f] + b * b].reshape((b, b))
+        else:
+            rest = np.empty((b, b), factors.dtype)
+        rest[:] = 0
         upper[:] = 0
         lower[:] = 0
         for k in range(entries[f], entries[f + 1]):
@@ -140,16 +160,18 @@ def _eliminate(
                 i = seat[first + u]
                 for a in range(6):
                     line = stack[g] + (6 * u + a) * 6 * n
+                    if i < own:
+                        own_row, far_row, skipped = upper[6 * i + a], upper[6 * i + a], 0
+                    else:
+                        own_row, far_row, skipped = lower[6 * (i - own) + a], rest[6 * (i - own) + a], p
                     for v in range(n):
-                        j = seat[first + v]
-                        for c in range(6):
-                            value = room[line + 6 * v + c]
-                            if i < own:
-                                upper[6 * i + a, 6 * j + c] += value
-                            elif j < own:
-                                lower[6 * (i - own) + a, 6 * j + c] += value
-                            else:
-                                rest[6 * (i - own) + a, 6 * (j - own) + c] += value
+                        j = 6 * seat[first + v]
+                        if j < p:
+                            for c in range(6):
+                                own_row[j + c] += room[line + 6 * v + c]
+                        else:
+                            for c in range(6):
+                                far_row[j - skipped + c] += room[line + 6 * v + c]
             g = sibling[g]
         for start in range(0, p, PANEL):
             end = min(start + PANEL, p)
@@ -162,7 +184,8 @@ def _eliminate(
             _add_product(minus, lower[:, start:end], scaled[:, : p - end], one, lower[:, end:])
         if p > 0:
             _add_product(minus, lower, upper[:, p:], one, rest)
-        room[stack[f] : stack[f] + b * b] = rest.ravel()
+        if not kept:
+            room[stack[f] : stack[f] + b * b] = rest.ravel()
     return True
 
 
@@ -302,7 +325,7 @@ class Factors:
         def eliminate(fronts: np.ndarray) -> bool:
             return _eliminate(
                 fronts[touched[fronts]], data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row, t.column, t.stack,
-                t.at, self._child, self._sibling, self._room, self._factors, self._units,
+                t.kept, t.at, self._child, self._sibling, self._room, self._factors, self._units,
             )  # fmt: skip
 
         if not all(self._climb(eliminate, THREADED)):

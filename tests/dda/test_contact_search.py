@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geomech.dda.contact_search import describe_contacts, find_contacts
+from geomech.dda.near_pairs import boxes, near_pairs
 from geomech.model import Blocks
 
 
@@ -20,7 +21,8 @@ def search(polygons, window=0.05, turn=0.0, fixed=None):
     next_, previous = blocks.next_vertex.astype(np.int64), blocks.previous_vertex.astype(np.int64)
     start, fixed = blocks.vertex_start.astype(np.int64), np.asarray(blocks.fixed, bool)
     none = np.empty(0, np.int64)
-    table = find_contacts(v, next_, previous, start, fixed, window, none)
+    near = near_pairs(boxes(v, start[:-1]), fixed, window)
+    table = find_contacts(v, next_, previous, start, near, window, none)
     geometry, mate, _ = describe_contacts(table, v, next_, previous, window, none, none, np.empty((0, 2)), none)
     return table, geometry, mate
 
