@@ -12,6 +12,7 @@ from .basis import displacement_matrix
 from .energy import EnergyBudget, StepEnergy
 from .equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
 from .force_rows import EDGE_FORCE, POINT_FORCE
+from .in_situ import InSituState, NoInSituEquilibrium, in_situ_state
 from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
@@ -29,6 +30,8 @@ __all__ = [
     "EnergyBudget",
     "Equilibrium",
     "FactorOfSafety",
+    "InSituState",
+    "NoInSituEquilibrium",
     "NotConverged",
     "StepEnergy",
     "StepResult",
@@ -38,6 +41,7 @@ __all__ = [
     "displacement_matrix",
     "equilibrium",
     "factor_of_safety",
+    "in_situ_state",
     "mass_matrix",
     "run",
 ]

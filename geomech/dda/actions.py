@@ -48,8 +48,11 @@ class StepActions:
             return load_map.point(block, at, vertices)
 
         self.imposed: ImposedMotion | None = None
-        if loads.base is not None or loads.block_motions or loads.point_motions:
-            self.imposed = ImposedMotion(blocks, fixed, removed, loads, moments, point_at, state.time, end)
+        shaken = loads.base is not None and loads.base.frame == "ground"
+        if shaken or loads.block_motions or loads.point_motions:
+            self.imposed = ImposedMotion(
+                blocks, fixed, removed, loads, moments, point_at, state.imposed, state.time, end
+            )
         self.bolts: BoltSet | None = None
         self.memory = np.empty(0, BOLT)
         if loads.bolts:

@@ -115,7 +115,8 @@ def equilibrium(
             result = static.step(state, loads, dt, crack, time)
         except NotConverged as failure:
             return answer(False, False, str(failure))
-        state = result.state
+        # Pseudo-time is no time: what the loads do at their times waits.
+        state = replace(result.state, time=begin.time)
         statistics = result.statistics
         unbalanced = unbalanced_force(static, result)
         moved = np.hypot(*(result.forces.centroid - _centroids(static, state)).T)

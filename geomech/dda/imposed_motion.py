@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import UNKNOWNS, Blocks, Loads, PointMotion
+from ..model import UNKNOWNS, BaseMotion, BlockMotion, Blocks, Loads, PointMotion
 from .basis import displacement_matrix
 from .force_rows import POINT_FORCE
 
@@ -64,12 +64,13 @@ class Pairs:
 class ImposedMotion:
     """The motion that ``loads`` give from ``start`` to ``end`` (s), on the geometry at the start of the step.
 
-    ``increment`` and ``rate`` (n_blocks, 6): of fixed blocks, zero elsewhere. Raises ValueError naming the block whose given
+    ``totals`` (k,) is what they have imposed at ``end``, ``before`` the same at the start as an earlier step has left it (else
+    taken at ``start``): statics may seek equilibrium at one time in many steps. ``increment`` and ``rate`` (n_blocks, 6): of fixed blocks, zero elsewhere. Raises ValueError naming the block whose given
     motions contradict or repeat one another, a fixed one whose point is moved, and one that is to be strained though fixed.
     """
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, moments: np.ndarray, point_at,
+        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, moments: np.ndarray, point_at, before: np.ndarray,
         start: float, end: float,
     ) -> None:  # fmt: skip
         n = blocks.n_blocks
@@ -81,27 +82,32 @@ class ImposedMotion:
         self._points = loads.point_motions
         self._rows = np.zeros(len(loads.point_motions), POINT_FORCE)
         removed = np.zeros(n, bool) if removed is None else removed
-        self._base(loads, removed, start, end)
-        for motion in loads.block_motions:
+        base = [loads.base] if loads.base is not None and loads.base.frame == "ground" else []
+        given = [*base, *loads.block_motions, *loads.point_motions]
+        totals = [motion.total(end) for motion in given]
+        self.totals = np.concatenate(totals)
+        if len(before) != len(self.totals):
+            before = np.concatenate([motion.total(start) for motion in given])
+        by = np.split(self.totals - before, np.cumsum([len(total) for total in totals])[:-1])
+        for motion, change in zip(base, by):
+            self._base(motion, removed, change, end)
+        for motion, change in zip(loads.block_motions, by[len(base) :]):
             if not removed[motion.block]:
-                self._block(motion, start, end)
-        for k, motion in enumerate(loads.point_motions):
+                self._block(motion, change, start, end)
+        for k, (motion, change) in enumerate(zip(loads.point_motions, by[len(base) + len(loads.block_motions) :])):
             if not removed[motion.block]:
-                self._point(k, motion, point_at(motion.block, motion.at), start, end)
+                self._point(k, motion, change, point_at(motion.block, motion.at), start, end)
         self.moving_base = bool(self.increment.any())
 
-    def _base(self, loads: Loads, removed: np.ndarray, start: float, end: float) -> None:
-        base = loads.base
-        if base is None or base.frame != "ground":
-            return
+    def _base(self, base: BaseMotion, removed: np.ndarray, by: np.ndarray, end: float) -> None:
         shaken = self.blocks.fixed & ~removed
         if base.blocks is not None:
             shaken &= np.isin(np.arange(len(shaken)), base.blocks)
-        self.increment[shaken, :2] = base.acceleration.double_integral(end) - base.acceleration.double_integral(start)
+        self.increment[shaken, :2] = by
         self.rate[shaken, :2] = base.acceleration.integral(end)
 
-    def _block(self, motion, start: float, end: float) -> None:
-        by, rate = motion.during(start, end), motion.rate(start, end)
+    def _block(self, motion: BlockMotion, by: np.ndarray, start: float, end: float) -> None:
+        rate = motion.rate(start, end)
         at = [UNKNOWNS.index(name) for name in motion.unknowns]
         if self.fixed[motion.block]:
             if max(at) > 2:
@@ -114,7 +120,9 @@ class ImposedMotion:
         for k, unknown in enumerate(at):
             self._add(motion.block, np.eye(6)[unknown], by[k], rate[k], -1)
 
-    def _point(self, number: int, motion: PointMotion, now: np.ndarray, start: float, end: float) -> None:
+    def _point(
+        self, number: int, motion: PointMotion, by: np.ndarray, now: np.ndarray, start: float, end: float
+    ) -> None:
         b = motion.block
         self._rows[number]["block"], self._rows[number]["at"], self._rows[number]["point"] = b, motion.at, now
         if self.fixed[b]:
@@ -123,13 +131,10 @@ class ImposedMotion:
         if motion.kind == "displacement":
             # To where the point is to be, so that what the turn of a step leaves out is made up for in the next.
             by = motion.history.at(end) - motion.axes @ (now - np.asarray(motion.at, dtype=float))
-            rate = (motion.history.at(end) - motion.history.at(start)) / (end - start)
-        else:
-            by, rate = motion.history.integral(end) - motion.history.integral(start), motion.history.at(end)
         if motion.stiffness is not None:
             self._springs.append((number, b, rows, by))
             return
-        for row, value, speed in zip(rows, by, rate, strict=True):
+        for row, value, speed in zip(rows, by, motion.rate(start, end), strict=True):
             self._add(b, row, value, speed, number)
 
     def _add(self, block: int, row: np.ndarray, by: float, rate: float, source: int) -> None:

@@ -151,7 +151,8 @@ class BlockSystem:
         removed = self.removed(loads, state.time)
         if removed is not self._removed:
             self._take_out(removed)
-        dt = until_next_event(loads, state.time, dt)
+        if load_time is None:
+            dt = until_next_event(loads, state.time, dt)
         vertices = np.ascontiguousarray(state.vertices)
         carried = self.settings.dynamic_factor * state.velocity
         carried[self._fixed] = 0.0
@@ -390,6 +391,7 @@ class BlockSystem:
             contacts=self._finder.carried(new_vertices, memory),
             acceleration=kept,
             bolts=state.bolts if actions is None else actions.memory,
+            imposed=state.imposed if imposed is None else imposed.totals,
             removed=self._removed,
         )
         closed = settled.state != OPEN

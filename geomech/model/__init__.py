@@ -6,6 +6,7 @@ from .cracks import Cracks
 from .damping import rayleigh_coefficients
 from .history import History, Wave, baseline_corrected, read_record
 from .imposed_motion import UNKNOWNS, BaseMotion, BlockMotion, PointMotion
+from .in_situ import InSituStress
 from .joint import JointLaw, Roughness
 from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
 from .material import Material
@@ -36,6 +37,7 @@ __all__ = [
     "Excavation",
     "GrowthSettings",
     "History",
+    "InSituStress",
     "JointLaw",
     "LinearProfile",
     "Loads",

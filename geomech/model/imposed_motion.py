@@ -45,18 +45,19 @@ class BlockMotion:
                 f"{np.shape(self.history.values)[1]} columns"
             )
 
-    def during(self, start: float, end: float) -> np.ndarray:
-        """(k,) by how much the unknowns change from ``start`` to ``end``."""
-        f = self.history.at if self.kind == "displacement" else self.history.integral
-        return f(end) - f(start)
+    def total(self, time: float) -> np.ndarray:
+        """(k,) what is imposed until ``time``."""
+        return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
 
     def rate(self, start: float, end: float) -> np.ndarray:
         """(k,) their rates at ``end``, where the history is a displacement the mean ones since ``start``."""
-        if self.kind == "velocity":
-            return self.history.at(end)
-        return (
-            (self.history.at(end) - self.history.at(start)) / (end - start) if end > start else 0 * self.history.at(end)
-        )
+        return _rate(self.history, self.kind, start, end)
+
+
+def _rate(history: History, kind: str, start: float, end: float) -> np.ndarray:
+    if kind == "velocity":
+        return history.at(end)
+    return (history.at(end) - history.at(start)) / (end - start) if end > start else np.zeros_like(history.values[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,14 @@ class PointMotion:
             raise ValueError(f"the motion of a point of block {self.block} has no direction: {self.direction}")
         if self.stiffness is not None and not (math.isfinite(self.stiffness) and self.stiffness > 0):
             raise ValueError(f"the stiffness that moves a point must be positive, got {self.stiffness!r} N/m")
+
+    def total(self, time: float) -> np.ndarray:
+        """(k,) m, what is imposed until ``time``."""
+        return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
+
+    def rate(self, start: float, end: float) -> np.ndarray:
+        """(k,) m/s at ``end``, where the history is a displacement the mean since ``start``."""
+        return _rate(self.history, self.kind, start, end)
 
     @property
     def axes(self) -> np.ndarray:
@@ -114,3 +123,7 @@ class BaseMotion:
             raise ValueError("the acceleration of the base needs two columns, x and y")
         if self.frame == "base" and self.blocks is not None:
             raise ValueError('seen from the "base" all fixed blocks move together: name no blocks')
+
+    def total(self, time: float) -> np.ndarray:
+        """(2,) m, how far the base has gone until ``time``."""
+        return self.acceleration.double_integral(time)
