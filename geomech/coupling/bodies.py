@@ -113,13 +113,12 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
     """TIP rows of all solved bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
     if not solutions:
         return np.empty(0, TIP)
-    from ..ddm.criteria import CRITERIA
+    from ..ddm.trial_kinks import judged
 
-    criterion = CRITERIA[problem.growth.criterion]
     rows = []
     for b, solution in solutions.items():
         tips = solution.tips.copy()
         tips["node"] = nodes_of[b][tips["node"]]
-        tips["angle"], tips["k_eq"] = criterion(tips["k_i"], tips["k_ii"], problem.materials[blocks.material[b]])
+        tips["angle"], tips["k_eq"] = judged(solution, problem.growth, problem.materials[blocks.material[b]])
         rows.append(tips)
     return rows[0] if len(rows) == 1 else np.concatenate(rows)

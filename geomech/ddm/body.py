@@ -111,6 +111,8 @@ class Body:
         self._factored_after_all = previous is not None and previous._factored_after_all
         self.compressed = is_compressed(settings.solver, self.faces.n_unknowns) and not self._factored_after_all
         self._functionals: tuple[tuple, TipFunctionals] | None = None
+        #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
+        self.trials: dict[float, dict[int, Body]] = {}
         self._assemble(previous)
 
     @property

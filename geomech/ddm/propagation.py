@@ -18,12 +18,12 @@ import numpy as np
 
 from ..model import TIP, Cracks, DdmSettings, Event, GrowthSettings, Material
 from .body import Body
-from .criteria import CRITERIA
 from .growth import Growth, advance
 from .initiation import Birth, bear, births
 from .loads import BodyLoad
 from .path import corrected
 from .solution import Solution
+from .trial_kinks import check_criterion, judged
 
 #: Under a controlled load, tips driven within this part of the most driven one grow with it: K at a graded kink is
 #: right to some 1e-3, and of two tips that are images of one another both should go.
@@ -87,8 +87,7 @@ def propagate(
     if control not in ("load", "toughness"):
         raise ValueError(f'control must be "load" or "toughness", got {control!r}')
     growth = GrowthSettings() if growth is None else growth
-    if growth.criterion not in CRITERIA:
-        raise ValueError(f"no growth criterion {growth.criterion!r}; there are {', '.join(CRITERIA)}")
+    check_criterion(growth)
     run = _Run(list(loops), material, load, growth, settings, body, control == "toughness", max_factor)
     return run.steps(cracks, max_steps)
 
@@ -148,7 +147,7 @@ class _Run:
         history = self.solution if body.rough else None
         solution = body.solve(self._load_at(factor, body.cracks), warm=self.solution, history=history)
         tips = solution.tips.copy()
-        tips["angle"], tips["k_eq"] = CRITERIA[self.growth.criterion](tips["k_i"], tips["k_ii"], self.material)
+        tips["angle"], tips["k_eq"] = judged(solution, self.growth, self.material)
         return solution, tips
 
     def _drives(self, factor: float) -> tuple[Solution, np.ndarray]:

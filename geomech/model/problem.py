@@ -77,6 +77,8 @@ class GrowthSettings:
     ``initiation`` says where cracks may be born besides: "" nowhere, "surface" on outlines, holes and crack faces,
     "everywhere" inside the rock too. ``initiation_distance`` m averages the stress there over a distance into the rock (0:
     the stress at the point), ``initiation_spacing`` m is the least distance between births (0: five increments).
+    ``trial_kink`` m: the criterion "f" tries kinks of this length in all directions, faces in contact (0: kinks of no
+    length, on which nothing presses).
     """
 
     criterion: str = "mts"
@@ -88,6 +90,7 @@ class GrowthSettings:
     initiation: str = ""
     initiation_distance: float = 0.0
     initiation_spacing: float = 0.0
+    trial_kink: float = 0.0
 
 
 @dataclass(frozen=True)

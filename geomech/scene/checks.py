@@ -68,6 +68,12 @@ def _statics(c: Check) -> None:
 
 def _growth_lengths(c: Check) -> None:
     growth = c.tables.growth
+    if growth is not None and growth.trial_kink_m and growth.criterion != "f":
+        c.refuse(
+            ("growth", "trial_kink_m"),
+            f'trial kinks are judged by the criterion "f", not by "{growth.criterion}"',
+            'leave it out, or set growth.criterion = "f"',
+        )
     if growth is None or growth.increment_m is None or growth.min_increment_m is None:
         return
     if growth.min_increment_m > growth.increment_m:

@@ -398,6 +398,11 @@ class GrowthTable(Table):
     initiation_spacing_m: NotNegative = Field(
         0.0, description="least distance between cracks at birth, m (0: five increments)"
     )
+    trial_kink_m: NotNegative = Field(
+        0.0,
+        description='length of the kinks that criterion "f" tries in all directions, faces in contact and with friction, m '
+        "(0: kinks of no length, on which nothing presses; an increment or less sees shear cracks under compression)",
+    )
 
 
 class RunTable(Table):

@@ -213,6 +213,7 @@ ADDED = [
     ("[gauge]\nfrom = [0.5, 1.0]\nto = [0.5, 1.0]\n", "gauge.to", "same point", "different"),
     ('[gauge]\nfrom = [0.5, 0.0]\nto = [0.5, 1.0]\nzone = "rok"\n', "gauge.zone", "no zone 'rok'", "rock"),
     ("[growth]\nincrement_m = 1e-3\nmin_increment_m = 1e-2\n", "growth.min_increment_m", "longer than the", "at most"),
+    ("[growth]\ntrial_kink_m = 1e-3\n", "growth.trial_kink_m", "judged by the criterion", "leave it out"),
     ('[growth]\ncriterion = "sif"\n', "growth.criterion", '"sif" is not one of', '"mts"'),
     ("[dda]\ntime_step_s = 1000.0\n", "dda.time_step_s", "longer than the whole run", "shorten"),
     ('[dda]\ncontact = "lagrange"\n', "dda.contact", "is not one of", "augmented"),
