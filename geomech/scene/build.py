@@ -23,6 +23,7 @@ from ..model import (
     ViscousBoundary,
     rayleigh_coefficients,
 )
+from ..shapes.parts import JOINT
 from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
 from .edges import contact_names, joint_names
@@ -41,7 +42,8 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         held=_held(tables, drawing),
     )
     joints, joint_of = _joints(tables, drawing)
-    face_laws, law = _face_laws(tables, drawing.cracks, joints)
+    edge_laws = {name: joints[law] for (other, name), law in joint_of.items() if other == ""}
+    face_laws, law = _face_laws(tables, drawing.cracks, joints, edge_laws)
     cracks = replace(drawing.cracks, aperture=_apertures(tables, drawing.cracks), law=law)
     carriers = gauge_carriers(check)
     return Problem(
@@ -93,9 +95,22 @@ def _held(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
     return held if held.any() else None
 
 
+def _set_of(crack: str) -> str:
+    """The joints that ``crack`` is a dead end of: "bedding" of "bedding 12"."""
+    return crack.rpartition(" ")[0]
+
+
+def _crack_entry(tables: SceneTables, crack: str):
+    """What [cracks] says of a crack: by its name, as a dead end by that of its joints, or for all."""
+    for name in (crack, _set_of(crack), "default"):
+        if name in tables.cracks:
+            return tables.cracks[name]
+    return None
+
+
 def _apertures(tables: SceneTables, cracks: Cracks) -> np.ndarray:
     def metres(name: str) -> float:
-        entry = tables.cracks.get(name, tables.cracks.get("default"))
+        entry = _crack_entry(tables, name)
         aperture = "closed" if entry is None else entry.aperture
         return {"closed": 0.0, "slot": math.inf}[aperture] if isinstance(aperture, str) else float(aperture)
 
@@ -103,19 +118,23 @@ def _apertures(tables: SceneTables, cracks: Cracks) -> np.ndarray:
 
 
 def _face_laws(
-    tables: SceneTables, cracks: Cracks, joints: tuple[JointLaw, ...]
+    tables: SceneTables, cracks: Cracks, joints: tuple[JointLaw, ...], joint_law_of: dict[str, JointLaw]
 ) -> tuple[tuple[JointLaw, ...], np.ndarray]:
-    """The laws of crack faces, smooth ones first, and the law of every segment."""
+    """The laws of crack faces, smooth ones first, and the law of every segment; ``joint_law_of`` edge names."""
     known = {joint.name: joint for joint in joints}
     laws = [Problem.face_laws[0]]
 
     def number(crack: str) -> int:
-        entry = tables.cracks.get(crack, tables.cracks.get("default"))
-        if entry is None or entry.joint is None:
+        entry = _crack_entry(tables, crack)
+        law = None if entry is None or entry.joint is None else known[entry.joint]
+        if law is None and entry is None:
+            # The dead end of a joint is rough as the joint is.
+            law = joint_law_of.get(JOINT + _set_of(crack))
+        if law is None:
             return 0
-        if known[entry.joint] not in laws:
-            laws.append(known[entry.joint])
-        return laws.index(known[entry.joint])
+        if law not in laws:
+            laws.append(law)
+        return laws.index(law)
 
     of_crack = np.array([number(name) for name in cracks.names], dtype=int)
     return tuple(laws), of_crack[cracks.crack] if cracks.n_segments else np.empty(0, int)

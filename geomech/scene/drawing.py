@@ -11,6 +11,7 @@ import numpy as np
 
 from ..model import Blocks, Cracks
 from ..shapes import EdgeLine, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
+from ..shapes.parts import JOINT
 from .errors import Fault
 from .locator import Path
 from .tables import CrackShape, Geometry
@@ -20,7 +21,8 @@ from .tables import CrackShape, Geometry
 class Drawing:
     """Blocks and cracks before materials and apertures are given. ``zones`` (n_blocks,) is the
     name of the zone each block belongs to, ``cracks_drawn`` the names of the cracks, ``parameters`` those of a Gmsh
-    model, as used, ``choices`` the names of their values where they have such, ``model`` its file. ``blocks`` is None
+    model, as used, ``choices`` the names of their values where they have such, ``model`` its file, ``joints`` what edges along
+    joints are called, whether or not a block has such an edge. ``blocks`` is None
     where the drawing cannot be assembled."""
 
     zones: tuple[str, ...]
@@ -30,6 +32,7 @@ class Drawing:
     parameters: dict[str, float | str] = field(default_factory=dict)
     choices: dict[str, Mapping[str, float]] = field(default_factory=dict)
     model: FilePath | None = None
+    joints: tuple[str, ...] = ()
 
     def choices_with_edge(self, name: str) -> str:
         """The choices of one parameter with which the model has edges called ``name``, as a scene says them; empty
@@ -104,15 +107,27 @@ def draw(
                 )
     names = tuple(zone.name for zone in zones)
     drawn = tuple(trace.name for trace in traces)
+    joints: tuple[str, ...] = ()
     try:
-        blocks, cracks = assemble(zones, traces, edges, geometry.tolerance_m)
+        if geometry.joints or geometry.joint_sets:
+            from .jointing import jointed
+
+            blocks, _ = assemble(zones, (), edges, geometry.tolerance_m)
+            cut = jointed(geometry, list(zones), blocks, list(traces))
+            warnings += [Fault(place(("geometry",)), f"mended while cutting: {text}", "") for text in cut.told()]
+            names = tuple(names[zone] for zone in cut.cutting.zone)
+            joints = tuple(joint.name for joint in cut.joints)
+            own = [name.removeprefix(JOINT) for name in joints]
+            blocks, cracks, drawn = cut.cutting.blocks, cut.cracks, (*drawn, *own)
+        else:
+            blocks, cracks = assemble(zones, traces, edges, geometry.tolerance_m)
     except ShapeError as error:
         for flaw in error.flaws:
             at = ("geometry", "model") if geometry.model is not None else ("geometry", flaw.part, flaw.index)
             message = flaw.message if geometry.model is None else f"{FilePath(geometry.model).name}: {flaw.message}"
             faults.append(Fault(place(at), message, flaw.way_out))
         return Drawing(names, drawn, None, None, parameters, choices, model)
-    return Drawing(names, drawn, blocks, cracks, parameters, choices, model)
+    return Drawing(names, drawn, blocks, cracks, parameters, choices, model, joints)
 
 
 def _loops(zone) -> tuple[np.ndarray, ...]:

@@ -96,8 +96,9 @@ def joint_names(patterns: tuple[str, ...], known: list[str]) -> list[str]:
 
 def contact_names(drawing: Drawing) -> list[str]:
     """Names that faces in contact may have: edges as drawn, and the faces that a crack leaves when it cuts through."""
-    names = [name for name in drawing.blocks.edge_names if name]
-    return names + [f"crack:{name}" for name in drawing.cracks_drawn]
+    names = [name for name in drawing.blocks.edge_names if name] + list(drawing.joints)
+    faces = [f"crack:{name}" for name in (*drawing.cracks_drawn, *drawing.cracks.names)]
+    return list(dict.fromkeys(names + faces))
 
 
 def _joints(c: Check) -> None:

@@ -18,7 +18,7 @@ from ..model import Blocks, Cracks
 from .arrangement import Arrangement, arrange, polygons
 from .assembly import block_names
 from .noding import FREE, Drawn, Graph, Mend, noded
-from .parts import Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
+from .parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
 
 #: Near things meet within this part of the drawing's largest side, unless said otherwise.
 TOLERANCE = 1e-6
@@ -228,8 +228,9 @@ def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.nda
     count: Counter[str] = Counter()
     names = []
     for source, _, _ in chains:
-        count[drawn.names[source]] += 1
-        names.append(f"{drawn.names[source]} {count[drawn.names[source]]}")
+        name = drawn.names[source].removeprefix(JOINT)
+        count[name] += 1
+        names.append(f"{name} {count[name]}")
     segments = np.array([pair for _, chain, _ in chains for pair in pairwise(chain)])
     used, flat = np.unique(segments.ravel(), return_inverse=True)
     lengths = [len(chain) - 1 for _, chain, _ in chains]

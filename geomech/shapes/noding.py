@@ -12,6 +12,8 @@ from .parts import Flaw, Joint, ShapeError, Zone
 
 #: Moving one near-miss may make another; more rounds than this mean that the tolerance is as large as the blocks.
 _ROUNDS = 20
+#: What moves by less than this part of the tolerance moves by round-off, which is nobody's mistake.
+_TOLD = 1e-4
 FREE, CORNER = -1, -2
 
 
@@ -227,7 +229,8 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, mends: list[Mend]):
         follows = (home == FREE) | ((home >= 0) & ((home[chief] == home) | (home[chief] == CORNER)))
         for k in np.flatnonzero((chief != np.arange(n)) & follows):
             away = float(np.hypot(*(nodes[k] - graph.nodes[chief[k]])))
-            mends.append(Mend("near corners", *graph.nodes[chief[k]].tolist(), away))
+            if away > _TOLD * tolerance:
+                mends.append(Mend("near corners", *graph.nodes[chief[k]].tolist(), away))
             nodes[k] = graph.nodes[chief[k]]
             settled[k] = settled[chief[k]] = True
         alive = (nodes[edges[:, 0]] != nodes[edges[:, 1]]).any(axis=1)
@@ -256,7 +259,7 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, mends: list[Mend]):
             settled[k] = True
         # The edge is led through the node; one that has been moved onto it lies on it but for round-off.
         through.setdefault(e, []).append(k)
-        if away > 1e-9 * tolerance:
+        if away > _TOLD * tolerance:
             mends.append(Mend("near miss", *nodes[k].tolist(), away))
     if not merged and not through:
         return False, None, None, None

@@ -27,6 +27,10 @@ class Trace:
     lines: tuple[np.ndarray, ...]
 
 
+#: What the names of block edges along joints begin with.
+JOINT = "joint:"
+
+
 @dataclass(frozen=True, eq=False)
 class Joint:
     """Joints of one kind as drawn: ``lines`` are polylines (n, 2) along which rock parts; ``name`` is what the block edges on

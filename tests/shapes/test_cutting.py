@@ -69,7 +69,7 @@ def test_dead_ends_become_cracks_or_go():
     cutting = cut([rock()], joints)
     assert cutting.blocks.n_blocks == 1 and cutting.blocks.n_vertices == 4
     cracks = cutting.cracks
-    assert set(cracks.names) == {"joint:a 1", "joint:a 2", "joint:b 1", "joint:b 2"}
+    assert set(cracks.names) == {"a 1", "a 2", "b 1", "b 2"}
     assert cracks.n_segments == 5  # the long one is divided where the other leaves it
     assert cracks.nodes[cracks.surface].tolist() == [[0.0, 5.0], [8.0, 0.0]]
     assert cutting.nodes == {"I": 5, "Y": 1, "X": 0}

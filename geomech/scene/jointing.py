@@ -1,0 +1,160 @@
+"""The joints of a scene: drawn ones and sets by statistics, and the rock cut along them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Blocks, Cracks
+from ..shapes import Cutting, Joint, Trace, Zone, cut
+from ..shapes.joint_sets import (
+    Law,
+    apparent_dip,
+    discs,
+    parallel_set,
+    poisson_lines,
+    poisson_traces,
+    terminated,
+    voronoi,
+)
+from ..shapes.network import crack_network
+from ..shapes.parts import JOINT, Flaw, ShapeError, extent_of, grid_decimals
+from .tables import Geometry, JointSetShape
+
+
+@dataclass(frozen=True, eq=False)
+class Jointed:
+    """Zones cut along ``joints``. ``cutting`` has the blocks; ``cracks`` are its dead ends and the drawn cracks, noded
+    together."""
+
+    joints: tuple[Joint, ...]
+    cutting: Cutting
+    cracks: Cracks
+
+    def told(self) -> list[str]:
+        """What was mended, a line a kind, with the first place."""
+        lines = []
+        for kind, number in Counter(mend.kind for mend in self.cutting.mends).items():
+            first = next(mend for mend in self.cutting.mends if mend.kind == kind)
+            size = max(mend.size for mend in self.cutting.mends if mend.kind == kind)
+            unit = "m²" if kind == "sliver" else "m"
+            lines.append(f"{number} × {kind}, up to {size:.3g} {unit}, first at ({first.x:.6g}, {first.y:.6g})")
+        return lines
+
+
+def jointed(geometry: Geometry, zones: list[Zone], blocks: Blocks, traces: list[Trace]) -> Jointed:
+    """The rock of ``zones``, drawn soundly as ``blocks``, cut along the scene's joints.
+
+    Raises ShapeError where joints or cracks are wrong.
+    """
+    named = [Zone(zone.name, tuple(blocks.loops(k)), _names(blocks, k)) for k, zone in enumerate(zones)]
+    joints = make_joints(geometry, [zone.loops[0] for zone in named])
+    cutting = cut(
+        named,
+        joints,
+        tolerance=geometry.tolerance_m,
+        dead_ends=geometry.dead_ends,
+        shortest_crack=geometry.shortest_crack_m,
+        smallest_area=geometry.smallest_block_m2,
+    )
+    return Jointed(tuple(joints), cutting, _cracks(geometry, named, cutting, traces))
+
+
+def make_joints(geometry: Geometry, outlines: list[np.ndarray]) -> list[Joint]:
+    """Drawn joints, one a name, and the scene's sets over the rock within ``outlines``."""
+    drawn: dict[str, list[np.ndarray]] = {}
+    for joint in geometry.joints:
+        drawn.setdefault(joint.name, []).append(np.array(joint.points, dtype=float).reshape(-1, 2))
+    joints = [Joint(JOINT + name, tuple(lines)) for name, lines in drawn.items()]
+    low, high = np.min([o.min(axis=0) for o in outlines], axis=0), np.max([o.max(axis=0) for o in outlines], axis=0)
+    box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+    flaws = []
+    for k, shape in enumerate(geometry.joint_sets):
+        # A set of its own stream: adding one does not change the others.
+        rng = np.random.default_rng([geometry.seed, k])
+        unknown = [name for name in shape.ends_on if JOINT + name not in {joint.name for joint in joints}]
+        if unknown:
+            known = ", ".join(repr(joint.name.removeprefix(JOINT)) for joint in joints) or "none"
+            flaws.append(
+                Flaw("joint_sets", k, f"there are no joints {unknown[0]!r} before this set", f"there are {known}")
+            )
+            continue
+        try:
+            joint = _set(shape, geometry, box, rng)
+        except ValueError as error:
+            flaws.append(Flaw("joint_sets", k, str(error), "check its means and deviations"))
+            continue
+        walls = [other for other in joints if other.name.removeprefix(JOINT) in shape.ends_on]
+        joints.append(terminated(joint, walls, shape.ends_share, rng) if walls else joint)
+    if flaws:
+        raise ShapeError(flaws)
+    return joints
+
+
+def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.random.Generator) -> Joint:
+    name = JOINT + shape.name
+    region = box if shape.region is None else np.array(shape.region, dtype=float).reshape(-1, 2)
+    section = math.radians(geometry.section_azimuth_deg)
+    angle = shape.angle_deg
+    if shape.dip_deg is not None:
+        angle = math.degrees(apparent_dip(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section))
+    turn = None if angle is None else Law(math.radians(angle), math.radians(shape.angle_deviation_deg), shape.angle_law)
+    length = None if shape.length_m is None else Law(shape.length_m, shape.length_deviation_m, shape.length_law)
+    if shape.kind == "parallel":
+        spacing = Law(shape.spacing_m, shape.spacing_deviation_m, shape.spacing_law)
+        gap = None if shape.gap_m == 0 else Law(shape.gap_m, shape.gap_deviation_m, shape.gap_law)
+        return parallel_set(name, region, turn, spacing, length, gap, rng)
+    if shape.kind == "poisson":
+        return poisson_traces(name, region, turn, length, shape.p20_per_m2, rng)
+    if shape.kind == "lines":
+        return poisson_lines(name, region, turn, shape.p21_per_m, rng)
+    if shape.kind == "voronoi":
+        return voronoi(name, region, shape.cell_area_m2, rng)
+    return discs(
+        name,
+        region,
+        dip=math.radians(shape.dip_deg),
+        dip_direction=math.radians(shape.dip_direction_deg),
+        fisher=shape.fisher,
+        diameter=length,
+        per_volume_area=shape.p32_per_m,
+        section=section,
+        rng=rng,
+    )
+
+
+def _names(blocks: Blocks, block: int) -> tuple[tuple[str, ...], ...]:
+    first, last = blocks.block_loop[block], blocks.block_loop[block + 1]
+    return tuple(
+        tuple(blocks.edge_names[k] for k in blocks.edge_name[blocks.loop_start[loop] : blocks.loop_start[loop + 1]])
+        for loop in range(first, last)
+    )
+
+
+def _cracks(geometry: Geometry, zones: list[Zone], cutting: Cutting, traces: list[Trace]) -> Cracks:
+    """Dead ends, and the drawn ``traces`` in the blocks that hold them now."""
+    if not traces:
+        return cutting.cracks
+    import shapely
+
+    every = [loop for zone in zones for loop in zone.loops]
+    decimals = grid_decimals(every)
+    tolerance = 1e-6 * extent_of(every) if geometry.tolerance_m is None else geometry.tolerance_m
+    loops = [cutting.blocks.loops(b) for b in range(cutting.blocks.n_blocks)]
+    polygons = np.array([shapely.Polygon(own[0], own[1:]) for own in loops])
+    ends = cutting.cracks
+    chains = [
+        ends.nodes[np.append(s[:, 0], s[-1, 1])] for s in (ends.segments[ends.crack == k] for k in range(ends.n_cracks))
+    ]
+    names = [trace.name for trace in traces] + list(ends.names)
+    lines = [[np.round(line, decimals) + 0.0 for line in trace.lines] for trace in traces] + [
+        [chain] for chain in chains
+    ]
+    flaws: list[Flaw] = []
+    cracks = crack_network(names, lines, cutting.blocks.names, polygons, loops, tolerance, decimals, flaws)
+    if flaws:
+        raise ShapeError(flaws)
+    return cracks

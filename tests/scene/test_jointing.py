@@ -1,0 +1,128 @@
+"""Joints in a scene: blocks, cracks, names and laws, mistakes told at their place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from geomech.scene import SceneError, load_scene
+
+SCENE = """
+title = "jointed"
+
+[geometry]
+seed = 3
+
+[[geometry.zones]]
+name = "rock"
+rectangle = [0, 0, 20, 10]
+
+[[geometry.zones]]
+name = "base"
+rectangle = [0, -1, 20, 0]
+
+[[geometry.edges]]
+name = "top"
+line = [[0, 10], [20, 10]]
+
+[[geometry.joints]]
+name = "fault"
+points = [[5, 0], [5, 10]]
+
+[[geometry.joint_sets]]
+name = "beds"
+angle_deg = 10
+spacing_m = 2
+region = [[0, 0], [20, 0], [20, 10], [0, 10]]
+
+[[geometry.joint_sets]]
+name = "cross"
+kind = "poisson"
+angle_deg = 95
+p20_per_m2 = 0.1
+length_m = 1.5
+ends_on = ["beds"]
+region = [[0, 0], [20, 0], [20, 10], [0, 10]]
+
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2600
+k_ic_pa_sqrt_m = 1e6
+
+[zones.base]
+fixed = true
+
+[joints.default]
+friction_angle_deg = 30
+
+[joints.rough]
+friction_angle_deg = 40
+edges = ["joint:cross"]
+
+[loads]
+gravity_m_s2 = [0, -9.81]
+
+[run]
+end_time_s = 1
+"""
+
+
+def load(tmp_path, text=SCENE, *changes):
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    return load_scene(path)
+
+
+def test_a_jointed_scene_becomes_blocks_and_cracks(tmp_path):
+    problem = load(tmp_path).problem()
+    blocks = problem.blocks
+    assert blocks.n_blocks > 8 and blocks.areas()[~blocks.fixed].sum() == pytest.approx(200, rel=1e-12)
+    assert {"", "top", "joint:fault", "joint:beds"} <= set(blocks.edge_names)
+    top = blocks.edges_named("top")
+    ends = blocks.vertices[blocks.next_vertex[top]] - blocks.vertices[top]
+    assert np.abs(ends[:, 0]).sum() == pytest.approx(20)
+    # Dead ends of the rough joints are rough cracks.
+    assert problem.cracks.n_cracks > 0 and all(name.startswith("cross ") for name in problem.cracks.names)
+    assert {problem.face_laws[k].friction_angle for k in problem.cracks.law} == {math.radians(40)}
+    again = load(tmp_path).problem()
+    assert np.array_equal(again.blocks.vertices, blocks.vertices) and np.array_equal(
+        again.cracks.nodes, problem.cracks.nodes
+    )
+
+
+def test_dead_ends_can_be_trimmed_and_told_about(tmp_path):
+    assert load(tmp_path, SCENE, ("seed = 3", 'seed = 3\ndead_ends = "trim"')).problem().cracks.n_cracks == 0
+    slot = load(tmp_path, SCENE + '\n[cracks.cross]\naperture = "slot"\n').problem()
+    assert np.isinf(slot.cracks.aperture).all()
+
+
+def test_a_drawn_crack_stands_beside_dead_ends(tmp_path):
+    crack = '\n[[geometry.cracks]]\nname = "flaw"\npoints = [[2, 9.0], [2.3, 9.2]]\n[cracks.flaw]\naperture = "slot"\n'
+    problem = load(tmp_path, SCENE + crack).problem()
+    assert "flaw" in problem.cracks.names and problem.cracks.n_cracks > 1
+    flaw = problem.cracks.names.index("flaw")
+    assert np.isinf(problem.cracks.aperture[problem.cracks.crack == flaw]).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("spacing_m = 2", ""), r'geometry.joint_sets\[0\].*a set of kind "parallel" needs `spacing_m`'),
+        (("p20_per_m2 = 0.1", "p21_per_m = 0.1"), "needs `p20_per_m2`"),
+        (
+            ('ends_on = ["beds"]', 'ends_on = ["bed"]'),
+            r"geometry.joint_sets\[1\].*no joints 'bed' before this set.*'fault', 'beds'",
+        ),
+        (("points = [[5, 0], [5, 10]]", "points = [[5, 0], [5, 0]]"), r"geometry.joints\[0\].*without length"),
+        (("angle_deg = 10", "dip_deg = 10"), "both `dip_deg` and `dip_direction_deg`"),
+    ],
+)
+def test_mistakes_are_told_at_their_place(tmp_path, change, message):
+    with pytest.raises(SceneError, match=f"(?s){message}"):
+        load(tmp_path, SCENE, change)
