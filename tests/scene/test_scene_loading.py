@@ -325,7 +325,7 @@ def test_every_key_is_described_once():
     text = describe_keys()
     for name, field in SceneTables.model_fields.items():
         assert field.description, name
-    for key in ("youngs_modulus_pa", "friction_angle_deg", "angle_deg", "max_displacement_ratio", "from", "stop_at"):
+    for key in ("youngs_modulus_pa", "friction_angle_deg", "spacing_m", "max_displacement_ratio", "from", "stop_at"):
         assert text.count(f"\n  {key} = ") == 1, key
     assert '"mts" | "g" | "s"' in text and "(required)" in text
     assert set(keys_of(SceneTables)) >= {"geometry", "materials", "variants"}
