@@ -67,6 +67,7 @@ class Coupling:
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
         self.budget = dda.EnergyBudget()
+        self.length = dda.StepLength(problem.dda)
         self.removed: np.ndarray | None = None
         self._take_blocks()
 
@@ -88,7 +89,7 @@ class Coupling:
 
     def _load_step(self):
         """All passes at one load. Returns True when a stop event happened."""
-        dt = min(self.problem.dda.time_step, self.problem.run.end_time - self.state.time)
+        dt = min(self.length.dt, self.problem.run.end_time - self.state.time)
         pending: tuple[Event, ...] = self._excavated()
         stops, load_time = False, None
         static = self.problem.dda.dynamic_factor == 0.0
@@ -139,6 +140,7 @@ class Coupling:
                         self.number,
                         growth_pass,
                     )
+                self.length.after(result, dt, self.system.allowed_ratio)
                 self.state, self.budget = result.state, budget
                 self.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
                 return stops

@@ -16,6 +16,7 @@ from .in_situ import InSituState, NoInSituEquilibrium, in_situ_state
 from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
+from .step_length import StepLength
 from .strength_reduction import FactorOfSafety, factor_of_safety
 from .system import BlockSystem, run
 from .time_integration import TimeScheme
@@ -34,6 +35,7 @@ __all__ = [
     "NoInSituEquilibrium",
     "NotConverged",
     "StepEnergy",
+    "StepLength",
     "StepResult",
     "TimeScheme",
     "block_moments",

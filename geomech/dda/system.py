@@ -24,6 +24,7 @@ from .open_close import Settled, Unsettled, settle
 from .overlap import refuse_overlap
 from .rigid import mean_stress, with_rigid
 from .step import CrackResponse, NotConverged, StepResult
+from .step_length import StepLength
 from .time_integration import TimeScheme, advance, assemble_blocks
 from .viscous_boundary import QuietEdges
 
@@ -108,6 +109,11 @@ class BlockSystem:
         if not 0 < share < 1:
             raise ValueError(f"penetration_tolerance must lie between 0 and 1, got {share!r}")
         return max(share * size, _FINEST * self._slack)
+
+    @property
+    def allowed_ratio(self) -> float:
+        """The largest displacement that a step may bring, in units of half the height."""
+        return self._limit / self.half_height
 
     def in_statics(self) -> BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
@@ -430,13 +436,17 @@ def run(
     joint_index: Callable[[str, str], int | None] | None = None,
     state: State | None = None,
 ) -> Iterator[State]:
-    """States of a block system from rest (or from ``state``) until ``end_time``, one a step.
+    """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how long.
 
     ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
     """
     system = BlockSystem(blocks, materials, joints, joint_index, settings)
     state = State.at_rest(blocks) if state is None else state
     yield state
+    length = StepLength(settings)
     while state.time < end_time * (1 - 1e-12):
-        state = system.step(state, loads, min(settings.time_step, end_time - state.time)).state
+        dt = min(length.dt, end_time - state.time)
+        result = system.step(state, loads, dt)
+        length.after(result, dt, system.allowed_ratio)
+        state = result.state
         yield state

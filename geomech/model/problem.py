@@ -17,7 +17,8 @@ from .material import Material
 class DdaSettings:
     """How blocks are moved (names and values of Shi 1988 where he has them).
 
-    ``normal_penalty`` and ``shear_penalty`` are contact spring stiffnesses, N/m per metre of thickness (Pa); None
+    ``time_step`` s is that of every step, or with ``automatic_time_step`` the longest, by which steps then grow and shrink
+    as they prove easy or hard (`dda.StepLength`). ``normal_penalty`` and ``shear_penalty`` are contact spring stiffnesses, N/m per metre of thickness (Pa); None
     picks them from the blocks' stiffness. ``contact`` "augmented" adds multipliers to these springs until closed contacts
     gape and sticking ones give by less than ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
     static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1) is Shi's, (¼, ½) the trapezoidal rule, which
@@ -32,6 +33,7 @@ class DdaSettings:
     """
 
     time_step: float = 1.0
+    automatic_time_step: bool = False
     dynamic_factor: float = 0.0
     newmark: tuple[float, float] = (0.5, 1.0)
     spectral_radius: float | None = None

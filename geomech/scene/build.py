@@ -201,6 +201,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
         mass, stiffness = rayleigh_coefficients(d.rayleigh_fractions, d.rayleigh_frequencies_hz)
     return DdaSettings(
         time_step=d.time_step_s,
+        automatic_time_step=d.automatic_time_step,
         dynamic_factor=d.dynamic_factor,
         newmark=d.newmark,
         spectral_radius=d.spectral_radius,

@@ -360,6 +360,10 @@ class LoadsTable(Table):
 
 class DdaTable(Table):
     time_step_s: Positive = Field(1.0, description="longest time step, s")
+    automatic_time_step: bool = Field(
+        False,
+        description="steps grow and shrink below `time_step_s` by displacement and open–close iterations",
+    )
     dynamic_factor: Annotated[float, Field(ge=0, le=1)] = Field(
         0.0, description="share of the velocity carried from step to step: 0 static, 1 dynamic"
     )

@@ -125,6 +125,7 @@ times_s = [0, 1]
 incoming_m_per_s = [[0, 0], [0, -0.1]]
 [dda]
 time_step_s = 0.01
+automatic_time_step = true
 dynamic_factor = 0.9
 damping = 0.1
 newmark = [0.25, 0.5]
@@ -191,6 +192,7 @@ def test_every_setting_arrives(scene_file):
     mass, stiffness = rayleigh_coefficients((0.02, 0.03), (1.0, 4.0))
     assert vars(p.dda) == {
         "time_step": 0.01,
+        "automatic_time_step": True,
         "dynamic_factor": 0.9,
         "damping": 0.1,
         "newmark": (0.25, 0.5),
