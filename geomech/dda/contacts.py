@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model import CONTACT, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import JointTable, Springs, contact_springs, penalties
 from .curved_joints import CurvedJoints
@@ -151,7 +151,7 @@ class ContactFinder:
         springs = self._springs(block, other, law, geometry[:, 4])
         remembered = self._remembered(old, parent, state.time, geometry, partner, springs)
         if self._table.curved.any():
-            self._pass_on_wear(old, parent, block, other, geometry, remembered)
+            self._pass_on_wear(old, block, other, geometry, remembered)
         return ContactSet(
             vertex=table[:, 0].copy(),
             edge=table[:, 1].copy(),
@@ -202,17 +202,22 @@ class ContactFinder:
             "slip": slip, "wear": wear, "lift": lift, "stretch": stretch,
         }  # fmt: skip
 
-    def _pass_on_wear(self, old, parent, block, other, geometry, remembered) -> None:
-        """New contacts on a joint that has slid are as worn, and as far lifted, as the nearest old one of that joint: the
-        same two blocks, along the same line."""
-        pair, old_pair = np.minimum(block, other), np.minimum(old["block"], old["other"])
-        mate, old_mate = np.maximum(block, other), np.maximum(old["block"], old["other"])
-        slid = old["wear"] > 0
-        for c in np.flatnonzero(parent < 0) if slid.any() else ():
-            aligned = np.abs(old["normal"] @ geometry[c, 1:3]) > _ALIGNED
-            same = np.flatnonzero(slid & aligned & (old_pair == pair[c]) & (old_mate == mate[c]))
-            if len(same):
-                row = old[same[np.argmin(np.linalg.norm(old["point"][same] - geometry[c, 5:7], axis=1))]]
+    def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:
+        """Contacts that have not touched are as worn, and as far lifted, as the nearest that slides along their direction
+        between the same two blocks: these have moved by as much everywhere."""
+        touched = old[(old["wear"] > 0) & (old["state"] != OPEN)]
+        if not len(touched):
+            return
+        pair = np.stack(
+            [np.minimum(touched["block"], touched["other"]), np.maximum(touched["block"], touched["other"])]
+        )
+        for c in np.flatnonzero(remembered["state"] == OPEN):
+            same = (pair[0] == min(block[c], other[c])) & (pair[1] == max(block[c], other[c]))
+            same &= np.abs(touched["normal"] @ geometry[c, 1:3]) > _ALIGNED
+            same &= touched["wear"] > remembered["wear"][c]
+            if same.any():
+                at = np.flatnonzero(same)
+                row = touched[at[np.argmin(np.linalg.norm(touched["point"][at] - geometry[c, 5:7], axis=1))]]
                 for name in ("slip", "wear", "lift"):
                     remembered[name][c] = row[name]
 

@@ -189,6 +189,8 @@ def contacts_grid(cycle: Cycle, configuration: str) -> Grid:
             "shear_force": contacts["shear_force"],
             "gap": contacts["gap"],
             "slip": contacts["slip"],
+            "wear": contacts["wear"],
+            "lift": contacts["lift"],
             "state": contacts["state"],
             "length": contacts["length"],
             "joint": contacts["law"],

@@ -402,7 +402,8 @@ class DdaTable(Table):
         0.001, description="largest displacement in a step, in units of half the height of the domain"
     )
     normal_penalty_pa: Positive | None = Field(
-        None, description="stiffness of normal contact springs, Pa (unset: from the blocks' stiffness)"
+        None,
+        description="stiffness of normal contact springs, Pa (unset: from the stiffness of both blocks and the shape of the face)",
     )
     shear_penalty_pa: Positive | None = Field(
         None, description="stiffness of shear contact springs, Pa (unset: from the normal one)"

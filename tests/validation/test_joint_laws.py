@@ -25,14 +25,28 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
-def direct_shear(law: JointLaw, pressure=1e6, travel=0.02, n=100, wall=None, back=False):
+SEAT = rectangle(-1, -0.5, 2, 0)
+
+
+def direct_shear(
+    law: JointLaw, pressure=1e6, travel=0.02, n=100, wall=None, back=False, seat=SEAT, contact="penalty", seen=None
+):
     """A 1 m block pressed on a joint and pushed along it by a heavy ram of constant speed, against a frictionless ``wall``
-    (Pa/m) above it if one is given. Per step: shear and normal force N, slip, wear, lift, gap m; mean iterations."""
-    polygons = [rectangle(-1, -0.5, 2, 0), rectangle(0, 0, 1, 0.5), rectangle(-0.5, 0.1, 0, 0.4)]
-    names = [[["", "", "joint", ""]], [["joint", "side", "top", "side"]], [[""] * 4]]
+    (Pa/m) above it if one is given; a second ram pushes it ``back`` by as much in as many steps more. ``seat`` is the polygon
+    below the joint; ``seen``, a list, gets the joint's contacts.
+
+    Per step: shear and normal force N, slip, wear, lift, gap m; and the mean of the iterations.
+    """
+    polygons = [seat, rectangle(0, 0, 1, 0.5), rectangle(-0.5, 0.1, 0, 0.4)]
+    names = [[["joint"] * len(seat)], [["joint", "side", "top", "side"]], [[""] * 4]]
     laws = [JointLaw("greased"), law]
     held = [[False] * 6, [False, False] + [True] * 4, [False] + [True] * 5]
     fixed = [True, False, False]
+    if back:
+        polygons.append(rectangle(1.0, 0.1, 1.5, 0.4))
+        names.append([[""] * 4])
+        held.append(held[2])
+        fixed.append(False)
     if wall is not None:
         polygons.append(rectangle(-1, 0.5, 2, 1))
         names.append([["wall", "", "", ""]])
@@ -44,12 +58,12 @@ def direct_shear(law: JointLaw, pressure=1e6, travel=0.02, n=100, wall=None, bac
         return 2 if "wall" in (a, b) else int("joint" in (a, b) and "top" not in (a, b))
 
     blocks = Blocks.from_polygons(
-        polygons, fixed=fixed, edge_names=names, held=held, material=[0, 0, 1] + [0] * (len(polygons) - 3)
+        polygons, fixed=fixed, edge_names=names, held=held, material=[0, 0] + [1 - f for f in fixed[2:]]
     )
     materials = [Material(name, YOUNGS_MODULUS, POISSON, density=d) for name, d in (("light", 1.0), ("ram", 1e12))]
     settings = DdaSettings(
         dynamic_factor=1.0, damping=0.0, max_displacement_ratio=0.5,
-        normal_penalty=PENALTY / 2, shear_penalty=PENALTY / 2,
+        normal_penalty=PENALTY / 2, shear_penalty=PENALTY / 2, contact=contact,
     )  # fmt: skip
     static = dda.BlockSystem(blocks, materials, laws, index, dataclasses.replace(settings, dynamic_factor=0.0))
     system = dda.BlockSystem(blocks, materials, laws, index, settings)
@@ -57,13 +71,20 @@ def direct_shear(law: JointLaw, pressure=1e6, travel=0.02, n=100, wall=None, bac
     state = static.step(static.step(State.at_rest(blocks), loads, 1e3).state, loads, 1e3).state
     state.velocity[:] = 0.0
     state.velocity[2, 0] = travel
+    if back:
+        state.velocity[3, 0] = travel
     rows, iterations = [], []
-    for step in range(n):
+    for step in range(2 * n if back else n):
+        if step == n:
+            state.velocity[:] = 0.0
+            state.velocity[2:4, 0] = -travel
         result = system.step(state, loads, 1.0 / n)
         assert result.statistics["step_cuts"] == 0
         state = result.state
-        c = result.contacts[result.contacts["law"] == 1]
+        c = result.contacts[(result.contacts["law"] == 1) & (result.contacts["normal_force"] > 0)]
         assert c["lift"].std() < 1e-12
+        if seen is not None:
+            seen.append(result.contacts[result.contacts["law"] == 1])
         rows.append(
             [abs(c["shear_force"].sum()), c["normal_force"].sum()]
             + [float(np.abs(c[name]).mean()) for name in ("slip", "wear", "lift")]
@@ -132,6 +153,51 @@ def test_direct_shear_with_dilation_up_to_a_critical_slip(wall):
     wall = wall or 0.0
     assert normal == pytest.approx((1e6 + wall * lift) / (1 + wall / PENALTY), rel=2e-6)
     assert gap == pytest.approx(-normal / PENALTY, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("seat", "contacts"),
+    [
+        ([[-1, -0.5], [1.01, -0.5], [1.01, 0], [-1, 0]], 2),
+        ([[-1, -0.5], [2, -0.5], [2, 0], [1.01, 0], [1.01, -0.1], [0.5, -0.1], [0.5, 0], [-1, 0]], 4),
+    ],
+    ids=["over the edge", "over a recess"],
+)
+def test_contacts_that_follow_one_another_pass_on_what_the_joint_has_become(seat, contacts):
+    # The block's corner slides off its seat, and the seat's corner carries it from then on; or onto the far side of a
+    # recess, which it has not touched before: as worn and as far lifted (`direct_shear` holds that all contacts are).
+    law = JointLaw("worn", ANGLE, residual_friction_angle=RESIDUAL, softening_slip=5e-3, dilation_angle=math.radians(8))
+    seen: list[np.ndarray] = []
+    (shear, normal, slip, wear, lift, gap), _ = direct_shear(law, seat=np.array(seat, dtype=float), seen=seen)
+    assert wear == pytest.approx(slip) and slip[-1] == pytest.approx(0.02, rel=2e-3)
+    assert lift == pytest.approx(math.tan(math.radians(8)) * slip, rel=1e-3)
+    assert shear[-1] == pytest.approx(math.tan(RESIDUAL) * normal[-1], rel=1e-6)
+    assert gap.max() < 0
+    # A contact that still hangs free follows a step behind: 2e-4 m of slip.
+    facing = seen[-1][seen[-1]["wear"] > 0]
+    assert len(facing) == contacts and facing["wear"].min() > wear[-1] - 3e-4
+    assert (facing["gap"] < 3e-5).all()
+
+
+@pytest.mark.parametrize("contact", ["penalty", "augmented"])
+def test_shear_to_and_fro(contact):
+    # Sliding back, faces sink again by what they rose, and do not regain what they lost.
+    law = JointLaw(
+        "to and fro", ANGLE, residual_friction_angle=RESIDUAL, softening_slip=5e-3, dilation_angle=math.radians(8),
+    )  # fmt: skip
+    (shear, normal, slip, wear, lift, gap), _ = direct_shear(law, travel=0.01, n=50, back=True, contact=contact)
+    left = np.clip(1 - wear / 5e-3, 0, 1)
+    expected = (math.tan(RESIDUAL) + (math.tan(ANGLE) - math.tan(RESIDUAL)) * left) * normal
+    sliding = np.diff(wear, prepend=0.0) > 0
+    assert sliding.sum() > 95
+    assert shear[sliding] == pytest.approx(expected[sliding], rel=2e-8)
+    assert (np.diff(wear) >= 0).all() and wear[-1] == pytest.approx(0.02, rel=2e-3)
+    # On the way back the lift counts the motion of the shear spring too, S/k of 10⁻⁷ m.
+    assert lift == pytest.approx(math.tan(math.radians(8)) * slip, abs=1e-7)
+    assert lift[-1] < 1e-2 * lift.max()
+    if contact == "augmented":
+        # 1e-8 of √area of the rams.
+        assert np.abs(gap).max() < 4e-9
 
 
 def test_direct_shear_of_a_rough_joint_at_constant_load():
