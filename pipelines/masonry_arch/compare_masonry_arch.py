@@ -70,7 +70,7 @@ def draw(path: Path, thinnest: dict[int, float], standing: Seen, falling: Seen, 
     number = np.arange(4, 51)
     axes.axhline(masonry.MILANKOVITCH_RATIO, color=HINGE, lw=1.2)
     axes.text(
-        60, masonry.MILANKOVITCH_RATIO + 2e-4, "Milankovitch (1907)", color=HINGE, fontsize=9, ha="right", va="bottom"
+        50, masonry.MILANKOVITCH_RATIO + 2e-4, "Milankovitch (1907)", color=HINGE, fontsize=9, ha="right", va="bottom"
     )
     exact = np.array([masonry.thinnest_arch(int(n)) for n in number])
     axes.plot(number, exact, ".-", color="#9a9a94", ms=5, lw=0.8, label="limit analysis of rigid voussoirs")

@@ -48,8 +48,8 @@ def test_a_block_just_steeper_than_its_friction_angle_slides_at_every_step(dt):
     )
 
 
-@pytest.mark.parametrize("dt", STEPS[1:])
-def test_a_block_that_weighs_at_once_sticks(dt):
+@pytest.mark.parametrize("dt", [pytest.param(STEPS[0], marks=pytest.mark.slow), *STEPS[1:]])
+def test_a_block_that_weighs_at_once_sticks_at_every_step(dt):
     # The shock of the weight makes it vibrate, and it creeps while it is light: by parts of its elastic shortening
     # (W/E' = 2.4 µm), a few times, then it must stand. 30 ms are twenty of its periods.
     system = block_on_slope(35)
