@@ -51,6 +51,31 @@ def multiply(data, pointer, columns, x):
     return out, size
 
 
+@_jit
+def _changed(data, diagonal, factored, tolerance):
+    """(n,) whether a diagonal block of ``data`` differs from the one ``factored`` (n, 36) by more than this part of its largest
+    entry."""
+    n = len(diagonal)
+    out = np.empty(n, np.bool_)
+    for b in range(n):
+        change, size = 0.0, 0.0
+        for k in range(36):
+            now = data[36 * diagonal[b] + k]
+            change, size = max(change, abs(now - factored[b, k])), max(size, abs(now))
+        # Not a number has changed.
+        out[b] = not change <= tolerance * size
+    return out
+
+
+@_jit
+def _take(data, diagonal, changed, factored):
+    """Copy the ``changed`` diagonal blocks of ``data`` to ``factored`` (n, 36)."""
+    for b in range(len(diagonal)):
+        if changed[b]:
+            for k in range(36):
+                factored[b, k] = data[36 * diagonal[b] + k]
+
+
 class BlockSolver:
     """Solves A x = b for one pattern of 6×6 blocks and matrices that change from time to time.
 
@@ -65,7 +90,8 @@ class BlockSolver:
         self._diagonal = np.flatnonzero(rows == columns)
         self._pattern = points, rows, columns
         self._factors = Factors(points, rows, columns, np.float32 if self.n >= SINGLE else np.float64)
-        self._factored: np.ndarray | None = None
+        self._factored = np.empty((self.n, 36))
+        self._has_factors = False
         #: ``shares``: factorisations, one that was done in part as that part.
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
 
@@ -79,8 +105,8 @@ class BlockSolver:
 
     def solve(self, data: np.ndarray, right: np.ndarray) -> np.ndarray:
         """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row. Raises numpy.linalg.LinAlgError."""
-        if self._factored is not None:
-            changed = self._changed(data)
+        if self._has_factors:
+            changed = _changed(data, self._diagonal, self._factored, CHANGED)
             if np.count_nonzero(changed) > (0 if self._factors.tree.kept else FEW):
                 self.factor(data, changed)
             x = self._iterate(data, right)
@@ -109,10 +135,10 @@ class BlockSolver:
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> None:
         """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only. Raises
         numpy.linalg.LinAlgError when it is singular."""
-        before, now = self._factored, self._diagonal_of(data)
-        self._factored = None
+        self._has_factors = False
         share = self._factors.factor(data, changed)
-        self._factored = now if changed is None else np.where(changed[:, None], now, before)
+        _take(data, self._diagonal, np.ones(self.n, np.bool_) if changed is None else changed, self._factored)
+        self._has_factors = True
         self.counts["factorisations"] += 1
         self.counts["shares"] += share
 
@@ -124,15 +150,6 @@ class BlockSolver:
     def multiply(self, data: np.ndarray, x: np.ndarray) -> np.ndarray:
         """The product with the matrix of ``data``."""
         return multiply(data, self.pointer, self.columns, x)[0]
-
-    def _diagonal_of(self, data: np.ndarray) -> np.ndarray:
-        """(n, 36) the diagonal blocks of ``data``."""
-        return data[36 * self._diagonal[:, None] + np.arange(36)]
-
-    def _changed(self, data: np.ndarray) -> np.ndarray:
-        """(n,) whether a diagonal block is no longer nearly the one factored."""
-        now = self._diagonal_of(data)
-        return np.abs(now - self._factored).max(axis=1) > CHANGED * np.abs(now).max(axis=1)
 
     def _iterate(self, data: np.ndarray, right: np.ndarray) -> np.ndarray | None:
         """GMRES with the factors at hand on the right; None when it takes too long."""
