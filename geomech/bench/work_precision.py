@@ -279,7 +279,8 @@ def _table(points: list[Point], growth: dict, goals: dict) -> str:
         f"growth, {g['increments']} increments at two tips of the specimen ({g['elements_at_the_end']} elements at the end)",
         f"  an increment with what is known {1e3 * g['incremental_s']:.1f} ms, all {g['all_incremental_s']:.2f} s",
         f"  fresh bodies {1e3 * g['fresh_s']:.1f} ms ({g['fresh_s'] / g['incremental_s']:.1f} times),"
-        + f" all {g['all_fresh_s']:.2f} s; K differs by {g['difference']:.1e}",
+        + f" all {g['all_fresh_s']:.2f} s ({g['all_fresh_s'] / g['all_incremental_s']:.1f} times);"
+        + f" K differs by {g['difference']:.1e}; {g['factorisations']} whole factorisations",
         "",
         "K to 1e-6: "
         + "; ".join(

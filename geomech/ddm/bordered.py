@@ -50,6 +50,13 @@ class Base:
     def factor(self) -> Factor | BorderedFactor:
         return self.matrix.factored() if isinstance(self.matrix, Bordered) else Factor(self.matrix, SINGULAR)
 
+    @property
+    def unfactored(self) -> bool:
+        """Whether asking for factors will make some of a whole matrix."""
+        if isinstance(self.matrix, Bordered):
+            return self.matrix.base.unfactored
+        return "factor" not in vars(self)
+
     @cached_property
     def dense(self) -> np.ndarray:
         return self.matrix.dense if isinstance(self.matrix, Bordered) else self.matrix
@@ -253,10 +260,11 @@ class BorderedFactor:
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
         """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
         shape, n_added = right.shape[1:], len(self._outer)
-        on_base = np.zeros((self._base.n, *shape), order="F")
-        on_base[self._places] = right[self._inner]
-        out, rest = np.empty_like(right), np.zeros((self._t.n, *shape), order="F")
-        rest[:n_added] = right[self._outer]
+        # Transposed, gathering goes along memory.
+        on_base = np.zeros((*shape, self._base.n)).T
+        on_base.T[..., self._places] = right.T[..., self._inner]
+        out, rest = np.empty((*shape, self.n)).T, np.zeros((*shape, self._t.n)).T
+        rest.T[..., :n_added] = right.T[..., self._outer]
         done = self._done
         if transposed:
             rest[:n_added] -= done.x.T @ on_base
@@ -271,5 +279,5 @@ class BorderedFactor:
             rest[n_added:] = -first[done.gone]
             w = self._t.solve(rest)
             first -= done.x @ w[:n_added] + done.lost @ w[n_added:]
-        out[self._inner], out[self._outer] = first[self._places], w[:n_added]
+        out.T[..., self._inner], out.T[..., self._outer] = first.T[..., self._places], w.T[..., :n_added]
         return out

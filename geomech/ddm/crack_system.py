@@ -103,6 +103,7 @@ class CrackSystem:
         if self.matrix.border is not None:
             try:
                 self._work.crack_borderings += 1
+                self._work.crack_factorisations += self.matrix.base.unfactored
                 factor = self.matrix.factored()
                 if factor.growth < LOSS * factor.rcond:
                     return factor

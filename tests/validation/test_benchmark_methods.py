@@ -78,7 +78,7 @@ def test_what_is_not_reached_is_extrapolated_in_the_other_method_s_favour():
 
 def test_table_and_picture(tmp_path):
     """From made-up curves: a method that gets there has a ratio, one that does not the time it was given."""
-    growth = dict.fromkeys(("increments", "elements_at_the_end"), 1)
+    growth = dict.fromkeys(("increments", "elements_at_the_end", "factorisations"), 1)
     growth |= dict.fromkeys(("incremental_s", "fresh_s", "all_incremental_s", "all_fresh_s", "difference"), 1.0)
     points = []
     for name in work_precision.PROBLEMS:
