@@ -50,8 +50,8 @@ class Body:
 
     ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``holes``:
     more of them, which may run either way, in the infinite plane too. ``cracks``: those of this body. ``previous``: an
-    earlier body of which whatever is unchanged, element by element, is reused: growth costs the rows and columns of the
-    new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of a crack segment counts in
+    earlier body of which whatever is unchanged, element by element, is reused, factors included (`bordered`): growth costs
+    the rows and columns of the new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of a crack segment counts in
     them. ``counts`` tells what making it took, ``work`` what was done since by all bodies that share it. Raises ValueError naming the item on geometry that is no body,
     numpy.linalg.LinAlgError when cracks cut a part off.
     """

@@ -7,10 +7,10 @@ equations of G, which are given up for w_G = 0,
 
 Eliminating w_B leaves a small matrix T = K − D X for (w_N, λ), X = S_BB⁻¹ (S_BN, I_BG): a column of X is made once and
 outlasts growth (block elimination; its part for G is Woodbury's formula). Elements that come and go between two
-increments cost no more than their columns.
+increments cost no more than their columns. A border that has grown wide becomes, with its base, the base of another one.
 
 Block elimination does not pivot between B and the border and loses ‖D‖ ‖X‖ / ‖T‖ in accuracy over an elimination that
-does (Higham 2002, §13.2). S is factored anew where that would be felt, and where the border has grown as dear as that.
+does (Higham 2002, §13.2). S is factored anew where that would be felt, and after some borders upon borders.
 """
 
 from __future__ import annotations
