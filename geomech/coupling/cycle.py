@@ -130,7 +130,9 @@ class Coupling:
                 tips["grown"] = growth.grown
                 events += self._initiations(tips, result.state)
                 stops = self._stops(events)
-            budget = self.budget.after(result.energy, result.state.time)
+            # What is dug out takes what it stores along.
+            dug = result.state.removed is not self.state.removed
+            budget = (self.budget.cut() if dug else self.budget).after(result.energy, result.state.time)
             statistics = {**result.statistics, **budget.statistics(), **mismatch}
             yield self._record(result.state, tips, solutions, events, growth_pass, statistics)
             if growth is None:

@@ -40,7 +40,6 @@ class StepEnergy(NamedTuple):
     before           T + U + Φ as the step began
     gravity_work     of the weight
     load_work        of edge tractions and point loads, bolts, and what imposes motion
-    spin_work        of the centrifugal force on the strains of spinning blocks, at the expense of T
     crack_work       done on the blocks' cracks: stored, rubbed off and released there
     friction         lost in sliding, ≥ 0
     damping          lost in the blocks' viscosity and in contact dashpots, ≥ 0
@@ -57,7 +56,6 @@ class StepEnergy(NamedTuple):
     before: float
     gravity_work: float
     load_work: float
-    spin_work: float
     crack_work: float
     friction: float
     damping: float
@@ -74,16 +72,16 @@ class StepEnergy(NamedTuple):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _product(first, second, b, c, d, moments, density):
-    """∫ρ u·w of two first-order fields with unknowns ``first[b]`` and ``second[b]``, whose strains c and d stand apart."""
-    area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
+def _product(first, second, b, c, d, area, xx, yy, xy):
+    """∫ u·w of two first-order fields with unknowns ``first[b]`` and ``second[b]``, whose strains c and d stand apart, over a
+    block of these moments."""
     p, q = 0.5 * c[2] - first[b, 2], 0.5 * c[2] + first[b, 2]
     r, s = 0.5 * d[2] - second[b, 2], 0.5 * d[2] + second[b, 2]
     # u = (u0 + εx x + p y, v0 + q x + εy y)
     total = area * (first[b, 0] * second[b, 0] + first[b, 1] * second[b, 1])
     total += (c[0] * d[0] + q * s) * xx + (p * r + c[1] * d[1]) * yy
     total += (c[0] * r + p * d[0] + q * d[1] + c[1] * s) * xy
-    return density[b] * total
+    return total
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -157,7 +155,7 @@ def step_energies(
     law,
     closure,
 ):
-    """The terms of `StepEnergy` in its order, (15,).
+    """The terms of `StepEnergy` in its order, (14,).
 
     Blocks: ``increment``, ``carried``, ``acceleration``, ``load`` (n_blocks, 6) as solved with, ``old_velocity`` and
     ``velocity`` before and after the step, ``old_stress``, ``tangent``, ``stress0`` with σ′ = tangent Δε + stress0; ``weight``
@@ -166,7 +164,7 @@ def step_energies(
     forces at its two ends (N); ``normal`` N/m, the spring without dashpot, and ``shear``, that of the step (``theta`` times
     the spring), 0 where a multiplier holds and nothing is stored; ``closure`` (n_laws,) m.
     """
-    kinetic = elastic = contact = before = fallen = loads = spin = cracks = 0.0
+    kinetic = elastic = contact = before = fallen = loads = cracks = 0.0
     friction = viscous = bond = scheme = lost = overlap = 0.0
     now = np.empty(3)
     rate = np.empty(3)
@@ -202,22 +200,31 @@ def step_energies(
         rate[0] = c * c * ex + s * s * ey + 2 * s * c * g
         rate[1] = s * s * ex + c * c * ey - 2 * s * c * g
         rate[2] = 2.0 * ((c * c - s * s) * g - s * c * (ex - ey))
-        after = 0.5 * _product(velocity, velocity, b, rate, rate, moments, density)
-        had = 0.5 * _product(old_velocity, old_velocity, b, old_velocity[b, 3:], old_velocity[b, 3:], moments, density)
-        kept = 0.5 * _product(carried, carried, b, carried[b, 3:], carried[b, 3:], moments, density)
-        work = _product(increment, acceleration, b, increment[b, 3:], acceleration[b, 3:], moments, density)
+        xx, yy, xy, rho = moments[b, 3], moments[b, 4], moments[b, 5], density[b]
+        had = (
+            0.5
+            * rho
+            * _product(old_velocity, old_velocity, b, old_velocity[b, 3:], old_velocity[b, 3:], area, xx, yy, xy)
+        )
+        kept = 0.5 * rho * _product(carried, carried, b, carried[b, 3:], carried[b, 3:], area, xx, yy, xy)
+        work = rho * _product(increment, acceleration, b, increment[b, 3:], acceleration[b, 3:], area, xx, yy, xy)
+        moved = rho * _product(increment, increment, b, increment[b, 3:], increment[b, 3:], area, xx, yy, xy)
+        # The second moments of the mass as the step ends, (I + ε) S (I + ε): rotation goes on on the strained block.
+        fx, fy, h = 1.0 + increment[b, 3], 1.0 + increment[b, 4], 0.5 * increment[b, 5]
+        xx1 = fx * fx * xx + 2.0 * fx * h * xy + h * h * yy
+        yy1 = h * h * xx + 2.0 * h * fy * xy + fy * fy * yy
+        xy1 = fx * h * xx + (fx * fy + h * h) * xy + h * fy * yy
+        after = 0.5 * rho * _product(velocity, velocity, b, rate, rate, area, xx1, yy1, xy1)
+        # What centrifugal force does on the strains it takes from the rotation.
+        spin = (
+            rho * carried[b, 2] * carried[b, 2] * (xx * increment[b, 3] + yy * increment[b, 4] + xy * increment[b, 5])
+        )
         kinetic += after
         before += had
         lost += had - kept
-        scheme += work - (after - kept)
+        scheme += work - spin - (after - kept)
         fallen += density[b] * area * (gravity[0] * increment[b, 0] + gravity[1] * increment[b, 1])
-        omega = density[b] * carried[b, 2] * carried[b, 2]
-        spin += omega * (
-            moments[b, 3] * increment[b, 3] + moments[b, 4] * increment[b, 4] + moments[b, 5] * increment[b, 5]
-        )
-        if mass_damping > 0.0:
-            moved = _product(increment, increment, b, increment[b, 3:], increment[b, 3:], moments, density)
-            viscous += mass_damping / dt * moved
+        viscous += mass_damping / dt * moved
         drag = stiffness_damping + 2.0 * block_damping * np.sqrt(density[b] * area / (12.0 * stiffness[b, 0, 0]))
         viscous += drag / dt * area * quadratic
     for i in range(state.shape[0]):
@@ -248,12 +255,12 @@ def step_energies(
             bond += rest
         else:
             scheme += rest
-    out = np.empty(15)
+    out = np.empty(14)
     out[0], out[1], out[2], out[3] = kinetic, elastic, contact, before
-    out[4], out[5], out[6], out[7] = fallen, loads, spin, cracks
-    out[8], out[9], out[10], out[11], out[12], out[13] = friction, viscous, bond, scheme, lost, overlap
-    out[14] = kinetic + elastic + contact - before
-    out[14] -= fallen + loads + spin + overlap - cracks - friction - viscous - bond - scheme - lost
+    out[4], out[5], out[6] = fallen, loads, cracks
+    out[7], out[8], out[9], out[10], out[11], out[12] = friction, viscous, bond, scheme, lost, overlap
+    out[13] = kinetic + elastic + contact - before
+    out[13] -= fallen + loads + overlap - cracks - friction - viscous - bond - scheme - lost
     return out
 
 
@@ -266,7 +273,7 @@ class EnergyBudget:
     overlap    brought in by blocks that overlapped
     start      stored as the first step began
     stored     stored now
-    split      stored energy that has changed because blocks were cut (`cut`)
+    split      stored energy that has changed because blocks were cut or dug out (`cut`)
     residual   stored + losses − work − overlap − split − start: what updating the geometry between steps has added (> 0) or
                taken away, and round-off
     """
@@ -288,8 +295,8 @@ class EnergyBudget:
         start = step.before if first else self.start
         jump = 0.0 if first else step.before - self.last.stored
         split = self.split + (jump if self.is_cut else 0.0)
-        residual = self.residual + (0.0 if self.is_cut else jump) + step.spin_work + step.residual
-        work = abs(float(totals[4])) + abs(float(totals[5]))
+        residual = self.residual + (0.0 if self.is_cut else jump) + step.residual
+        work = abs(float(totals[_SUMS["gravity_work"]])) + abs(float(totals[_SUMS["load_work"]]))
         turnover = max(self.turnover, step.stored, step.before, work)
         warned = self.warned
         if residual > warned * turnover:
@@ -301,7 +308,7 @@ class EnergyBudget:
         return EnergyBudget(self.steps + 1, step, start, totals, split, residual, turnover, False, warned)
 
     def cut(self) -> EnergyBudget:
-        """The same as the next step finds its blocks cut: what that changes is no residual."""
+        """The same as the next step finds blocks cut or dug out: what that changes is no residual."""
         return EnergyBudget(
             self.steps, self.last, self.start, self.totals, self.split, self.residual, self.turnover,
             self.last is not None, self.warned,
@@ -319,25 +326,28 @@ class EnergyBudget:
 
     @property
     def losses(self) -> float:
-        return float(self.totals[7:13].sum())
+        return float(self.totals[_LOSSES].sum())
 
     def statistics(self) -> dict[str, float]:
         """The columns of a history, J/m."""
         sums = self.totals.tolist()
-        out = {column: sums[at] for column, at in _COLUMNS.items()}
+        out = {column: sums[_SUMS[name]] for column, name in _COLUMNS.items()}
         out["energy_residual"] = self.residual
         return out
 
 
-_SUMS = {name: at for at, name in enumerate(StepEnergy._fields) if 4 <= at < 14}
+#: Sums of a run: where they stand in `StepEnergy`; and the columns of a history that they make.
+_SUMS = {name: at for at, name in enumerate(StepEnergy._fields) if at >= StepEnergy._fields.index("gravity_work")}
+del _SUMS["residual"]
 _COLUMNS = {
-    "gravity_work": 4,
-    "load_work": 5,
-    "crack_work": 7,
-    "friction_loss": 8,
-    "damping_loss": 9,
-    "bond_loss": 10,
-    "scheme_loss": 11,
-    "carried_loss": 12,
-    "overlap_energy": 13,
+    "gravity_work": "gravity_work",
+    "load_work": "load_work",
+    "crack_work": "crack_work",
+    "friction_loss": "friction",
+    "damping_loss": "damping",
+    "bond_loss": "bond",
+    "scheme_loss": "scheme",
+    "carried_loss": "carried",
+    "overlap_energy": "overlap",
 }
+_LOSSES = [_SUMS[name] for name in ("crack_work", "friction", "damping", "bond", "scheme", "carried")]

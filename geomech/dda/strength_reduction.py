@@ -118,7 +118,7 @@ def factor_of_safety(
 ) -> FactorOfSafety:
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
-    Loads are those of ``load_time`` s. ``state`` is where the first trial begins (default: blocks at rest). ``reduce`` names
+    Loads are those of ``load_time`` s, after excavations up to then. ``state`` is where the first trial begins (default: blocks at rest). ``reduce`` names
     the joint laws that are weakened (default: all). The answer is bracketed to ``tolerance`` (relative); a trial stands when
     no block has more than the part ``unbalanced`` of the forces on it left to move it. Static steps are ``time_step`` s long
     (default: free fall over it is a hundredth of the smallest block). ``watch`` sees every trial.
@@ -187,10 +187,11 @@ def factor_of_safety(
 
 
 def _relaxed(blocks, materials, joints, loads, settings, joint_index, state: State, load_time: float) -> State:
-    """Where the blocks come to rest from ``state``; ``state`` if they do not."""
+    """Where the blocks come to rest from ``state``, at ``load_time``: what is dug out or bolted by then is so in the step
+    that follows. ``state`` itself if they do not."""
     system = BlockSystem(blocks, materials, joints, joint_index, settings)
     found = equilibrium(system, state, loads, load_time=load_time, max_steps=_RELAXING)
-    return found.state if found.converged else state
+    return replace(found.state, time=max(state.time, load_time)) if found.converged else state
 
 
 def reduced(law: JointLaw, factor: float) -> JointLaw:

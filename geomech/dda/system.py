@@ -435,8 +435,10 @@ def run(
     *,
     joint_index: Callable[[str, str], int | None] | None = None,
     state: State | None = None,
+    watch: Callable[[StepResult], None] | None = None,
 ) -> Iterator[State]:
     """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how long.
+    ``watch`` sees every `StepResult`.
 
     ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
     """
@@ -448,5 +450,7 @@ def run(
         dt = min(length.dt, end_time - state.time)
         result = system.step(state, loads, dt)
         length.after(result, dt, system.allowed_ratio)
+        if watch is not None:
+            watch(result)
         state = result.state
         yield state

@@ -8,7 +8,7 @@ from block_problems import GRAVITY, WEIGHT, rectangle, turned
 
 from geomech import dda
 from geomech.dda.strength_reduction import reduced
-from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, Roughness
+from geomech.model import GROUND, Blocks, Bolt, DdaSettings, Excavation, History, JointLaw, Loads, Material, Roughness
 from geomech.reference import rock_slopes, toppling_slope
 
 DIP = np.radians(35)
@@ -117,6 +117,26 @@ def test_toppling_slope_of_goodman_and_bray():
     # All blocks move: those at the toe slide, those behind turn.
     assert set(found.moving) >= set(range(1, 12))
     assert sum("turning left" in line for line in found.mechanism) >= 6
+
+
+def test_bolts_and_excavations_count_at_their_time():
+    # A slab that a block at its toe holds, and a bolt along the plane: F = W cos α tan φ / (W sin α − T).
+    along, up = np.array([np.cos(DIP), np.sin(DIP)]), np.array([-np.sin(DIP), np.cos(DIP)])
+    slab_at = np.array([2 * along, 4 * along, 4 * along + up, 2 * along + up])
+    toe = np.array([0.5 * along, 2 * along, 2 * along + up, 0.5 * along + up])
+    blocks = Blocks.from_polygons([turned(rectangle(-3, -2, 8, 0), DIP), toe, slab_at], fixed=[True, True, False])
+    law, weight = JointLaw("plane", np.radians(30)), 2600 * GRAVITY * 2.0
+    middle, far = 3 * along + 0.5 * up, 12 * along + 0.5 * up
+    pull = 4e3
+    bolt = Bolt(2, tuple(middle), GROUND, tuple(far), 1e4, pretension=pull, installation=1.0)
+    dug = Excavation(2.0, (1,))
+    expected = {0.5: np.inf, 3.0: np.cos(DIP) * np.tan(np.radians(30)) / (np.sin(DIP) - pull / weight)}
+    for time, factor in expected.items():
+        loads = Loads(gravity=WEIGHT.gravity, bolts=(bolt,), excavations=(dug,))
+        found = dda.factor_of_safety(blocks, [ROCK], [law], loads, load_time=time)
+        print(f"at {time:g} s: {found.factor:.5f}, should be {factor:.5f}")
+        # The bolt is soft, 10 kN/m: on the 0.1 mm that the slab moves it gains 1 N.
+        assert found.upper == factor if np.isinf(factor) else found.factor == pytest.approx(factor, rel=1e-3)
 
 
 def test_what_cannot_fail_or_stand_is_told():
