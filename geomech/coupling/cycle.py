@@ -20,7 +20,7 @@ from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
 from ..model.polygon import winding_number
 from .bodies import boundary_loads, elastic_bodies, inherited, solve_bodies, tip_rows
 from .compliance import crack_response
-from .inherited_loads import on_children
+from .inherited_loads import on_children, on_moved
 from .mean_stress import rotated_mean_stress
 from .record import axial_strain, joined_faces, leading_load
 from .splitting import split_blocks
@@ -70,6 +70,8 @@ class Coupling:
         self.length = dda.StepLength(problem.dda)
         self.removed: np.ndarray | None = None
         self._take_blocks()
+        if problem.in_situ is not None:
+            self._settle_in_situ()
 
     # -- the generator -------------------------------------------------------------------------------------------
 
@@ -166,6 +168,28 @@ class Coupling:
         log.warning("t = %g s: %s; the run ends", load_time, found.reason)
         first = int(self.blocks.vertex_start[found.moving[0]])
         return (self._event("collapse", self.state, self.blocks.vertices[first], found.reason),)
+
+    def _settle_in_situ(self) -> None:
+        """Begin with the blocks at rest under the in-situ stress; where they are then is the reference. Cracks are as if cut
+        into them then: they open and slide from the first step on."""
+        with self._timed("dda"):
+            found = dda.in_situ_state(self.system, self.problem.in_situ, self.problem.loads)
+        motion = Motion.of(self.blocks, found.state.vertices)
+
+        def moved(block: int, point) -> tuple[float, float]:
+            return tuple(motion.current(block, np.asarray(point, dtype=float)).tolist())
+
+        nodes = self.cracks.nodes.copy()
+        for block in np.unique(self.cracks.block).tolist():
+            own = np.unique(self.cracks.segments[self.cracks.block == block])
+            nodes[own] = motion.current(block, nodes[own])
+        self.cracks = replace(self.cracks, nodes=nodes)
+        self.problem = replace(self.problem, loads=on_moved(self.problem.loads, moved))
+        if self.gauge is not None:
+            self.gauge = tuple((b, moved(b, p)) for b, p in self.gauge)
+        self.monitors = {name: (b, moved(b, p)) for name, (b, p) in self.monitors.items()}
+        self.blocks, self.state = found.blocks, found.state
+        self._take_blocks()
 
     def _excavated(self) -> tuple[Event, ...]:
         """Leave out the elastic bodies of blocks that are taken out at the present time; an event for each."""

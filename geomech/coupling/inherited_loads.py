@@ -1,4 +1,4 @@
-"""The loads of blocks that split, on their children."""
+"""The loads of blocks that split, on their children, and of blocks whose reference has moved."""
 
 from __future__ import annotations
 
@@ -41,4 +41,21 @@ def on_children(loads: Loads, parent: np.ndarray, child: Callable[[int, tuple[fl
             replace(e, blocks=tuple(part for b in e.blocks for part in parts(b))) for e in loads.excavations
         ),
         base=base,
+    )
+
+
+def on_moved(loads: Loads, moved: Callable[[int, tuple[float, float]], tuple[float, float]]) -> Loads:
+    """``loads`` with their material points where ``moved(block, point)`` says that these are in a new reference."""
+    return replace(
+        loads,
+        point_loads=tuple(replace(p, at=moved(p.block, p.at)) for p in loads.point_loads),
+        point_motions=tuple(replace(p, at=moved(p.block, p.at)) for p in loads.point_motions),
+        bolts=tuple(
+            replace(
+                b,
+                start=moved(b.block, b.start),
+                end=b.end if b.other == GROUND else moved(b.other, b.end),
+            )
+            for b in loads.bolts
+        ),
     )

@@ -8,6 +8,7 @@ import numpy as np
 
 from .blocks import Blocks
 from .cracks import Cracks
+from .in_situ import InSituStress
 from .joint import JointLaw
 from .loads import Loads
 from .material import Material
@@ -110,7 +111,7 @@ class Problem:
     ``law`` counts in ``face_laws``.
 
     ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
-    compression); ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
+    compression); ``in_situ`` is the stress that the blocks have, at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
     """
 
     title: str
@@ -121,6 +122,7 @@ class Problem:
     joint_of: dict[tuple[str, str], int] = field(default_factory=dict)
     face_laws: tuple[JointLaw, ...] = (JointLaw("frictionless"),)
     loads: Loads = field(default_factory=Loads)
+    in_situ: InSituStress | None = None
     dda: DdaSettings = field(default_factory=DdaSettings)
     ddm: DdmSettings = field(default_factory=DdmSettings)
     growth: GrowthSettings = field(default_factory=GrowthSettings)

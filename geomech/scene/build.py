@@ -24,12 +24,13 @@ from ..model import (
     rayleigh_coefficients,
 )
 from ..shapes.parts import JOINT
+from .actions import actions_of, force_history, in_situ_of, profile_of, traction_history
 from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
 from .edges import contact_names, joint_names
 from .errors import Check
 from .joints import joint_law
-from .tables import ForceTable, MaterialTable, SceneTables, TractionTable
+from .tables import MaterialTable, SceneTables
 
 
 def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Problem:
@@ -70,6 +71,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         joint_of=joint_of,
         face_laws=face_laws,
         loads=_loads(tables, check),
+        in_situ=in_situ_of(tables),
         dda=_dda(tables),
         ddm=DdmSettings(**tables.ddm.model_dump()),
         growth=_growth(tables, cracks),
@@ -164,9 +166,13 @@ def _loads(tables: SceneTables, check: Check) -> Loads:
         )
     return Loads(
         gravity=gravity,
-        edge_tractions=tuple(EdgeTraction(t.edge, traction_history(t)) for t in tables.loads.tractions),
+        edge_tractions=tuple(
+            EdgeTraction(t.edge, traction_history(t), t.follower, profile_of(t)) for t in tables.loads.tractions
+        ),
         point_loads=tuple(
-            PointLoad(carrier(check, ("loads", "forces", k, "at"), "force", f.at, f.zone), f.at, force_history(f))
+            PointLoad(
+                carrier(check, ("loads", "forces", k, "at"), "force", f.at, f.zone), f.at, force_history(f), f.follower
+            )
             for k, f in enumerate(tables.loads.forces)
         ),
         viscous_boundaries=tuple(
@@ -175,23 +181,8 @@ def _loads(tables: SceneTables, check: Check) -> Loads:
             )
             for v in tables.loads.viscous_boundaries
         ),
+        **actions_of(tables, check),
     )
-
-
-def traction_history(table: TractionTable) -> History:
-    return _history(table, table.value_pa, table.rate_pa_per_s, table.values_pa)
-
-
-def force_history(table: ForceTable) -> History:
-    return _history(table, table.value_n_per_m, table.rate_n_per_m_s, table.values_n_per_m)
-
-
-def _history(table, value, rate, values) -> History:
-    if value is not None:
-        return History.constant(value)
-    if rate is not None:
-        return History.ramp(rate, table.start_s)
-    return History(np.array(table.times_s, dtype=float), np.array(values, dtype=float))
 
 
 def _dda(tables: SceneTables) -> DdaSettings:

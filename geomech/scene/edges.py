@@ -78,6 +78,7 @@ def _unused(c: Check) -> None:
     if c.drawing.model is None or t.loads is None or t.joints is None:
         return
     used = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
+    used.update(() if t.loads.water is None else t.loads.water.dry_edges)
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
     idle = [name for name in _edge_names(c) if name not in used]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import Blocks
-from .build import force_history, traction_history
+from .action_checks import records_are_sound
+from .actions import force_history, traction_history
 from .checks import blocks_at, material_of
 from .errors import Check
 from .tables import SceneTables
@@ -19,7 +20,12 @@ def check_loads(c: Check) -> None:
     if t.zones is None or t.materials is None:
         return
     fixed = np.array([zone in t.zones and t.zones[zone].fixed for zone in c.drawing.zones])
-    if t.loads is not None and _loads_are_lost(c, fixed):
+    if t.loads is not None and not records_are_sound(c):
+        return
+    acts = t.loads is not None and bool(
+        t.loads.motions or t.loads.point_motions or t.loads.bolts or t.loads.base or t.loads.water or t.loads.in_situ
+    )
+    if t.loads is not None and not acts and _loads_are_lost(c, fixed):
         return
     if fixed.all():
         c.warn(("zones",), "all blocks are fixed: nothing moves", "let a zone move")
@@ -32,7 +38,7 @@ def check_loads(c: Check) -> None:
                 f"zone {zone!r} may move but its material {name!r} has no density",
                 "give the density; blocks without mass have no equation of motion",
             )
-    if fixed.any() or t.loads is None or t.run is None or t.dda is None or t.dda.dynamic_factor > 0:
+    if acts or fixed.any() or t.loads is None or t.run is None or t.dda is None or t.dda.dynamic_factor > 0:
         return
     if any(t.loads.gravity_m_s2):
         c.refuse(

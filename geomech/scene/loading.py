@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..model import Blocks, Cracks, Problem
+from .action_checks import check_actions
 from .build import build_problem
 from .checks import check
 from .drawing import Drawing, draw
@@ -152,6 +153,7 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
         except OverrideError as error:
             faults.append(Fault(f"--set {override}", error.message, error.way_out))
 
+    _resolve_records(data, path.parent)
     tables, found = validate(data, places)
     faults += found
     if not found:
@@ -161,6 +163,7 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
         drawing = draw(tables.geometry, path.parent, places, faults, warnings)
     sections = Check(tables, data, drawing, places, faults, warnings)
     check(sections)
+    check_actions(sections)
     check_loads(sections)
     if faults:
         raise SceneError(places.sorted(faults))
@@ -219,6 +222,15 @@ def _syntax_hint(source: str) -> str:
     if value.lower() in ("true", "false"):
         return f"write {value.lower()} in lower case"
     return "texts stand in double quotes, arrays in square brackets, each key once"
+
+
+def _resolve_records(data: dict[str, Any], folder: FilePath) -> None:
+    """Make the files of loads absolute, in place: they stand beside the scene, and a resolved scene may stand elsewhere."""
+    loads = data.get("loads")
+    for entry in loads.values() if isinstance(loads, dict) else ():
+        for table in entry if isinstance(entry, list) else [entry]:
+            if isinstance(table, dict) and isinstance(table.get("file"), str):
+                table["file"] = str((folder / table["file"]).resolve())
 
 
 def _apply_variant(data: dict[str, Any], name: str, places: _Places, faults: list[Fault]) -> None:

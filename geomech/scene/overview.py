@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..model import Blocks, Cracks, History, counted
-from .build import force_history, traction_history
+from .actions import force_history, traction_history
 from .checks import material_of
 from .drawing import Drawing
 from .tables import SceneTables
@@ -90,6 +90,19 @@ def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
     if any(tables.loads.gravity_m_s2):
         x, y = tables.loads.gravity_m_s2
         lines.append(f"gravity ({x:g}, {y:g}) m/s²")
+    for text, count in (
+        ("motions of blocks", len(tables.loads.motions)),
+        ("motions of points", len(tables.loads.point_motions)),
+        ("bolts", len(tables.loads.bolts)),
+        ("excavations", len(tables.loads.excavations)),
+    ):
+        lines += [f"{text}: {count}"] if count else []
+    if tables.loads.water is not None:
+        lines.append(f"water table over {counted(len(tables.loads.water.points), 'point')}")
+    if tables.loads.base is not None:
+        lines.append(f"shaking, seen from the {tables.loads.base.frame}")
+    if tables.loads.in_situ is not None:
+        lines.append("in-situ stress")
     return lines or ["none"]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .build import traction_history
+from .actions import traction_history
 from .checks import material_of
 from .errors import Check
 from .tables import SceneTables, TractionTable
