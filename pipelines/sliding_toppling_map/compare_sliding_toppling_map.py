@@ -1,0 +1,71 @@
+"""The map of sliding and toppling beside the boundaries of statics and dynamics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from geomech.reference.block_on_incline import MODES, failure_mode, toe_holds_above
+
+COLOURS = dict(zip(MODES, ("#8aa4a0", "#d9a441", "#c8553d", "#8d6a9f")))
+
+LIMITS = """\
+What this does and does not say
+  - One column on a rough incline, let go from rest; what it does later, on the way down, is another matter.
+  - Between toppling and toppling with sliding the boundary is dynamic: the toe of a column that starts to turn carries less
+    shear than one at rest (Bray & Goodman 1981; Sagaseta 1986). Ashby (1971) drew it at φ = α."""
+
+
+def expected(kind: str, angle: float, incline: float) -> float:
+    """The boundary ``kind`` at ``angle`` (rad)."""
+    if kind == "slides":
+        return toe_holds_above(angle, incline) if angle < incline else incline
+    return angle if kind == "slides and topples" else incline
+
+
+def report(incline: float, found: dict[str, np.ndarray]) -> str:
+    """``found``: kind → (n, 2) rad, the angle at which a boundary was sought and where it lies."""
+    rows = ["boundary                at        found     should be   (degrees)"]
+    for kind, table in found.items():
+        for at, where in np.degrees(table):
+            exact = np.degrees(expected(kind, np.radians(at), incline))
+            rows.append(f"{kind:<20} {'φ' if kind == 'topples' else 'δ'} = {at:4.1f} {where:10.4f} {exact:12.4f}")
+    return "\n".join([*rows, "", f"largest difference {np.degrees(worst(incline, found)):.4f}°", "", LIMITS])
+
+
+def worst(incline: float, found: dict[str, np.ndarray]) -> float:
+    return max(abs(where - expected(kind, at, incline)) for kind, table in found.items() for at, where in table)
+
+
+def draw(path: Path, incline: float, grid: list[tuple[float, float, str]], found: dict[str, np.ndarray]) -> None:
+    """``grid``: (δ, φ, mode) of columns that were let go."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.6, 6.6), layout="constrained")
+    axes = figure.subplots()
+    fine = np.linspace(0.1, 60, 400)
+    expected_mode = np.array(
+        [[MODES.index(failure_mode(np.radians(d), np.radians(f), incline)) for d in fine] for f in fine]
+    )
+    axes.pcolormesh(
+        fine, fine, expected_mode, cmap=ListedColormap([COLOURS[m] for m in MODES]), vmin=-0.5, vmax=3.5, alpha=0.28,
+        linewidth=0, rasterized=True,
+    )  # fmt: skip
+    for name in MODES:
+        own = np.array([(d, f) for d, f, what in grid if what == name])
+        axes.plot(*np.degrees(own).T, "o", ms=4, color=COLOURS[name], label=name)
+    along = np.vstack([table[:, ::-1] if kind == "topples" else table for kind, table in found.items()])
+    axes.plot(*np.degrees(along).T, "D", ms=6, mfc="white", mec="#2f3136", mew=1.4, label="boundary, by bisection")
+    axes.set(xlim=(0, 60), ylim=(0, 60), aspect="equal")
+    axes.set(
+        xlabel=r"slenderness angle $\delta$, $\tan\delta$ = width/height (degrees)",
+        ylabel=r"friction angle $\varphi$ (degrees)",
+    )
+    axes.set_title(
+        f"Columns let go on an incline of {np.degrees(incline):g}°; tints: Yagoda-Biran & Hatzor (2013)", fontsize=10
+    )
+    axes.legend(fontsize=9, loc="upper right", framealpha=0.95, edgecolor="none")
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=150)
