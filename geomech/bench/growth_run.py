@@ -15,8 +15,8 @@ from .crack_problems import ROCK, factors, specimen
 
 def measure(increments: int = 40) -> dict:
     """Both outer tips of the two slots grow along wings of 0.5 mm increments that turn to the load. Medians over the
-    increments and sums, s, the largest difference of a K between both ways, relative to the largest K, and how often all of the
-    crack unknowns' equations were factored on the way."""
+    increments and sums, s, the largest difference of a K between both ways, relative to the largest K, and how often
+    all of the crack unknowns' equations were factored on the way."""
     from ..ddm import Body
 
     problem = specimen()

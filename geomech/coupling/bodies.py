@@ -97,9 +97,9 @@ def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict, histo
 
 
 def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
-    """child → what the faces of its ``cracks`` remember (`ddm.FaceMemory`), from that of the parents, ``parent`` (n_children,).
-    Children keep their parent's reference coordinates, and so its memory; the work done by friction so far goes on with
-    one of them, or a sum over blocks would count it twice."""
+    """child → what the faces of its ``cracks`` remember (`ddm.FaceMemory`), from that of the parents, ``parent``
+    (n_children,). Children keep their parent's reference coordinates, and so its memory; the work done by friction so
+    far goes on with one of them, or a sum over blocks would count it twice."""
     found, told = {}, set()
     for child in np.unique(cracks.block).tolist():
         block = int(parent[child])

@@ -91,7 +91,7 @@ def largest_relative_release_rate(
     So F = (k_1/K_Ic)² + (k_2/K_IIc)² with the factors k_1, k_2 of an infinitesimal kink (`kink_factors`); a kink that
     closes (k_1 < 0) has only its second part. K_IIc = K_Ic makes it the energy criterion, an infinite K_IIc that of
     the largest k_1. What presses on the faces of a closed kink (friction, stress along the crack) does not come in: for a
-    kink of no length it vanishes beside k_1 and k_2. Kinks beyond 126° are not considered.
+    kink of no length it vanishes beside k_1 and k_2 (`trial_kinks` are of some length). Kinks beyond 126° are not considered.
     """
     k_i, k_ii = _tips(k_i, k_ii)
     share = material.k_ic / material.k_iic if np.isfinite(material.k_iic) else 0.0

@@ -310,7 +310,8 @@ def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set
 
 
 def copy_blocks(old: np.ndarray, out: np.ndarray, rows: np.ndarray, columns: np.ndarray, high: int, wide: int) -> None:
-    """Copy to ``out`` what it has of ``old``: blocks ``high`` × ``wide`` whose old numbers are ``rows`` and ``columns``, or −1."""
+    """Copy to ``out`` what it has of ``old``: blocks ``high`` × ``wide`` whose old numbers are ``rows`` and
+    ``columns``, or −1."""
     # Elements mostly keep their order: copying a few slices is several times faster than gathering.
     column_runs = list(_runs(columns))
     for r, was_r, m in _runs(rows):

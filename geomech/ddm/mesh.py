@@ -248,8 +248,8 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
 
 
 def _cut(cracks: Cracks, pieces: np.ndarray, inner: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Start, end and kind of the elements of all segments, ``pieces`` (n_segments,) of each; ``inner`` (m, 1) are the fractions
-    of the segments, one after the other, where they are cut."""
+    """Start, end and kind of the elements of all segments, ``pieces`` (n_segments,) of each; ``inner`` (m, 1) are the
+    fractions of the segments, one after the other, where they are cut."""
     total = int(pieces.sum())
     last = np.cumsum(pieces) - 1
     first = last - pieces + 1

@@ -32,8 +32,8 @@ DIRECTIONS = np.radians(np.arange(-120.0, 121.0, 10.0))
 
 
 def judged(solution: Solution, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """(n_tips,) angle and K_eq of the tips of ``solution`` by the criterion that ``growth`` asks for. Raises ValueError where it
-    is none, or one that trial kinks know nothing of."""
+    """(n_tips,) angle and K_eq of the tips of ``solution`` by the criterion that ``growth`` asks for. Raises
+    ValueError where it is none, or one that trial kinks know nothing of."""
     check_criterion(growth)
     if growth.trial_kink > 0:
         return driven(solution, growth.trial_kink, material)
@@ -51,9 +51,9 @@ def check_criterion(growth: GrowthSettings) -> None:
 
 
 def driven(solution: Solution, length: float, material: Material) -> tuple[np.ndarray, np.ndarray]:
-    """(n_tips,) angle of the kink with the largest F and its K_eq, Pa √m, from kinks of ``length`` m under the load, and with
-    the history, of ``solution``. Tips at which some kink does not fit into the rock, or its faces do not settle, are judged by
-    kinks of no length."""
+    """(n_tips,) angle of the kink with the largest F and its K_eq, Pa √m, from kinks of ``length`` m under the load,
+    and with the history, of ``solution``. Tips at which some kink does not fit into the rock, or its faces do not
+    settle, are judged by kinks of no length."""
     tips, body = solution.tips, solution.body
     n = len(tips)
     value = np.full((len(DIRECTIONS), n), np.nan)
@@ -126,8 +126,8 @@ def _body(body: Body, k: int, length: float, at: np.ndarray) -> Body:
 
 
 def _kinked(cracks: Cracks, tips: np.ndarray, angle: float, length: float) -> Cracks:
-    """``cracks`` with a segment more at each of ``tips`` (TIP rows), the nodes in their order behind all others. A trial has
-    no aperture: it is torn."""
+    """``cracks`` with a segment more at each of ``tips`` (TIP rows), the nodes in their order behind all others. A
+    trial has no aperture: it is torn."""
     n, n_nodes = len(tips), len(cracks.nodes)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
     owner = _owners(cracks, tips["node"])

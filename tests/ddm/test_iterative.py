@@ -155,8 +155,8 @@ def test_what_the_iteration_does_not_solve_is_factored_after_all(monkeypatch):
 
 
 def test_long_cracks_talk_from_end_to_end(monkeypatch):
-    """Two parallel cracks of 300 elements, cut by sixteen patches: coarse elements save half of the products (51 → 25), and do not
-    change the answer (residuals of 1e-11). A crack that winds has none, and is solved as before."""
+    """Two parallel cracks of 300 elements, cut by sixteen patches: coarse elements save half of the products (51 →
+    25), and do not change the answer (residuals of 1e-11). A crack that winds has none, and is solved as before."""
     from geomech.ddm import coarse
 
     x = np.array([-10.0, 10.0])

@@ -25,8 +25,9 @@ def pressed(confinement):
 
 
 def test_short_kinks_are_those_of_no_length():
-    """A kink of a thousandth of the crack under mixed load and under compression against the expansion of Amestoy & Leblond
-    (1992): what its length adds is of the order of √(1/1000), and a parabola over 10° costs a fraction of a degree."""
+    """A kink of a thousandth of the crack under mixed load and under compression against the expansion of Amestoy &
+    Leblond (1992): what its length adds is of the order of √(1/1000), and a parabola over 10° costs a fraction of a
+    degree."""
     opened = Cracks.from_polylines([[[-HALF, 0.0], [HALF, 0.0]]], aperture=math.inf)
     for cracks, load in ((opened, ddm.BodyLoad(remote_stress=[0, 1e6, 0.7e6])), (flaw(), pressed(0.0))):
         solution = ddm.Body([], cracks, ROCK, face_laws=LAW).solve(load)
@@ -37,10 +38,10 @@ def test_short_kinks_are_those_of_no_length():
 
 
 def test_confined_cracks_grow_in_shear():
-    """A closed crack with friction at 55°, σ3/σ1 = 0.2: kinks of no length make wings, at 76°; those of a tenth of the crack's half
-    are pressed shut and go straight on, driven by shear, at a K_eq that is K_II K_Ic/K_IIc (growth ahead keeps K_II to
-    some 10 %). Without confinement wings open all the same. Growth does as the criterion says, and reuses the trials of a
-    geometry for all loads."""
+    """A closed crack with friction at 55°, σ3/σ1 = 0.2: kinks of no length make wings, at 76°; those of a tenth of
+    the crack's half are pressed shut and go straight on, driven by shear, at a K_eq that is K_II K_Ic/K_IIc (growth
+    ahead keeps K_II to some 10 %). Without confinement wings open all the same. Growth does as the criterion says,
+    and reuses the trials of a geometry for all loads."""
     load = pressed(0.2)
     solution = ddm.Body([], flaw(), ROCK, face_laws=LAW).solve(load)
     wings, _ = CRITERIA["f"](solution.tips["k_i"], solution.tips["k_ii"], ROCK)

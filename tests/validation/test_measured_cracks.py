@@ -51,8 +51,8 @@ def test_slanted_cracks_start_where_they_were_seen_to():
 
 @pytest.mark.parametrize(("degrees", "friction"), [(45, 0.0), (45, 0.3), (54, 0.3), (60, 0.6)])
 def test_straight_wings_of_a_sliding_crack(degrees, friction):
-    """Horii & Nemat-Nasser (1986): K_I of wings along the load against l/c. Their formula (an interpolation between short and
-    long wings) is 1 to 10 % above, for all lengths and with friction as without."""
+    """Horii & Nemat-Nasser (1986): K_I of wings along the load against l/c. Their formula (an interpolation between
+    short and long wings) is 1 to 10 % above, for all lengths and with friction as without."""
     end = HALF * np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
     law = [JointLaw("flaw", friction_angle=math.atan(friction))]
     for ratio in (0.1, 0.3, 1.0, 2.0, 4.0):
@@ -66,10 +66,10 @@ def test_straight_wings_of_a_sliding_crack(degrees, friction):
 
 
 def test_wings_of_a_closed_crack_with_friction_grow_into_the_load():
-    """Growth of a closed crack at 54° with μ = 0.3 under the load that just drives it. Wings leave it turned by 70.5° (pure mode
-    II) and bend into the load's direction; every increment takes more load. Their K_I begins as the formula for straight
-    wings has it (1.0 at l/c = 0.3) and falls to 0.6 of it at l/c = 2: it is as long as they, but the load presses on the slanted
-    beginning, of which straight wings along the load have none."""
+    """Growth of a closed crack at 54° with μ = 0.3 under the load that just drives it. Wings leave it turned by 70.5°
+    (pure mode II) and bend into the load's direction; every increment takes more load. Their K_I begins as the
+    formula for straight wings has it (1.0 at l/c = 0.3) and falls to 0.6 of it at l/c = 2: it is as long as they, but
+    the load presses on the slanted beginning, of which straight wings along the load have none."""
     end = HALF * np.array([math.cos(math.radians(54)), math.sin(math.radians(54))])
     law = [JointLaw("flaw", friction_angle=math.atan(0.3))]
     cracks, growth = Cracks.from_polylines([[-end, end]]), GrowthSettings(increment=1e-3, min_increment=1e-3)
