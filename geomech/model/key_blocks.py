@@ -26,7 +26,7 @@ CLASSES = {
     FRICTION: "removable, held by strength",
     SLIDES: "key block, slides",
     FALLS: "key block, falls",
-    FIXED: "fixed",
+    FIXED: "fixed, or dug out",
     UNKNOWN: "not known before contacts have been sought",
 }
 
@@ -58,6 +58,8 @@ def key_blocks(
     joints = joints or (JointLaw("frictionless"),)
     out = np.zeros(blocks.n_blocks, KEY_BLOCK)
     fixed = np.asarray(blocks.fixed, dtype=bool)
+    if state.removed is not None:
+        fixed = fixed | state.removed
     out["direction"] = out["factor"] = np.nan
     out["kind"][fixed] = FIXED
     _rank(out, blocks, state, fixed)

@@ -52,7 +52,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
             "key_block",
             "cell",
             "-",
-            "between neighbours that stand: -2 not known yet, -1 fixed, 0 held by them, 1 removable but pushed in, 2 removable but held by "
+            "between neighbours that stand: -2 not known yet, -1 fixed or dug out, 0 held by them, 1 removable but pushed in, 2 removable but held by "
             "strength, 3 slides, 4 falls",
             dtype="int32",
         ),

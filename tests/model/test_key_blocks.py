@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -84,3 +86,7 @@ def test_blocks_are_ranked_by_how_far_they_have_moved():
     assert rows["rank"].tolist() == [3, 1, 2, 0]
     assert rows["displacement"] == pytest.approx([0, 0.1, 0, 0.3])
     assert rows["speed"][2] == 5.0
+    # What is dug out is out of the ranking.
+    gone = replace(state, removed=np.array([False, False, False, True]))
+    rows = key_blocks(blocks, [ROCK], [JointLaw("j")], gone, DOWN)
+    assert rows["kind"].tolist() == [FIXED, FALLS, FALLS, FIXED] and rows["rank"][1] == 0
