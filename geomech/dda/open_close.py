@@ -271,9 +271,9 @@ class _Equations:
             unknowns, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
             springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
         )  # fmt: skip
-        slip = _plastic(forces, state, found.shear, springs)
         known, missed = springs, None
         if self.curved is not None:
+            slip = _plastic(forces, state, found.shear, springs)
             known, known_gap = self.curved.lines(
                 self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
             )
@@ -288,8 +288,9 @@ class _Equations:
 def _settled(equations: _Equations, states: _States, answer: _Answer, iterations: int) -> Settled:
     forces, springs = answer.forces, answer.springs
     lifted = np.zeros(len(forces))
+    slip = _plastic(forces, states.state, equations.found.shear, springs)
     if equations.curved is not None:
-        lifted = springs.lift * np.where(springs.lift * states.direction < 0, answer.slip, forces[:, 3])
+        lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, forces[:, 3])
     return Settled(
         unknowns=answer.unknowns.reshape(-1, 6),
         state=states.state,
@@ -298,7 +299,7 @@ def _settled(equations: _Equations, states: _States, answer: _Answer, iterations
         normal_force=forces[:, 0],
         shear_force=forces[:, 1],
         gap=forces[:, 2] + springs.lift * forces[:, 3] - lifted - (answer.gap - equations.found.gap),
-        slip=answer.slip,
+        slip=slip,
         lifted=lifted,
         springs=springs,
         iterations=iterations,

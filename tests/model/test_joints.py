@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from geomech.ddm.face_laws import all_smooth
 from geomech.model import JointLaw, Roughness
 
 
@@ -39,3 +40,8 @@ def test_a_law_is_straight_until_something_bends_it():
     assert JointLaw("plain", 0.5, cohesion=1e4, tensile_strength=1e3, normal_stiffness=1e9).straight
     assert JointLaw("plain", 0.5, residual_friction_angle=0.5).straight
     assert not JointLaw("worn", 0.5, residual_friction_angle=0.4).straight
+
+
+def test_crack_faces_refuse_laws_they_cannot_follow():
+    with pytest.raises(ValueError, match="joint 'rough'.*without them"):
+        all_smooth([JointLaw("plain", 0.5), JointLaw("rough", 0.5, roughness=Roughness(10.0, 1e8))])
