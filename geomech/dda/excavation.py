@@ -31,6 +31,16 @@ class Excavations:
             self._known[past] = out
         return self._known[past]
 
+    def drained(self, loads: Loads, time: float) -> np.ndarray | None:
+        """(n_blocks,) True for those of them that took the water with them; None before anything is."""
+        if self.removed(loads, time) is None:
+            return None
+        out = np.zeros(self._blocks.n_blocks, bool)
+        for excavation in loads.excavations:
+            if excavation.drained and excavation.time <= time + _SAME * abs(time):
+                out[self._taken(excavation)] = True
+        return out
+
     def _taken(self, excavation: Excavation) -> list[int]:
         n = self._blocks.n_blocks
         for block in excavation.blocks:

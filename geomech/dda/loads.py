@@ -10,7 +10,7 @@ import numpy as np
 from ..model import Blocks, EdgeTraction, LinearProfile, Loads, WaterTable
 from .basis import material_weights
 from .force_rows import EDGE_FORCE, POINT_FORCE
-from .water import pressed_edges
+from .water import pressed_edges, wet_pieces
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +79,13 @@ class LoadMap:
         self.blocks = blocks
         self._edges: dict[tuple[str, LinearProfile | None], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
         self._points: dict[tuple[int, tuple[float, float]], np.ndarray] = {}
-        self._wet: tuple[WaterTable, np.ndarray] | None = None
+        self._wet: tuple[WaterTable, tuple[np.ndarray, np.ndarray]] | None = None
         self._removed: np.ndarray | None = None
+        self._drained: np.ndarray | None = None
 
-    def take_out(self, removed: np.ndarray | None) -> None:
-        """Load the blocks ``removed`` (n_blocks,) no more."""
-        self._removed, self._wet = removed, None
+    def take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
+        """Load the blocks ``removed`` (n_blocks,) no more; where ``drained`` ones lay against others, there is no water."""
+        self._removed, self._drained, self._wet = removed, drained, None
 
     def edges(self, load: EdgeTraction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Edges that ``load`` acts on, (n, 2) reference lengths times its profile at their two ends, and EDGE_FORCE rows for
@@ -144,15 +145,17 @@ class LoadMap:
             points, edges = points[~self._removed[points["block"]]], edges[~self._removed[edges["block"]]]
         return points, edges
 
-    def _wet_edges(self, water: WaterTable) -> np.ndarray:
-        """The edges of moving blocks that water may reach."""
+    def _wet_edges(self, water: WaterTable) -> tuple[np.ndarray, np.ndarray]:
+        """The pieces of edges of moving blocks that water may reach."""
         if self._wet is None or self._wet[0] is not water:
             known = self.blocks.edge_names
             for name in water.dry:
                 if name not in known:
                     raise ValueError(f"the water table leaves edges named {name!r} dry, but no edge has that name")
             dry = np.isin(self.blocks.edge_name, [known.index(name) for name in water.dry])
-            self._wet = water, np.flatnonzero(~dry & ~self.blocks.fixed[self.blocks.vertex_block])
+            out = self.blocks.fixed if self._removed is None else self.blocks.fixed | self._removed
+            edges = np.flatnonzero(~dry & ~out[self.blocks.vertex_block])
+            self._wet = water, wet_pieces(self.blocks, edges, self._drained)
         return self._wet[1]
 
 

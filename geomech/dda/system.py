@@ -76,7 +76,7 @@ class BlockSystem:
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
         self._finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus)
-        self._take_out(None)
+        self._take_out(None, None)
         rigid = np.array([m.rigid for m in self.materials])[of] & ~self._fixed
         self._rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
@@ -124,8 +124,9 @@ class BlockSystem:
         """(n_blocks,) True for blocks that ``loads`` have taken out by ``time``; None before any is."""
         return self._excavations.removed(loads, time)
 
-    def _take_out(self, removed: np.ndarray | None) -> None:
-        """Go on without the blocks ``removed`` (n_blocks,): they keep their place in all arrays, fixed and touching nothing."""
+    def _take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
+        """Go on without the blocks ``removed`` (n_blocks,): they keep their place in all arrays, fixed and touching nothing;
+        ``drained`` ones took the water with them."""
         self._removed = removed
         fixed = self.blocks.fixed if removed is None else self.blocks.fixed | removed
         self._fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
@@ -134,7 +135,7 @@ class BlockSystem:
         self._turns = ~self._fixed if self.blocks.held is None else ~(self._fixed | self.blocks.held[:, 2])
         self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
         self._finder.take_out(removed)
-        self._load_map.take_out(removed)
+        self._load_map.take_out(removed, drained)
 
     def step(
         self,
@@ -156,7 +157,7 @@ class BlockSystem:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
         removed = self.removed(loads, state.time)
         if removed is not self._removed:
-            self._take_out(removed)
+            self._take_out(removed, self._excavations.drained(loads, state.time))
         if load_time is None:
             dt = until_next_event(loads, state.time, dt)
         vertices = np.ascontiguousarray(state.vertices)

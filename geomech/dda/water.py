@@ -4,37 +4,72 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import WaterTable
+from ..model import Blocks, WaterTable
 from .force_rows import EDGE_FORCE
+
+#: Faces of drained blocks lie against others within this part of the drawing's size.
+_AGAINST = 1e-6
+
+
+def wet_pieces(blocks: Blocks, edges: np.ndarray, drained: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """(edges (n,), spans (n, 2) from 0 to 1 along them) of ``edges`` without what lies against ``drained`` (n_blocks,) blocks,
+    in reference positions."""
+    whole = np.tile([0.0, 1.0], (len(edges), 1))
+    if drained is None or not drained.any():
+        return edges, whole
+    start = blocks.vertices[edges]
+    along = blocks.vertices[blocks.next_vertex[edges]] - start
+    square = np.sum(along**2, axis=1)
+    near = _AGAINST * np.ptp(blocks.vertices, axis=0).max()
+    dry: dict[int, list[tuple[float, float]]] = {}
+    for gone in np.flatnonzero(drained[blocks.vertex_block]).tolist():
+        ends = blocks.vertices[[gone, blocks.next_vertex[gone]]]
+        arm = ends[:, None] - start
+        off = np.abs(along[:, 0] * arm[..., 1] - along[:, 1] * arm[..., 0]) / np.sqrt(square)
+        share = np.clip(np.sum(arm * along, axis=2) / square, 0.0, 1.0)
+        low, high = share.min(axis=0), share.max(axis=0)
+        for k in np.flatnonzero((off < near).all(axis=0) & ((high - low) * np.sqrt(square) > near)).tolist():
+            dry.setdefault(k, []).append((low[k], high[k]))
+    kept, spans = [], []
+    for k in range(len(edges)):
+        at = 0.0
+        for low, high in sorted(dry.get(k, [])):
+            if low > at:
+                kept.append(edges[k])
+                spans.append((at, low))
+            at = max(at, high)
+        if at < 1.0:
+            kept.append(edges[k])
+            spans.append((at, 1.0))
+    return np.array(kept, dtype=int), np.array(spans).reshape(-1, 2)
 
 
 def pressed_edges(
     water: WaterTable,
     time: float,
-    edges: np.ndarray,
+    pieces: tuple[np.ndarray, np.ndarray],
     owner: np.ndarray,
     vertices: np.ndarray,
     next_vertex: np.ndarray,
 ) -> np.ndarray:
-    """EDGE_FORCE rows of the water's pressure on ``edges`` (n,) of the current ``vertices``; ``owner`` (n_vertices,) and
-    ``next_vertex`` as in `Blocks`.
+    """EDGE_FORCE rows of the water's pressure on the ``pieces`` (as from `wet_pieces`) of edges of the current ``vertices``;
+    ``owner`` (n_vertices,) and ``next_vertex`` as in `Blocks`.
 
     p = γw · depth below the line, linear along every piece of an edge that lies wet and between two of the line's points.
     Around a block under a level table the pieces add up to γw times its wet area (Archimedes) to round-off.
     """
     line_x, line_y = np.asarray(water.points, dtype=float).T
     line_y = line_y + (0.0 if water.level is None else float(water.level.at(time)[0]))
+    edges, spans = pieces
     start = vertices[edges]
     along = vertices[next_vertex[edges]] - start
     low = np.minimum(start[:, 1], start[:, 1] + along[:, 1]) < line_y.max()
-    edges, start, along = edges[low], start[low], along[low]
-    shares = np.zeros((len(edges), 2))
-    shares[:, 1] = 1.0
+    edges, shares, start, along = edges[low], spans[low], start[low], along[low]
     if len(line_x) > 1:
         # Where the edge passes a point of the line, the pressure along it has a kink.
         with np.errstate(divide="ignore", invalid="ignore"):
             kinks = np.nan_to_num((line_x - start[:, :1]) / along[:, :1], nan=0.0, posinf=0.0, neginf=0.0)
-        shares = np.sort(np.hstack([shares, np.clip(kinks, 0.0, 1.0)]), axis=1)
+        shares = np.sort(np.hstack([shares, np.clip(kinks, shares[:, :1], shares[:, 1:])]), axis=1)
     row = np.repeat(np.arange(len(edges)), shares.shape[1] - 1)
     s0, s1 = shares[:, :-1].ravel(), shares[:, 1:].ravel()
     keep = s1 > s0

@@ -9,6 +9,7 @@ from geomech.model import (
     Blocks,
     DdaSettings,
     EdgeTraction,
+    Excavation,
     History,
     JointLaw,
     LinearProfile,
@@ -164,3 +165,57 @@ def test_uplift_takes_its_share_of_the_force_on_a_base():
     # Friction takes the thrust on the face; the line stands over nothing else (the far side is dry).
     assert rows["normal_force"].sum() == pytest.approx(weight - uplift, rel=1e-6)
     assert abs(rows["shear_force"].sum()) == pytest.approx(thrust, rel=1e-6)
+
+
+@pytest.mark.parametrize("drained", [True, False])
+def test_an_excavation_drains_the_faces_it_lays_open(drained):
+    # Block 1 leans on a lower and an upper block, all under 5 m of water: once the lower one is out, the water presses on what
+    # the upper one still covers, and on the other sides.
+    blocks = Blocks.from_polygons(
+        [rectangle(-5, -1, 5, 0), rectangle(0, 0, 1, 3), rectangle(1, 0, 2, 1.2), rectangle(1, 1.2, 2, 3)],
+        fixed=[True, False, False, False],
+    )
+    system = dda.BlockSystem(blocks, [ROCK], settings=DdaSettings(max_displacement_ratio=1.0))
+    loads = Loads(
+        gravity=History.constant([0.0, -9.81]),
+        water=WaterTable(np.array([[0.0, 5.0]])),
+        excavations=(Excavation(0.0, (2,), drained=drained),),
+    )
+    rows = system.step(State.at_rest(blocks), loads, 1e-6).forces.edges
+    assert not (rows["block"] == 2).any()
+    force = rows["force"][rows["block"] == 1].sum(axis=0)
+    # Drained, what pressed on the right below 1.2 m is missing: mean depth 4.4 m.
+    assert force == pytest.approx([9810 * 4.4 * 1.2 if drained else 0.0, 9810 * 3.0], rel=1e-12, abs=1e-8)
+    on_top = rows[(rows["block"] == 3) & (rows["start"][:, 1] == rows["end"][:, 1])]
+    assert len(on_top) == (1 if drained else 2)  # the upper block's underside
+
+
+def test_plane_failure_with_water_in_its_tension_crack():
+    # Hoek & Bray (1981), ch. 7: a wedge on a plane at ψ, cut off by a vertical tension crack with water z_w deep in it, the
+    # pressure falling from there linearly to the toe: U = ½ γw z_w A, V = ½ γw z_w²;
+    # F = (W cos ψ − U − V sin ψ) tan φ / (W sin ψ + V cos ψ). The piezometric line says the same.
+    slope, depth_of_water, unit = np.radians(35), 4.0, 9810.0
+    crack_foot = np.array([10.0, 10.0 * np.tan(slope)])
+    wedge = np.array([[0.0, 0.0], crack_foot, crack_foot + [0, 6.0], [6.0, crack_foot[1] + 6.0]])
+    c, s = np.cos(slope), np.sin(slope)
+    ground = np.array([[-3 * c, -3 * s], [-3 * c + s, -3 * s - c], [14.0, -3.0], [14.0, 14 * np.tan(slope)]])
+    back = np.array([crack_foot, [14.0, 14 * np.tan(slope)], [14.0, 14.0], [10.0, 14.0]])
+    blocks = Blocks.from_polygons(
+        [ground, back, wedge], fixed=[True, True, False], edge_names=[[[""] * 4], [[""] * 4], [["", "", "top", "face"]]]
+    )
+    line = np.array([[0.0, 0.0], [10.0, crack_foot[1] + depth_of_water]])
+    loads = Loads(gravity=History.constant([0.0, -9.81]), water=WaterTable(line, unit))
+    u, v = 0.5 * unit * depth_of_water * np.hypot(*crack_foot), 0.5 * unit * depth_of_water**2
+    water = LoadMap(blocks).rows(loads, 0.0, blocks.vertices, np.zeros(3))[1]
+    assert set(water["edge"].tolist()) == {8, 9}  # plane and crack; the line runs below the face and the top
+    assert water["force"].sum(axis=0) == pytest.approx([-v - u * s, u * c], rel=1e-12)
+    weight = 2600 * 9.81 * blocks.areas()[2]
+    balance = (weight * s + v * c) / (weight * c - u - v * s)
+    # It holds just above the friction that balances. Just below it slides: a quarter of a metre, until so much of it has left
+    # the water, which stays where its line is, that it holds again.
+    for factor, most in ((1.01, 1e-3), (0.99, np.inf)):
+        joint = JointLaw("joint", friction_angle=float(np.arctan(factor * balance)))
+        system = dda.BlockSystem(blocks, [ROCK], [joint], settings=DdaSettings(max_displacement_ratio=0.5))
+        found = dda.equilibrium(system, State.at_rest(blocks), loads)
+        slid = np.hypot(*(found.state.vertices - blocks.vertices)[8])
+        assert slid < most if factor > 1 else slid > 0.1
