@@ -48,6 +48,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
         Field("block_id", "cell", "-", "index of the block", dtype="int32"),
         Field("material", "cell", "-", "index of the block's material", dtype="int32"),
         Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
+        Field("removed", "cell", "-", "1 where the block has been taken out", dtype="int32"),
         Field(
             "key_block",
             "cell",

@@ -70,6 +70,7 @@ def blocks_grid(
             "block_id": owner,
             "material": blocks.material[owner],
             "fixed": blocks.fixed[owner],
+            "removed": np.zeros(len(owner), bool) if state.removed is None else state.removed[owner],
             "key_block": keys.kind(cycle)[owner],
             "displacement_rank": _rank(blocks, state)[owner],
         },
