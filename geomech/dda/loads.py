@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from ..model import Blocks, EdgeTraction, LinearProfile, Loads, WaterTable
 from .basis import material_weights
@@ -168,18 +169,37 @@ def _turned(vector: np.ndarray, angle: np.ndarray) -> np.ndarray:
 def generalised(points: np.ndarray, edges: np.ndarray, centroid: np.ndarray) -> np.ndarray:
     """(n_blocks, 6) ∫ Tᵀ t ds and Σ Tᵀ F of EDGE_FORCE and POINT_FORCE rows; N and N m."""
     out = np.zeros((len(centroid), 6))
-    acting = [(points["block"], points["point"], points["force"])] if len(points) else []
-    if len(edges):
-        # ∫ t and ∫ x ⊗ t of a linear traction are those of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at its ends.
-        along, (t0, t1) = edges["end"] - edges["start"], np.moveaxis(edges["traction"], 1, 0)
-        sixth = np.hypot(along[:, 0], along[:, 1])[:, None] / 6
-        acting += [
-            (edges["block"], edges["start"], sixth * (2 * t0 + t1)),
-            (edges["block"], edges["end"], sixth * (t0 + 2 * t1)),
-        ]
-    for block, at, force in acting:
-        x, y = (at - centroid[block]).T
-        fx, fy = force.T
-        rows = np.stack([fx, fy, x * fy - y * fx, x * fx, y * fy, 0.5 * (y * fx + x * fy)], axis=1)
-        np.add.at(out, block, rows)
+    if len(points) or len(edges):
+        _gather(
+            out, centroid, points["block"], points["point"], points["force"], edges["block"], edges["start"],
+            edges["end"], edges["traction"],
+        )  # fmt: skip
     return out
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _add(row, x, y, fx, fy):
+    row[0] += fx
+    row[1] += fy
+    row[2] += x * fy - y * fx
+    row[3] += x * fx
+    row[4] += y * fy
+    row[5] += 0.5 * (y * fx + x * fy)
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _gather(out, centroid, point_block, point, force, edge_block, start, end, traction):
+    """Add to ``out`` (n_blocks, 6) the generalised forces about ``centroid`` (n_blocks, 2) of forces at points, and of linear
+    tractions: ∫ t and ∫ x ⊗ t are those of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at the ends."""
+    for i in range(len(point_block)):
+        b = point_block[i]
+        _add(out[b], point[i, 0] - centroid[b, 0], point[i, 1] - centroid[b, 1], force[i, 0], force[i, 1])
+    for i in range(len(edge_block)):
+        b = edge_block[i]
+        dx, dy = end[i, 0] - start[i, 0], end[i, 1] - start[i, 1]
+        sixth = np.sqrt(dx * dx + dy * dy) / 6.0
+        for side in range(2):
+            fx = sixth * (traction[i, side, 0] * 2.0 + traction[i, 1 - side, 0])
+            fy = sixth * (traction[i, side, 1] * 2.0 + traction[i, 1 - side, 1])
+            at = start if side == 0 else end
+            _add(out[b], at[i, 0] - centroid[b, 0], at[i, 1] - centroid[b, 1], fx, fy)
