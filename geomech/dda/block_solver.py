@@ -105,6 +105,19 @@ class BlockSolver:
 
     def solve(self, data: np.ndarray, right: np.ndarray) -> np.ndarray:
         """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row. Raises numpy.linalg.LinAlgError."""
+        if self._factors.single:
+            try:
+                x = self._solved(data, right)
+            except np.linalg.LinAlgError:
+                x = None
+            if x is not None:
+                return x
+            # Beyond single precision: double from now on.
+            self._factors, self._has_factors = Factors(*self._pattern), False
+        return self._solved(data, right)
+
+    def _solved(self, data: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+        """`solve` with the factors as they are; None where single precision does not do."""
         if self._has_factors:
             changed = _changed(data, self._diagonal, self._factored, CHANGED)
             if np.count_nonzero(changed) > (0 if self._factors.tree.kept else FEW):
@@ -114,11 +127,7 @@ class BlockSolver:
                 return x
         self.factor(data)
         if self._factors.single:
-            x = self._iterate(data, right)
-            if x is not None:
-                return x
-            self._factors = Factors(*self._pattern)
-            self.factor(data)
+            return self._iterate(data, right)
         x = self.substitute(right)
         for _ in range(REFINEMENTS):
             rest, target = self._residual(data, right, x)
@@ -156,8 +165,11 @@ class BlockSolver:
         x = self.substitute(right)
         for _ in range(3):
             rest, target = self._residual(data, right, x)
-            if not np.abs(rest).max() > target:
+            largest = float(np.abs(rest).max(initial=0.0))
+            if largest <= target:
                 return x
+            if not np.isfinite(largest):
+                return None
             step = self._krylov(data, rest, target)
             if step is None:
                 return None

@@ -225,15 +225,19 @@ class BlockSystem:
     def _pattern(
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
     ) -> assembly.Pattern:
-        known = block
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
         if int(self._free.max()) + 1 <= assembly.DENSE_BLOCKS:
             return assembly.dense_pattern(self._free, block, other)
-        if self._sparse is None or self._sparse[0] is not known or len(self._sparse[1].upper) != len(block):
-            kept = None if self._sparse is None else self._sparse[1].solver
-            self._sparse = known, assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
-        return self._sparse[1]
+        pairs, pattern = np.stack([block, other]), None
+        if self._sparse is not None:
+            known, pattern = self._sparse
+            if pattern.order is self._free and np.array_equal(known, pairs):
+                return pattern
+        kept = None if pattern is None else pattern.solver
+        pattern = assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
+        self._sparse = pairs, pattern
+        return pattern
 
     def _settled(self, pattern, matrix, right, found, vectors, springs, gap, curved) -> Settled:
         def solve(contacts: ContactSet, start: np.ndarray) -> Settled:
