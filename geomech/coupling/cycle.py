@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from .. import dda
+from ..dda.excavation import until_next_event
 from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
 from ..model.polygon import winding_number
@@ -96,10 +97,10 @@ class Coupling:
         stops, load_time = False, None
         static = self.problem.dda.dynamic_factor == 0.0
         if static and self.problem.dda.equilibrium == "loads":
-            collapse = self._relax(self.state.time + dt)
+            load_time = self.state.time + until_next_event(self.problem.loads, self.state.time, dt)
+            collapse = self._relax(load_time)
             if collapse:
                 self.number += 1
-                self.state = replace(self.state, time=self.state.time + dt)
                 yield self._record(self.state, np.empty(0, TIP), {}, collapse, 0, {})
                 return True
         for growth_pass in range(self.problem.growth.max_passes + 1):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,3 +81,24 @@ def test_a_run_ends_where_there_is_none_and_names_what_moves(when):
     assert event.kind == "collapse"
     assert "'upper', 'lower' move" in event.detail or "'lower', 'upper' move" in event.detail
     assert len(seen) == (1 if when == "start" else 2)
+
+
+def test_motion_that_is_given_is_given_once():
+    # A guided plate pushes the column down by 1 mm in all, half of it at each load.
+    from geomech.model import BlockMotion
+
+    pushed = History(np.array([0.0, 1.0]), np.array([[0.0], [-1e-3]]))
+    problem = column(History.constant([0.0, 0.0]), equilibrium="loads")
+    vertices = problem.blocks.vertices.copy()
+    vertices[4:, 1] -= 0.02
+    problem = replace(
+        problem,
+        blocks=problem.blocks.with_vertices(vertices),
+        loads=Loads(block_motions=(BlockMotion(2, pushed, ("v0",)),)),
+    )
+    seen = list(cycles(problem))
+    centre = [
+        s.blocks.mean_vertices(s.state.vertices)[2, 1] - s.blocks.mean_vertices(s.blocks.vertices)[2, 1] for s in seen
+    ]
+    assert [s.state.time for s in seen] == pytest.approx([0.0, 0.5, 1.0])
+    assert centre == pytest.approx([0.0, -0.5e-3, -1e-3], abs=1e-12)
