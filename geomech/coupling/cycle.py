@@ -101,6 +101,7 @@ class Coupling:
             collapse = self._relax(load_time)
             if collapse:
                 self.number += 1
+                self.state = replace(self.state, time=load_time)
                 yield self._record(self.state, np.empty(0, TIP), {}, collapse, 0, {})
                 return True
         for growth_pass in range(self.problem.growth.max_passes + 1):

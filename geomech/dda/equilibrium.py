@@ -49,7 +49,7 @@ _PENALTY = 40.0
 class Equilibrium:
     """Where static relaxation ended.
 
-    state       at the time of the loads, with no velocity
+    state       at the time it began, with no velocity
     converged   True: the unbalanced force is below the tolerance
     collapsed   True: there is no equilibrium within reach; ``moving`` says which blocks go, the fastest first
     reason      one sentence
@@ -89,12 +89,10 @@ def equilibrium(
     blocks = system.blocks
     static = system if system.scheme.static else system.in_statics()
     time = state.time if load_time is None else load_time
-    state = replace(state, velocity=np.zeros_like(state.velocity), acceleration=None)
+    begin = state = replace(state, velocity=np.zeros_like(state.velocity), acceleration=None)
     free = np.flatnonzero(~blocks.fixed)
     if not len(free):
-        return Equilibrium(
-            replace(state, time=time), True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), None
-        )
+        return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), None)
     reach = 0.1 * float(np.hypot(*np.ptp(blocks.vertices, axis=0))) if reach is None else reach
     dt, longest = _pseudo_times(static)
     history: list[np.void] = []
@@ -109,7 +107,7 @@ def equilibrium(
             moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
             named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
             reason += f"; {named}{' and others' if len(moving) > 5 else ''} move"
-        rest = replace(state, time=time, velocity=np.zeros_like(state.velocity))
+        rest = replace(state, time=begin.time, velocity=np.zeros_like(state.velocity))
         rows = np.array(history, RELAXATION_STEP) if history else np.empty(0, RELAXATION_STEP)
         log.info("static equilibrium: %s (%d steps)", reason, len(rows))
         return Equilibrium(rest, converged, collapsed, moving, reason, rows, result)
