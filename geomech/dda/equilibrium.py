@@ -141,7 +141,7 @@ def equilibrium(
         travelled += moved
         if travelled.max() > reach:
             return answer(False, True, f"no equilibrium: blocks have moved {travelled.max():.3g} m and go on")
-        moves_far = statistics["max_displacement_ratio"] * static.half_height > _NEARLY * static.longest_move
+        moves_far = statistics["max_displacement_ratio"] > _NEARLY * static.allowed_ratio
         dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
     return answer(False, False, f"unbalanced force {history[-1]['unbalanced']:.2g} after {max_steps} steps")
 

@@ -94,7 +94,7 @@ class BlockSystem:
         self._mass = self.density * areas
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
         self._slack = _SLACK * float(np.abs(vertices).max())
-        self.longest_move = min(
+        self._limit = min(
             self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
         )
         self._tolerance = self._allowed_penetration(float(np.sqrt(areas.min())))
@@ -166,7 +166,7 @@ class BlockSystem:
         moments = block_moments(vertices, self._next, self._start)
         if state.time == 0.0 and len(state.contacts) == 0:
             refuse_overlap(self.blocks, vertices, moments)
-        limit = self.longest_move
+        limit = self._limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
         found = self._finder.find(state, vertices, _WINDOW * limit)
         reason, before = "", np.inf
