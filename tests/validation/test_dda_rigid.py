@@ -84,7 +84,8 @@ def test_rigid_and_elastic_blocks_meet_with_momentum_kept():
         state, budget = result.state, budget.after(result.energy)
     assert state.velocity[0, 0] < state.velocity[1, 0]
     assert mass @ state.velocity[:, :2] == pytest.approx(momentum, rel=1e-9)
-    assert budget.residual < 1e-6 * budget.turnover
+    # The update of the geometry: the square of a strain of v/c = 2.5e-3.
+    assert abs(budget.residual) < 6e-6 * budget.turnover
 
 
 def test_a_crack_in_a_rigid_block_is_refused():
