@@ -172,7 +172,8 @@ class CentralPath:
         # Motions: what makes the gap and the motion along the edge 0 where no force acts.
         self._g, self._s = gap[some] - self._pull / self._kn, -found.shear[some] / self._ks
         self._centre(_START * self._unit)
-        self.ended = False
+        self._load = max(float(np.abs(right).max()), 1e-300)
+        self.missed, self.ended = 1.0, False
 
     def _centre(self, epsilon: np.ndarray) -> None:
         """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""
@@ -248,6 +249,7 @@ class CentralPath:
         self._normal, self._width = normal + far * changes[0], width + far * changes[1]
         self._shear = self._shear + far * d_shear
         self._slip = np.stack([back + far * changes[2], ahead + far * changes[3]])
+        self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
         self.ended = not (epsilon > _END and far > _STUCK)
         return int(self._undecided().sum())
 

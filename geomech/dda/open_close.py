@@ -28,17 +28,21 @@ from .contact_springs import Springs
 from .contacts import ContactSet
 from .curved_joints import CurvedJoints
 
-#: Which of the contacts that are wrong are switched.
-_ALL, _WORST, _FIRST = 0, 1, 2
+#: Which of the contacts that are wrong are switched: all, those of each block that are half as wrong as its worst, its
+#: worst, the first.
+_ALL, _SOME, _WORST, _FIRST = 0, 1, 2, 3
 #: Switching all goes on while the number of wrong contacts falls to this part of the fewest so far, …
 _FEWER = 0.55
 #: … or for so many iterations although it does not.
 _TRIES = 1
-#: So few contacts are switched with caution first, which takes three iterations where the path takes fifteen, and asked of
-#: the path only after so many iterations.
+#: If no more than this many contacts are still wrong then, only some are switched, while that helps or for so many iterations.
+_LITTLE, _MORE = 12, 5
+#: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path takes
+#: fifteen; it is asked after so many iterations.
 _FEW, _CAUTIOUS = 40, 12
-#: The central path proposes states when no more than this part of the contacts are undecided.
-_DECIDED = 0.006
+#: The central path proposes states when no more than this part of the contacts are undecided, and no more than this part of
+#: the forces on blocks is out of balance.
+_DECIDED, _BALANCED = 0.006, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,19 +310,22 @@ def _settled(equations: _Equations, states: _States, answer: _Answer, iterations
     )
 
 
-def _proposed(path: CentralPath, n: int, budget: int) -> tuple[bool, int]:
-    """Whether nearly all of ``n`` contacts are decided before the ``path`` ends, and the iterations spent, at most
-    ``budget``. Raises `Unsettled`."""
+def _proposed(path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int) -> tuple[_States | None, int]:
+    """States that the ``path`` proposes once nearly all contacts are decided, none of those ``offered`` already, or None if
+    it ends or takes more than ``budget`` iterations; and the iterations spent. Raises `Unsettled`."""
     for spent in range(1, budget + 1):
         try:
             undecided = path.advance()
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         if path.ended:
-            return False, spent
-        if undecided <= max(2, _DECIDED * n):
-            return True, spent
-    return False, budget
+            return None, spent
+        if undecided <= max(2, _DECIDED * len(bonded)) and path.missed < _BALANCED:
+            states = _States(*path.states(), bonded)
+            if states.key not in offered:
+                offered.add(states.key)
+                return states, spent
+    return None, max(budget, 0)
 
 
 def settle(
@@ -343,6 +350,7 @@ def settle(
     states = _States(found.state, found.direction, found.bonded)
     normal_force, slip = found.normal, np.zeros(len(found))
     seen: set[bytes] = set()
+    offered: set[bytes] = set()
     path: CentralPath | None = None
     caution, fewest, tries = _ALL, np.inf, 0
     few = len(found) <= _FEW
@@ -359,26 +367,36 @@ def settle(
         if not wrong.any():
             continue
         number = int(wrong.sum())
-        # Bonds are lost for good: none breaks before the contacts without are right, and the most strained break first.
         bonds = wrong & (states.bonded > 0)
-        if not (wrong & ~bonds).any():
+        if bonds.sum() == number:
+            # Bonds are lost for good: none breaks before all else is right, and the most strained break first.
             wrong = bonds & _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 0.5)
-        else:
-            wrong &= ~bonds
+            states, caution, fewest, tries = states.switched(wrong, answer.called), _ALL, np.inf, 0
+            continue
+        wrong &= ~bonds
         returned = states.key in seen
         seen.add(states.key)
         tries = 0 if number <= _FEWER * fewest else tries + 1
         fewest = min(fewest, number)
         stuck = caution == _ALL and (returned or tries > _TRIES)
-        if (stuck and not few) or (few and path is None and iteration > _CAUTIOUS):
+        tired = caution == _SOME and (returned or tries > _MORE)
+        if few and path is None:
+            tired = iteration > _CAUTIOUS or (caution == _FIRST and returned)
+        if stuck and not few and number <= _LITTLE:
+            caution, tries = _SOME, 0
+            seen.clear()
+        elif tired or (stuck and not (few and path is None)):
             if path is None or not np.array_equal(path.bonded, states.bonded):
                 path = CentralPath(pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded)
-            proposed, spent = _proposed(path, len(found), max_iterations - iteration - 1)
+            # The last sixth of the iterations is kept for the careful ways.
+            proposal, spent = _proposed(path, states.bonded, offered, (5 * max_iterations) // 6 - iteration)
             iteration += spent
-            if proposed:
-                states, fewest, tries = _States(*path.states(), states.bonded), np.inf, 0
+            seen.clear()
+            if proposal is not None:
+                states, caution, fewest, tries = proposal, _ALL, np.inf, 0
                 continue
-        if stuck:
+            stuck = True
+        if stuck and caution != _SOME or tired:
             caution = _WORST
             seen.clear()
             # A body held by sliding contacts alone has nothing but its inertia against the least imbalance: begin again
@@ -386,17 +404,21 @@ def settle(
             rough = (springs.friction > 0) & (states.state == SLIP)
             states = _States(np.where(rough, STICK, states.state), states.direction, states.bonded)
             continue
-        if caution == _WORST:
-            if returned:
-                caution = _FIRST
-            wrong &= _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 1.0)
-        if caution == _FIRST:
+        if caution == _FIRST and returned:
+            break
+        if caution == _WORST and returned:
+            caution = _FIRST
+            seen.clear()
+        if caution in (_SOME, _WORST):
+            share = 0.5 if caution == _SOME else 1.0
+            wrong &= _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, share)
+        elif caution == _FIRST:
             wrong[int(wrong.argmax()) + 1 :] = False
         states = states.switched(wrong, answer.called)
     worst = int((answer.violation if answer.violation.any() else answer.missed).argmax())
     name = ("open", "sticking", "sliding")
     raise Unsettled(
-        f"contact states did not settle in {max_iterations} open-close iterations; a contact that was "
+        f"contact states did not settle in {iteration} open-close iterations; a contact that was "
         f"{name[states.state[worst]]} still disagrees with its motion",
         worst,
     )
