@@ -10,21 +10,29 @@ import numpy as np
 from geomech.model import OPEN, SLIP, Cycle, Problem
 from geomech.model.key_blocks import CLASSES, FIXED, key_blocks
 
-#: Blocks are at rest when less than this part of the forces on any of them is left to move it.
-AT_REST = 1e-3
+#: Blocks are at rest, but for small vibrations, when less than this part of the forces on any of them is left to move it …
+AT_REST = 1e-2
+#: … and their kinetic energy is below this part of what blocks and contacts store: what slides steadily is balanced too.
+STILL = 1e-2
 #: So many blocks are named.
 NAMED = 5
 
 
 def condition(cycle: Cycle) -> str:
-    """One of "at rest", "sliding" (along joints that stay closed), "moving"; "" before the first step."""
-    unbalanced = cycle.statistics.get("unbalanced_ratio", math.nan)
+    """One of "at rest", "sliding" (every block that moves keeps touching others), "moving"; "" before the first step."""
+    statistics = cycle.statistics
+    unbalanced = statistics.get("unbalanced_ratio", math.nan)
     if math.isnan(unbalanced):
         return ""
-    if unbalanced < AT_REST:
+    strained = statistics.get("elastic_energy", 0.0) + statistics.get("contact_energy", 0.0)
+    if unbalanced < AT_REST and statistics["kinetic_energy"] <= STILL * strained:
         return "at rest"
-    contacts = cycle.state.contacts
-    return "sliding" if (contacts["state"] == SLIP).any() and (contacts["state"] != OPEN).all() else "moving"
+    contacts, alone = cycle.state.contacts, ~np.asarray(cycle.blocks.fixed, dtype=bool)
+    if cycle.state.removed is not None:
+        alone &= ~cycle.state.removed
+    closed = contacts[contacts["state"] != OPEN]
+    alone[closed["block"]] = alone[closed["other"]] = False
+    return "sliding" if (closed["state"] == SLIP).any() and not alone.any() else "moving"
 
 
 def told(cycle: Cycle) -> str:

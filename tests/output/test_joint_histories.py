@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import synthetic_run as made
 
-from geomech.output import JointHistories
+from geomech.output import JointHistories, standard_observers
 from geomech.output.condition import closing, condition, told
 from geomech.output.fields import JOINTS, REACTIONS
 
@@ -30,13 +32,17 @@ def test_every_cycle_leaves_a_row_a_joint_and_a_support(tmp_path):
 
 
 def test_condition_is_read_from_the_unbalanced_force_and_the_contacts():
-    cycle = replace(made.cycle(1, 1, 0, 0), cracks=made.cycle(0, 0, 0, 0).cracks)
+    cycle = made.cycle(1, 1, 0, 0)
+    cycle = replace(cycle, blocks=replace(cycle.blocks, fixed=np.array([True, False, True])))
     assert condition(cycle) == "" and told(cycle) == "starting"
 
     def at(ratio: float):
         return replace(cycle, statistics={"unbalanced_ratio": ratio, "kinetic_energy": 12.0, "step_cuts": 3})
 
-    assert condition(at(1e-6)) == "at rest"
+    # Balanced, but with more energy in motion than in springs: it slides steadily.
+    assert condition(at(1e-6)) == "sliding"
+    stored = replace(cycle, statistics={"unbalanced_ratio": 1e-6, "kinetic_energy": 1e-9, "elastic_energy": 1.0})
+    assert condition(stored) == "at rest"
     assert condition(at(0.2)) == "sliding"
     assert told(at(0.2)) == "sliding, unbalanced 2.0e-01, kinetic energy 12 J/m, 1 contacts slide, step cut 3 times"
     contacts = cycle.state.contacts.copy()
@@ -56,3 +62,14 @@ def test_closing_lines_name_what_moved():
     assert lines[0].startswith("  sliding: unbalanced force 1.0e-01")
     assert lines[1] == "  wedge         moved 0.2 m, key block, slides towards -40°, factor 0.90"
     assert closing({}) == []
+
+
+@pytest.mark.parametrize(
+    ("joints", "cracks", "written"), [(None, 0, True), (None, 1, False), (True, 1, True), (False, 0, False)]
+)
+def test_scenes_with_cracks_write_joints_when_asked(joints, cracks, written):
+    scene = SimpleNamespace(
+        output=SimpleNamespace(joints=joints), cracks=SimpleNamespace(n_cracks=cracks), resolved=dict
+    )
+    watchers = standard_observers(scene, quiet=True)
+    assert any(isinstance(watcher, JointHistories) for watcher in watchers) == written
