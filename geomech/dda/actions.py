@@ -117,14 +117,16 @@ class StepActions:
             )  # fmt: skip
             self.imposed.impose(matrix, right, [contacts, *self._bolted()], self.order)
         if shift.any():
+            geometry = found.geometry.copy()
+            geometry[:, 3] += shift[:, 0]
             shear = found.shear - springs.shear * shift[:, 1]
-            found = replace(found, shear=shear, stretch=found.stretch + shift[:, 1])
+            found = replace(found, geometry=geometry, shear=shear, stretch=found.stretch + shift[:, 1])
             gap = gap + shift[:, 0]
         settled = self._with_bolts(pattern, matrix, right, found, gap, settle)
         unknowns = settled.unknowns
         if self.imposed is not None:
             unknowns = self.imposed.recover(unknowns, self.order)
-        return replace(settled, gap=settled.gap + shift[:, 0]) if shift.any() else settled, unknowns
+        return settled, unknowns
 
     def _bolted(self) -> list[Pairs]:
         return [] if self.bolts is None else [self.bolts.pairs]

@@ -8,6 +8,7 @@ from geomech.model import (
     BaseMotion,
     BlockMotion,
     Blocks,
+    Bolt,
     DdaSettings,
     EdgeTraction,
     Excavation,
@@ -290,3 +291,46 @@ def test_an_excavation_that_takes_nothing_is_refused():
         system.step(State.at_rest(blocks), Loads(excavations=(Excavation(0.0, (7,)),)), 1.0)
     with pytest.raises(ValueError, match="names no blocks"):
         Excavation(1.0)
+
+
+# -- together with the rest --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_a_platen_drives_contacts_that_do_not_penetrate(friction):
+    blocks, _ = press(platen_fixed=True)
+    settings = DdaSettings(max_displacement_ratio=1.0, contact="augmented")
+    system = dda.BlockSystem(blocks, [ROCK], [JointLaw("joint", friction_angle=friction)], settings=settings)
+    driven = Loads(block_motions=(BlockMotion(2, History.ramp([2e-5, -1e-4]), ("u0", "v0")),))
+    result = march(system, State.at_rest(blocks), driven, 5, 1.0)
+    stress, strain = result.state.stress[1], -5e-4 / 2
+    if friction == 0.0:
+        expected = np.array([0.0, ROCK.plane_modulus * strain, 0.0])
+    else:
+        # Stuck to both: no strain along x, shear u/h.
+        m, nu = ROCK.stiffness(), 5e-4 / 5 / 2
+        expected = m @ np.array([0.0, strain, nu])
+    # Nothing is lost to springs; five steps add up the strain of a block that gets shorter by 2.5e-4 (Coulomb aside).
+    assert stress == pytest.approx(expected, rel=5e-4, abs=1.0)
+    assert result.statistics["reaction_y:platen"] == pytest.approx(2 * stress[1], rel=5e-4)
+
+
+@pytest.mark.parametrize("newmark", [(0.5, 1.0), (0.25, 0.5)])
+def test_the_work_of_a_shaken_base_and_of_a_yielding_bolt_closes_the_energy_budget(newmark):
+    blocks = Blocks.from_polygons(
+        [rectangle(-6, -1, 6, 0), rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2)], fixed=[True, False, False]
+    )
+    settings = DdaSettings(max_displacement_ratio=0.1, dynamic_factor=1.0, newmark=newmark)
+    system = dda.BlockSystem(blocks, [ROCK], [JointLaw("joint", friction_angle=0.3)], settings=settings)
+    loads = Loads(
+        gravity=GRAVITY,
+        base=BaseMotion(History.sinusoid([4.0, 1.0], 3.0)),
+        bolts=(Bolt(1, (0.5, 0.5), 2, (0.5, 1.5), 1e8, pretension=1e4, yield_force=2e4),),
+    )
+    state, budget = State.at_rest(blocks), dda.EnergyBudget()
+    for _ in range(150):
+        result = system.step(state, loads, 2e-3)
+        state, budget = result.state, budget.after(result.energy, result.state.time)
+    assert budget.friction > 10.0 and abs(budget.load_work) > 100.0
+    # Between steps the geometry is updated exactly where the step was linear; elastic strains here are 1e-6.
+    assert abs(budget.residual) < 1e-6 * abs(budget.load_work)
