@@ -26,6 +26,9 @@ from .open_close import Settled, Unsettled
 _DEPTH = 12
 #: Updates of the multipliers before the step is cut. Springs as soft as the blocks take about ten in statics.
 _MOST_UPDATES = 60
+#: After so many, and again and again, the springs become so much stiffer (Bertsekas 1982): soft ones in short steps are slow
+#: where states still change.
+_PATIENCE, _STIFFER = 10, 5.0
 
 
 class _Mixing:
@@ -51,15 +54,15 @@ class _Mixing:
 
 
 def settle_augmented(
-    solve: Callable[[ContactSet, np.ndarray], Settled],
+    solve: Callable[[ContactSet, Springs, np.ndarray], Settled],
     found: ContactSet,
     springs: Springs,
     gap: np.ndarray,
     held: tuple[np.ndarray, np.ndarray],
     tolerance: float,
 ) -> Settled:
-    """The settled step of ``found`` with multipliers; ``solve`` (contacts, starting gaps) iterates open–close states on the
-    ``springs`` and starting ``gap`` (n,) of the step, ``held`` (n,) twice says which contacts have penalty springs, normal
+    """The settled step of ``found`` with multipliers; ``solve`` (contacts, springs, starting gaps) iterates open–close
+    states; ``springs`` and starting ``gap`` (n,) are those of the step, ``held`` (n,) twice says which contacts have penalty springs, normal
     and shear. ``tolerance`` m.
 
     Raises `Unsettled` when the multipliers do not settle.
@@ -70,10 +73,15 @@ def settle_augmented(
     multiplier = np.concatenate([np.where(pressed, found.normal, 0.0), np.where(drawn, found.shear, 0.0)])
     stretch = np.where(drawn, found.stretch, 0.0)
     mixing, iterations = _Mixing(), 0
-    for _ in range(_MOST_UPDATES):
+    for update in range(_MOST_UPDATES):
+        if update and update % _PATIENCE == 0:
+            more = np.where(held[0], (_STIFFER - 1.0) * springs.normal, 0.0)
+            gap = (springs.normal * gap + more * found.gap) / (springs.normal + more)
+            shear = np.where(held[1], _STIFFER, 1.0) * springs.shear
+            springs, mixing = replace(springs, normal=springs.normal + more, shear=shear), _Mixing()
         normal, shear = multiplier[:n], multiplier[n:]
         start = np.where(held[1], shear - springs.shear * stretch, found.shear)
-        settled = solve(replace(found, shear=start), gap - normal / springs.normal)
+        settled = solve(replace(found, shear=start), springs, gap - normal / springs.normal)
         iterations += settled.iterations
         closed = settled.state != OPEN
         pressed, drawn = closed & held[0], closed & held[1]

@@ -12,7 +12,7 @@ from ..model import OPEN, STICK, Blocks, DdaSettings, JointLaw, Loads, Material,
 from . import assembly
 from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
-from .contact_springs import end_of_step, over_a_step
+from .contact_springs import Springs, end_of_step, over_a_step
 from .contacts import ContactFinder, ContactSet
 from .energy import StepEnergy, sliding, step_energies
 from .excavation import Excavations, until_next_event
@@ -240,12 +240,12 @@ class BlockSystem:
         return pattern
 
     def _settled(self, pattern, matrix, right, found, vectors, springs, gap, curved) -> Settled:
-        def solve(contacts: ContactSet, start: np.ndarray) -> Settled:
+        def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray) -> Settled:
             most = self.settings.max_open_close_iterations
-            return settle(pattern, matrix, right, contacts, vectors, springs, start, self._slack, most, curved)
+            return settle(pattern, matrix, right, contacts, vectors, stiff, start, self._slack, most, curved)
 
         if not self._tolerance or not len(found):
-            return solve(found, gap)
+            return solve(found, springs, gap)
         return settle_augmented(solve, found, springs, gap, self._finder.on_penalty(found), self._tolerance)
 
     def _real_springs(self, found: ContactSet, settled: Settled) -> tuple[np.ndarray, np.ndarray]:
