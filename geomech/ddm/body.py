@@ -158,19 +158,18 @@ class Body:
         )
         if same_boundary:
             self._loads.inherit(old._loads, c_old)
-        if self.compressed and system.anchors is not None:
-            raise ValueError("supports on holes need the dense solver")
-        if self.compressed:
-            self._w, self.crack_system = compressed(c, g, self.cracks.crack[c.source], system.solve, self._cg, nu, tol)
-            return
-        # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
-        # make again, should the boundary change, than to carry along.
-        everything = np.arange(g.n)
 
         def gc(k):
             rows = influence(g, c.take(k), nu, tol)
             return rows if system.anchors is None else system.anchored(rows, system.anchors.of_jumps(c.take(k)))
 
+        if self.compressed:
+            on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
+            self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol)
+            return
+        # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
+        # make again, should the boundary change, than to carry along.
+        everything = np.arange(g.n)
         kept = same_boundary and not old.compressed
         self._w = reuse(
             old._w if kept else None,

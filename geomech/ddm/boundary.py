@@ -109,10 +109,10 @@ class BoundarySystem:
         matrix = influence(targets, self.elements.take(elements), self._nu, self._tol)
         return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self._nu, self._tol)
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions."""
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; ``transposed``: A_ΓΓ⁻ᵀ."""
         self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
-        return self.factor.solve(np.asfortranarray(right))
+        return self.factor.solve(np.asfortranarray(right), transposed)
 
     def times(self, u: np.ndarray, lifted: np.ndarray) -> np.ndarray:
         """A_ΓΓ ``u``, and what the lifted rigid motions of ``lifted`` add."""

@@ -71,6 +71,20 @@ class CoarseLevel:
         out[self._held] = rest[self._held] = 0.0
         return out, rest
 
+    def split_transposed(self, smooth: np.ndarray, rest: np.ndarray) -> np.ndarray:
+        """`split` as a matrix of two parts, transposed: (n,) from what multiplies either of its results."""
+        if not self.n:
+            return rest
+        smooth, out = np.where(self._held, 0.0, smooth), np.where(self._held, 0.0, rest)
+        density = np.concatenate([(smooth[part.unknowns] @ part.density).ravel() for part in self._parts])
+        own = np.zeros_like(density)
+        own[self._free] = self._factor.solve(density[self._free], transposed=True)
+        own -= np.concatenate([(out[part.unknowns] @ part.at_nodes).ravel() for part in self._parts])
+        own[~self._free] = 0.0
+        for part, values in zip(self._parts, own.reshape(self.n, 2, ORDER + 1)):
+            out[part.unknowns] += values @ part.fit
+        return out
+
 
 class _Part:
     """One coarse element: ``unknowns`` (2, m) of the fine elements it stands for, by component; ``fit`` (p+1, m) from values

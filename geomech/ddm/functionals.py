@@ -5,7 +5,7 @@ on the cracks and p of the fluid in them: with M the equations of the faces (`fr
 
     K = yᵀ (p n − r) + hᵀ g + K₀,     Mᵀ z = l,  y = Nᵀ z,  A_ΓΓᵀ h = A_CΓᵀ y.
 
-So one transposed solve a factor, with factors that are there, replaces a solve for every load. K₀ is what slip, springs
+So one transposed solve a factor, with equations that are there, replaces a solve for every load. K₀ is what slip, springs
 and cohesion leave behind without any load.
 """
 
@@ -34,12 +34,10 @@ class TipFunctionals:
     on_faces     (n_crack_unknowns, 2 n_tips): y
     constant     (2 n_tips,): K₀, Pa √m
 
-    Raises ValueError when the crack unknowns are iterated on, so that there are no factors.
+    Where the crack unknowns are iterated on, so are these, by the transposed equations.
     """
 
     def __init__(self, body: Body, solution: Solution | None = None):
-        if body.compressed:
-            raise ValueError("functionals of tips need the dense solver")
         self.body = body
         c, equations = body.faces, body.face_equations
         n_nodes = c.n * c.per
@@ -54,7 +52,7 @@ class TipFunctionals:
             weights[element[k], 1, :, 0, k] = weights[element[k], 0, :, 1, k] = factor * lead[k]
         weights = weights.reshape(c.n_unknowns, 2 * n)
         self.on_faces = equations.adjoint(weights, states)
-        self.on_boundary = body._outside.factor.solve(body._cg.T @ self.on_faces, transposed=True)
+        self.on_boundary = body._outside.solve(body._cg.T @ self.on_faces, transposed=True)
         at_rest, _ = equations.solve(np.zeros(c.n_unknowns), states, memory)
         self.constant = weights.T @ at_rest
         rigid = np.isinf(body.laws.normal).reshape(c.n, c.per)[element, last]

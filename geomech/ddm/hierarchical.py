@@ -297,6 +297,56 @@ class Compressed:
         out[target.order] = np.matmul(self._to_elements, received)[..., 0]
         return out.ravel()
 
+    def transposed_times(self, y: np.ndarray) -> np.ndarray:
+        """(m,) the transposed operator on ``y`` (n,): every step of a product turned round, complex ones conjugated."""
+        out = self._from_far(y) if len(self.far) else np.zeros(self.shape[1])
+        for rows, columns, matrix in self.blocks:
+            out[columns] += y[rows] @ matrix
+        return out
+
+    def _from_far(self, y: np.ndarray) -> np.ndarray:
+        n, source, target = self.terms, self.source_tree, self.target_tree
+        own = np.matmul(y.reshape(self.targets.n, 1, -1)[target.order], self._to_elements)[:, 0]
+        own = np.add.reduceat(own, target.first[target.leaves], axis=0)
+        inner = np.zeros((len(target.first), 2, n), complex)
+        inner.real[target.leaves] = own[:, : 2 * n].reshape(-1, 2, n)
+        inner.imag[target.leaves] = own[:, 2 * n :].reshape(-1, 2, n)
+        degree = np.arange(1, n)
+        for parent, child, delta, radius, shift in reversed(self._down):
+            series = inner[child] @ np.conj(shift)
+            series[:, 0, 1:] -= (0.5 * delta / radius)[:, None] * degree * series[:, 1, :-1]
+            inner[parent[::2]] += series[::2] + series[1::2]
+        outer = np.zeros((len(source.first), 2, n), complex)
+        self._translate_back(inner, outer)
+        degree = np.arange(2, n + 1)
+        for parent, child, delta, radius, shift in reversed(self._up):
+            series = outer[parent] @ np.conj(shift)
+            series[:, 0, :-1] -= (0.5 * delta / radius)[:, None] * degree * series[:, 1, 1:]
+            outer[child] += series
+        sent = outer[_leaf_of(source)[source.order]].reshape(-1, 2 * n)
+        sent = np.concatenate([sent.real, sent.imag], axis=1)[:, None]
+        out = np.empty((self.sources.n, 2 * self.sources.per))
+        out[source.order] = np.matmul(sent, self._from_elements)[:, 0]
+        return out.ravel()
+
+    def _translate_back(self, inner: np.ndarray, outer: np.ndarray) -> None:
+        """`_translate` transposed."""
+        before, after, arm, choose = (np.conj(part) for part in self._between)
+        n = self.terms
+        degree = np.arange(2, n + 1)
+        by_source = np.argsort(self.far[:, 1], kind="stable")
+        for first in range(0, len(self.far), _BATCH):
+            part = by_source[first : first + _BATCH]
+            t, s = self.far[part].T
+            moved = inner[t] * _powers(after[part], n)[:, None]
+            parts = moved.view(float).reshape(-1, n, 2).swapaxes(1, 2).reshape(-1, n) @ choose.T
+            parts = parts.reshape(-1, 2, 2, n)
+            series = parts[:, :, 0] + 1j * parts[:, :, 1]
+            series *= (before[part, None] ** 2 * _powers(before[part], n))[:, None]
+            series[:, 0, :-1] += (0.5 * arm[part])[:, None] * degree * series[:, 1, 1:]
+            starts = np.flatnonzero(np.r_[True, np.diff(s) > 0])
+            outer[s[starts]] += np.add.reduceat(series, starts, axis=0)
+
     def _translate(self, outer: np.ndarray, inner: np.ndarray) -> None:
         """Add to the ``inner`` series what the ``outer`` ones of far clusters are about their centres."""
         before, after, arm, choose = self._between

@@ -170,15 +170,28 @@ class Patches:
             out[to] = factor.solve(right[free])[kept]
         return out
 
+    def solve_transposed(self, right: np.ndarray) -> np.ndarray:
+        """The transposed of `solve`."""
+        out = np.zeros_like(right)
+        for _, free, kept, to, factor in self._factors:
+            own = np.zeros(len(free))
+            own[kept] = right[to]
+            out[free] += factor.solve(own, transposed=True)
+        return out
+
 
 class Following:
-    """What the boundary does when crack faces move, A_ΓΓ⁻¹ A_ΓC, as an operator; ``influence`` is A_ΓC, a matrix or not."""
+    """What the boundary does when crack faces move, A_ΓΓ⁻¹ A_ΓC, as an operator: ``solve(right, transposed)`` applies
+    A_ΓΓ⁻¹, ``influence`` is A_ΓC."""
 
-    def __init__(self, solve: Callable[[np.ndarray], np.ndarray], influence):
+    def __init__(self, solve: Callable[..., np.ndarray], influence: np.ndarray):
         self._solve, self._influence = solve, influence
 
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
         return self._solve(self._influence @ w)
+
+    def transposed_times(self, v: np.ndarray) -> np.ndarray:
+        return self._solve(v, transposed=True) @ self._influence
 
 
 class Reduced:
@@ -190,6 +203,11 @@ class Reduced:
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
         out = self.cracks @ w
         return out - self._on_cracks @ (self._following @ w) if self._on_cracks.shape[1] else out
+
+    def transposed_times(self, v: np.ndarray) -> np.ndarray:
+        """Sᵀ ``v``."""
+        out = self.cracks.transposed_times(v)
+        return out - self._following.transposed_times(v @ self._on_cracks) if self._on_cracks.shape[1] else out
 
 
 class IterativeCrackSystem:
@@ -248,6 +266,26 @@ class IterativeCrackSystem:
         self._last = right, w
         return w
 
+    def solve_transposed(self, right: np.ndarray, rows: Rows) -> np.ndarray:
+        """(n,) what multiplies right-hand sides of `solve` in ``right`` ᵀ w; zero where held. Raises NotSolved."""
+        moving = np.flatnonzero(rows.mixed)
+
+        def times(v: np.ndarray) -> np.ndarray:
+            mixed = v.copy()
+            mixed[moving + rows.per] += rows.mixed[moving] * v[moving]
+            out = self.matrix.transposed_times(mixed) - rows.spring * v
+            out[rows.held] = 0.0
+            return out
+
+        def roughly(v: np.ndarray) -> np.ndarray:
+            return self._coarse.split_transposed(v, self._patches.solve_transposed(v))
+
+        self._patches.change(rows)
+        self._coarse.change(rows.held)
+        w, n = gmres(times, np.where(rows.held, 0.0, right), roughly)
+        self.products += n
+        return w
+
     def _guess(self, right: np.ndarray, held: np.ndarray) -> np.ndarray | None:
         """The last solution, as much of it as its right-hand side is in this one."""
         if self._last is None:
@@ -285,27 +323,26 @@ class Iterated:
         return self._system.rcond_of(self._rows)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
-        """Free unknowns for ``right`` (n_free,) or (n_free, k). Raises ValueError for ``transposed`` equations."""
-        if transposed:
-            raise ValueError('functionals of the loads need factored equations: solver "dense"')
+        """Free unknowns for ``right`` (n_free,) or (n_free, k), of the ``transposed`` equations if asked."""
         if right.ndim == 2:
-            return np.column_stack([self.solve(column) for column in right.T])
+            return np.column_stack([self.solve(column, transposed) for column in right.T])
         whole = np.zeros(self._system.n)
         whole[self._free] = right
-        return self._system.solve(whole, self._rows)[self._free]
+        solve = self._system.solve_transposed if transposed else self._system.solve
+        return solve(whole, self._rows)[self._free]
 
 
 def compressed(
     cracks: ElementSet,
-    boundary: ElementSet,
     crack: np.ndarray,
-    solve: Callable[[np.ndarray], np.ndarray],
+    solve: Callable[..., np.ndarray],
+    on_boundary: np.ndarray,
     on_cracks: np.ndarray,
     nu: float,
     tol: float,
 ) -> tuple[Following, IterativeCrackSystem]:
-    """A_ΓΓ⁻¹ A_ΓC and the crack system of a body; ``crack`` (n,) is the crack of every element, ``solve`` applies A_ΓΓ⁻¹ and
-    ``on_cracks`` is A_CΓ."""
-    following = Following(solve, influence(boundary, cracks, nu, tol))
+    """A_ΓΓ⁻¹ A_ΓC and the crack system of a body; ``crack`` (n,) is the crack of every element, ``solve(right,
+    transposed)`` applies A_ΓΓ⁻¹, ``on_boundary`` is A_ΓC and ``on_cracks`` is A_CΓ."""
+    following = Following(solve, on_boundary)
     matrix = Reduced(Compressed(cracks, cracks, nu, tol), on_cracks, following)
     return following, IterativeCrackSystem(matrix, cracks, crack, nu, tol)

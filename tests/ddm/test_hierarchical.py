@@ -50,6 +50,19 @@ def test_product_is_that_of_the_matrix(order):
     assert far_error(operator, x) < 1e-11
 
 
+def test_transposed_product_is_that_of_the_transposed_matrix():
+    """Two sets of different orders; what is left is that of the product itself."""
+    targets, sources = scattered(180, order=2), scattered(260, order=4, seed=1)
+    operator = Compressed(targets, sources, NU, TOL)
+    rng = np.random.default_rng(3)
+    x, y = rng.standard_normal(sources.n_unknowns), rng.standard_normal(targets.n_unknowns)
+    assert len(operator.far)
+    exact = influence(targets, sources, NU, TOL).T @ y
+    np.testing.assert_allclose(operator.transposed_times(y), exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+    size = np.linalg.norm(y) * np.linalg.norm(operator @ x)
+    assert abs(y @ (operator @ x) - operator.transposed_times(y) @ x) < 1e-14 * size
+
+
 def test_error_follows_what_is_asked():
     elements = scattered(300)
     x = np.random.default_rng(2).standard_normal(elements.n_unknowns)

@@ -81,8 +81,48 @@ def test_faces_under_a_law_do_as_with_dense_equations(law):
         assert (other.states == dense.states).all()
         assert other.frictional_work == pytest.approx(dense.frictional_work, rel=1e-9)
         assert other.residual < 1e-10
-    with pytest.raises(ValueError, match="dense"):
-        body.face_equations.adjoint(np.zeros((body.faces.n_unknowns, 1)), loaded.face_states)
+
+
+@pytest.mark.parametrize("loops", [PLANE, SQUARE], ids=["plane", "square"])
+@pytest.mark.parametrize("law", [JointLaw("smooth"), JointLaw("rough", friction_angle=0.5, cohesion=1e5)])
+def test_functionals_of_the_tips_are_the_iterated_solution(loops, law):
+    """Transposed equations, faces that slide included: K as the solution has it, to the iteration's tolerance."""
+    body = ddm.Body(loops, network(2), ROCK, DdmSettings(3, solver="compressed"), face_laws=(law,))
+    for stress in ([2e5, 1e6, 1e5], [-1e6, -2e7, 7e6]):
+        load = pressed(stress) if loops else ddm.BodyLoad(remote_stress=stress)
+        solution = body.solve(load)
+        expected = np.stack([solution.tips["k_i"], solution.tips["k_ii"]], axis=1)
+        found = body.k_functionals(solution)(load)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_coarse_elements_are_transposed_with_the_rest():
+    """A crack long enough for them, cut by several patches: the products the transposed equations take are few too."""
+    x = np.array([-10.0, 10.0])
+    cracks = Cracks.from_polylines([np.column_stack([x, 0.1 * x])], aperture=np.inf)
+    body = ddm.Body(PLANE, cracks, ROCK, DdmSettings(1, solver="compressed", elements_per_crack=300))
+    load = ddm.BodyLoad(remote_stress=[0.2e6, 1e6, 0.3e6])
+    solution, before = body.solve(load), body.crack_system.products
+    assert body.crack_system._coarse.n
+    found = body.k_functionals()(load)
+    np.testing.assert_allclose(found[:, 0], solution.tips["k_i"], rtol=1e-8)
+    # Four functionals, each as many products as a load or nearly so.
+    assert body.crack_system.products - before < 6 * before
+
+
+def test_held_holes_hold_cracks_that_are_iterated_on():
+    """A body that hangs on a hole in its middle, under its own weight."""
+    cracks = Cracks.from_polylines([line + [0.6, 0.6] for line in cracks_in_cells(2)], aperture=np.inf)
+    hole = np.array([[3.0, 3.0], [4.0, 3.1], [3.9, 4.2], [3.1, 4.0]])
+    supports = tuple(ddm.Support(k) for k in range(4, 8))
+    answers = []
+    for solver in ("dense", "compressed"):
+        settings = DdmSettings(solver=solver)
+        body = ddm.Body(SQUARE, cracks, ROCK, settings, holes=[hole], supports=supports)
+        answers.append(body.solve(ddm.BodyLoad(body_force=[1e4, -2e4])))
+    agree(*answers)
+    dense, other = (answer.reactions.force for answer in answers)
+    np.testing.assert_allclose(other, dense, rtol=0, atol=1e-9 * np.abs(dense).max())
 
 
 def test_growth_may_cross_from_dense_to_compressed():
