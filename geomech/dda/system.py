@@ -150,7 +150,8 @@ class BlockSystem:
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun again
         from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
-        ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved.
+        ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved, or
+        when nothing holds them up in statics.
         """
         dt = self.settings.time_step if dt is None else float(dt)
         if not dt > 0:
@@ -166,6 +167,7 @@ class BlockSystem:
         moments = block_moments(vertices, self._next, self._start)
         if state.time == 0.0 and len(state.contacts) == 0:
             refuse_overlap(self.blocks, vertices, moments)
+            self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
         limit = self._limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
         found = self._finder.find(state, vertices, _WINDOW * limit)
@@ -199,6 +201,18 @@ class BlockSystem:
                 )
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
+
+    def _refuse_unheld(self, loads: Loads, time: float) -> None:
+        """In statics weight needs something to rest on: what falls for ever has no equilibrium."""
+        holds = (
+            self._fixed.any() or self.blocks.held is not None or loads.edge_tractions or loads.point_loads
+            or loads.block_motions or loads.point_motions or loads.bolts or loads.viscous_boundaries or loads.water
+        )  # fmt: skip
+        if self.scheme.static and not holds and loads.gravity.at(time).any():
+            raise ValueError(
+                "no block is fixed, so that under gravity all of them fall and statics finds no equilibrium: fix a block, or "
+                "let velocity be carried (dynamic_factor = 1)"
+            )
 
     def _refuse_crushed(self, state: State) -> None:
         area = block_moments(state.vertices, self._next, self._start)[:, 0]

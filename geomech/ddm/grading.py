@@ -15,8 +15,8 @@ import numpy as np
 
 from ..model import DdmSettings
 
-#: A turn by more than this is a kink that is graded, rad.
-KINK = math.radians(20)
+#: A turn by 20° or more, whatever its round-off, is a kink that is graded, rad.
+KINK = math.radians(20) - 1e-9
 #: A turn by more than this is a sharp kink, graded for good and by so many layers more (two of them: K_I 3.5 % → 1 %).
 SHARP_KINK = math.radians(60)
 SHARP_LAYERS = 2

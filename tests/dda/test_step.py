@@ -316,3 +316,12 @@ def test_run_yields_states_until_the_end_time():
     )
     assert [s.time for s in states] == pytest.approx([0, 0.03, 0.06, 0.09, 0.1])
     assert states[-1].vertices[0, 1] == pytest.approx(-0.5 * 9.81 * 0.01, rel=1e-12)
+
+
+def test_statics_under_gravity_need_a_fixed_block():
+    blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)])
+    rock, weight = Material("rock", 10e9, 0.25, density=2600.0), Loads(gravity=History.constant([0.0, -9.81]))
+    with pytest.raises(ValueError, match="no block is fixed"):
+        list(dda.run(blocks, [rock], [], weight, DdaSettings(), 1.0))
+    *_, last = dda.run(blocks, [rock], [], weight, DdaSettings(dynamic_factor=1.0, time_step=0.01), 0.1)
+    assert last.vertices[0, 1] == pytest.approx(-0.5 * 9.81 * 0.1**2)
