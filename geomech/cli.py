@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
+from .bench import TOPICS, topic
 
 # The matrices of a specimen are small: a second BLAS thread gains them nothing, and costs tens of times their own time
 # when the machine is busy. Set before numpy is loaded; whoever wants more says so in the environment.
@@ -21,7 +22,6 @@ for _library in ("OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-BENCHMARKS = ("accuracy", "dda", "ddm", "kernels", "many", "stability", "startup")
 #: Pixels, as for a scene's own render.width_px.
 LEAST_WIDTH = 64
 
@@ -129,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
         "bench", _bench, "measure what things cost and how right they are (run it in the project's folder)",
         "geomech bench startup\ngeomech bench --quick",
     )  # fmt: skip
-    bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(BENCHMARKS)} (default: all)")
+    bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(TOPICS)} (default: all)")
     bench.add_argument("--quick", action="store_true", help="fewer repetitions, nothing compiled anew")
 
     verb("doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
@@ -328,12 +328,10 @@ def _open_run(run: Callable[[Path], Any], folder: Path) -> Any:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    from .bench import topic
-
-    unknown = [name for name in options.topics if name not in BENCHMARKS]
+    unknown = [name for name in options.topics if name not in TOPICS]
     if unknown:
-        raise BadInput(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}")
-    for name in options.topics or BENCHMARKS:
+        raise BadInput(f"no benchmark {', '.join(unknown)}; there are {', '.join(TOPICS)}")
+    for name in options.topics or TOPICS:
         print(topic(name)(options.quick), end="\n\n", flush=True)
     return DONE
 
