@@ -10,9 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 #: Blocks in a leaf of the dissection: smaller ones cost more calls, larger ones more arithmetic (measured on walls).
 LEAF = 10
+#: Neither part of a cut has less than this part of the blocks.
+_LEAST = 0.3
+#: Cuts are sought across these directions (2, k), from so many blocks on across more: joints may be inclined.
+_LARGE = 200
+_TWO, _MANY = (np.stack([np.cos(t), np.sin(t)]) for t in (np.pi / 2 * np.arange(2), np.pi / 8 * np.arange(8)))
 #: Entries of all S together up to which they are kept: 1.2 GB in single precision, those of some fifty thousand blocks.
 KEPT = 300_000_000
 
@@ -54,12 +60,64 @@ class Tree:
     waves: tuple[np.ndarray, ...]
 
 
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _best_cut(order, pointer, neighbour, place, least):
+    """(price, k, whether the first part gives the separator) of the cheapest cut of the blocks in ``order`` into the first k and
+    the rest, neither below ``least``; ``place`` (n,) is room, −1 all over, and left so."""
+    m = len(order)
+    for q in range(m):
+        place[order[q]] = q
+    # Block q is in the separator of a cut before k if q < k ≤ the last neighbour's place, or the first one's < k ≤ q.
+    first, second = np.zeros(m + 2, np.int64), np.zeros(m + 2, np.int64)
+    for q in range(m):
+        low = high = q
+        for e in range(pointer[order[q]], pointer[order[q] + 1]):
+            r = place[neighbour[e]]
+            if r >= 0:
+                low, high = min(low, r), max(high, r)
+        first[q + 1] += 1
+        first[high + 1] -= 1
+        second[low + 1] += 1
+        second[q + 1] -= 1
+    for q in range(m):
+        place[order[q]] = -1
+    price, at, mine = np.inf, m // 2, True
+    a = b = 0
+    for k in range(1, m):
+        a += first[k]
+        b += second[k]
+        if least <= k <= m - least:
+            off = (2.0 * k - m) / m
+            here = min(a, b) * (1.0 + off * off)
+            if here < price:
+                price, at, mine = here, k, a <= b
+    return price, at, mine
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _meets(order, at, mine, pointer, neighbour, place):
+    """(m,) whether each block in ``order`` is of the first ``at`` (or, not ``mine``, of the rest) and meets one on the other side."""
+    m = len(order)
+    out = np.zeros(m, np.bool_)
+    for q in range(m):
+        place[order[q]] = q
+    for q in range(m):
+        if (q < at) == mine:
+            for e in range(pointer[order[q]], pointer[order[q] + 1]):
+                r = place[neighbour[e]]
+                out[q] = out[q] or (r >= 0 and (r < at) != mine)
+    for q in range(m):
+        place[order[q]] = -1
+    return out
+
+
 def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
     """The blocks of every front and (n_fronts,) its parent, in postorder; ``points`` (n, 2) lie where the blocks do.
 
-    Halved at the median of the longer side; the separator is the smaller of the two rows of blocks along the cut.
+    Cut across one of several directions, where the separator, the smaller of the two rows of blocks along the cut, is
+    smallest: bricks are many to a metre upwards and few along a course.
     """
-    side = np.zeros(len(points), np.int8)
+    place = np.full(len(points), -1)
     fronts: list[np.ndarray] = []
     parent: list[int] = []
     # (blocks, None) is still to be divided, (separator, number of children) is a front whose children are done.
@@ -68,22 +126,15 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
     while work:
         blocks, children = work.pop()
         if children is None and len(blocks) > LEAF:
-            at = points[blocks]
-            along = at[:, int(np.argmax(np.ptp(at, axis=0)))]
-            half = np.argpartition(along, len(blocks) // 2)
-            first, second = blocks[half[: len(blocks) // 2]], blocks[half[len(blocks) // 2 :]]
-            side[first], side[second] = 1, 2
-            cut_first, cut_second = (
-                _meets(first, 2, side, pointer, neighbour),
-                _meets(second, 1, side, pointer, neighbour),
-            )
-            side[blocks] = 0
-            if cut_first.sum() < cut_second.sum():
-                separator, first = first[cut_first], first[~cut_first]
-            else:
-                separator, second = second[cut_second], second[~cut_second]
-            halves = [half for half in (first, second) if len(half)]
-            work.append((separator, len(halves)))
+            least = max(1, int(_LEAST * len(blocks)))
+            directions = _MANY if len(blocks) >= _LARGE else _TWO
+            orders = [blocks[at] for at in np.argsort(points[blocks] @ directions, axis=0, kind="stable").T]
+            cuts = [_best_cut(order, pointer, neighbour, place, least) for order in orders]
+            best = min(range(len(cuts)), key=lambda k: cuts[k][0])
+            order, (_, at, mine) = orders[best], cuts[best]
+            cut = _meets(order, at, mine, pointer, neighbour, place)
+            halves = [half for half in (order[:at][~cut[:at]], order[at:][~cut[at:]]) if len(half)]
+            work.append((order[cut], len(halves)))
             work += [(half, None) for half in halves]
             continue
         for _ in range(children or 0):
@@ -99,12 +150,6 @@ def _around(blocks: np.ndarray, pointer: np.ndarray) -> tuple[np.ndarray, np.nda
     count = pointer[blocks + 1] - pointer[blocks]
     first = np.cumsum(count) - count
     return np.repeat(pointer[blocks] - first, count) + np.arange(count.sum()), first
-
-
-def _meets(blocks: np.ndarray, other: int, side: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> np.ndarray:
-    """(n,) whether each of ``blocks`` has a neighbour on the ``other`` side. Every block is its own neighbour."""
-    at, first = _around(blocks, pointer)
-    return np.logical_or.reduceat(side[neighbour[at]] == other, first)
 
 
 def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
