@@ -33,6 +33,8 @@ _SHORT_OF = 0.99
 _CLEAR = 3.0
 #: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere.
 _END, _STUCK = 1e-14, 1e-3
+#: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their difference.
+_LEAST_LEFT = 1e-14
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -157,8 +159,9 @@ class CentralPath:
         firm = np.where(slides, springs.sliding[some], springs.hold[some]) + held * springs.cohesion[some]
         self._rough = (friction > 0.0) | (firm > 0.0)
         # N is counted from where the contact is pulled off; its strength against sliding is positive to the last.
-        pull = np.minimum(held * springs.tension[some], 0.9 * firm / np.maximum(friction, 1e-300))
-        self._pull = np.where(friction > 0.0, pull, held * springs.tension[some])
+        self._pull = held * springs.tension[some]
+        sloped = friction > 0.0
+        self._pull[sloped] = np.minimum(self._pull[sloped], 0.9 * firm[sloped] / friction[sloped])
         self._mu = np.where(self._rough, friction, 1.0)
         self._base = np.where(self._rough, firm - friction * self._pull, 0.0)
 
@@ -177,14 +180,19 @@ class CentralPath:
 
     def _centre(self, epsilon: np.ndarray) -> None:
         """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""
-        spread = np.sqrt(self._g**2 + 4.0 * epsilon / self._kn)
-        self._width = np.where(self._g > 0.0, 0.5 * (spread + self._g), 2.0 * epsilon / self._kn / (spread - self._g))
-        self._normal = epsilon / self._width
+        # The roots of w² − g w = ε/kₙ and of its like for N/kₙ, of which the smaller would cancel: their product is ε/kₙ.
+        larger = 0.5 * (np.sqrt(self._g**2 + 4.0 * epsilon / self._kn) + np.abs(self._g))
+        smaller = epsilon / self._kn / larger
+        self._width = np.where(self._g > 0.0, larger, smaller)
+        self._normal = self._kn * np.where(self._g > 0.0, smaller, larger)
         strength = self._mu * self._normal + self._base
         low, high = -strength, strength
+        # Nearer to the strength than its round-off S is not known, and nothing would be left to divide by.
+        least = _LEAST_LEFT * strength
         for _ in range(50):
             shear = 0.5 * (low + high)
-            less = shear / self._ks + self._s < epsilon / (strength + shear) - epsilon / (strength - shear)
+            below, above = np.maximum(strength + shear, least), np.maximum(strength - shear, least)
+            less = shear / self._ks + self._s < epsilon / below - epsilon / above
             low, high = np.where(less, shear, low), np.where(less, high, shear)
         self._shear = np.where(self._rough, 0.5 * (low + high), 0.0)
         self._slip = epsilon / np.stack(self._left())
@@ -192,7 +200,7 @@ class CentralPath:
     def _left(self) -> tuple[np.ndarray, np.ndarray]:
         """The strength left against sliding either way, N: above and below S."""
         strength = self._mu * self._normal + self._base
-        least = 1e-14 * strength
+        least = _LEAST_LEFT * strength
         return np.maximum(strength - self._shear, least), np.maximum(strength + self._shear, least)
 
     def advance(self) -> int:
