@@ -10,7 +10,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from ..model import Blocks, Cracks
-from ..shapes import EdgeLine, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
+from ..shapes import EdgeLine, Joint, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
 from ..shapes.parts import JOINT
 from .errors import Fault
 from .locator import Path
@@ -67,6 +67,8 @@ def draw(
     parameters: dict[str, float | str] = {}
     choices: dict[str, Mapping[str, float]] = {}
     model = None
+    drawn_joints: tuple[Joint, ...] = ()
+    places: Mapping[tuple[str, int], str] = {}
     if geometry.model is not None:
         # Imported here: a scene drawn in TOML needs no Gmsh.
         from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
@@ -90,7 +92,8 @@ def draw(
         parameters = {name: entry.value for name, entry in read.parameters.items()}
         choices = {name: entry.choices for name, entry in read.parameters.items() if entry.choices}
         model = folder / geometry.model
-        zones, traces, edges = read.zones, read.traces, ()
+        zones, traces, edges, drawn_joints = read.zones, read.traces, (), read.joints
+        places = read.places
     else:
         zones = [Zone(z.name, _loops(z)) for z in geometry.zones]
         traces = [Trace(c.name, (_line(c),)) for c in geometry.cracks]
@@ -108,12 +111,13 @@ def draw(
     names = tuple(zone.name for zone in zones)
     drawn = tuple(trace.name for trace in traces)
     joints: tuple[str, ...] = ()
+    own_joints = len({joint.name for joint in geometry.joints})
     try:
-        if geometry.joints or geometry.joint_sets:
+        if geometry.joints or geometry.joint_sets or drawn_joints:
             from .jointing import jointed
 
             blocks, _ = assemble(zones, (), edges, geometry.tolerance_m)
-            cut = jointed(geometry, list(zones), blocks, list(traces))
+            cut = jointed(geometry, list(zones), blocks, list(traces), drawn_joints)
             warnings += [Fault(place(("geometry",)), f"mended while cutting: {text}", "") for text in cut.told()]
             names = tuple(names[zone] for zone in cut.cutting.zone)
             joints = tuple(joint.name for joint in cut.joints)
@@ -123,8 +127,16 @@ def draw(
             blocks, cracks = assemble(zones, traces, edges, geometry.tolerance_m)
     except ShapeError as error:
         for flaw in error.flaws:
-            at = ("geometry", "model") if geometry.model is not None else ("geometry", flaw.part, flaw.index)
-            message = flaw.message if geometry.model is None else f"{FilePath(geometry.model).name}: {flaw.message}"
+            at: Path = ("geometry", flaw.part, flaw.index)
+            message = flaw.message
+            if (
+                geometry.model is not None
+                and flaw.part != "joint_sets"
+                and flaw.index >= own_joints * (flaw.part == "joints")
+            ):
+                entity = places.get((flaw.part, flaw.index - own_joints * (flaw.part == "joints")))
+                at = ("geometry", "model")
+                message = f"{FilePath(geometry.model).name}: {f'{entity}: ' if entity else ''}{message}"
             faults.append(Fault(place(at), message, flaw.way_out))
         return Drawing(names, drawn, None, None, parameters, choices, model)
     return Drawing(names, drawn, blocks, cracks, parameters, choices, model, joints)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,13 +46,15 @@ class Jointed:
         return lines
 
 
-def jointed(geometry: Geometry, zones: list[Zone], blocks: Blocks, traces: list[Trace]) -> Jointed:
-    """The rock of ``zones``, drawn soundly as ``blocks``, cut along the scene's joints.
+def jointed(
+    geometry: Geometry, zones: list[Zone], blocks: Blocks, traces: list[Trace], drawn: Sequence[Joint] = ()
+) -> Jointed:
+    """The rock of ``zones``, drawn soundly as ``blocks``, cut along the scene's joints and those ``drawn`` elsewhere.
 
     Raises ShapeError where joints or cracks are wrong.
     """
     named = [Zone(zone.name, tuple(blocks.loops(k)), _names(blocks, k)) for k, zone in enumerate(zones)]
-    joints = make_joints(geometry, [zone.loops[0] for zone in named])
+    joints = make_joints(geometry, [zone.loops[0] for zone in named], drawn)
     cutting = cut(
         named,
         joints,
@@ -63,12 +66,14 @@ def jointed(geometry: Geometry, zones: list[Zone], blocks: Blocks, traces: list[
     return Jointed(tuple(joints), cutting, _cracks(geometry, named, cutting, traces))
 
 
-def make_joints(geometry: Geometry, outlines: list[np.ndarray]) -> list[Joint]:
-    """Drawn joints, one a name, and the scene's sets over the rock within ``outlines``."""
-    drawn: dict[str, list[np.ndarray]] = {}
+def make_joints(geometry: Geometry, outlines: list[np.ndarray], drawn: Sequence[Joint] = ()) -> list[Joint]:
+    """Joints drawn in the scene and elsewhere, one a name, and the scene's sets over the rock within ``outlines``."""
+    lines: dict[str, list[np.ndarray]] = {}
     for joint in geometry.joints:
-        drawn.setdefault(joint.name, []).append(np.array(joint.points, dtype=float).reshape(-1, 2))
-    joints = [Joint(JOINT + name, tuple(lines)) for name, lines in drawn.items()]
+        lines.setdefault(JOINT + joint.name, []).append(np.array(joint.points, dtype=float).reshape(-1, 2))
+    for joint in drawn:
+        lines.setdefault(joint.name, []).extend(joint.lines)
+    joints = [Joint(name, tuple(own)) for name, own in lines.items()]
     low, high = np.min([o.min(axis=0) for o in outlines], axis=0), np.max([o.max(axis=0) for o in outlines], axis=0)
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     flaws = []
@@ -149,8 +154,9 @@ def _cracks(geometry: Geometry, zones: list[Zone], cutting: Cutting, traces: lis
     chains = [
         ends.nodes[np.append(s[:, 0], s[-1, 1])] for s in (ends.segments[ends.crack == k] for k in range(ends.n_cracks))
     ]
-    names = [trace.name for trace in traces] + list(ends.names)
-    lines = [[np.round(line, decimals) + 0.0 for line in trace.lines] for trace in traces] + [
+    pieces = [piece for trace in traces for piece in _parted(trace, polygons, tolerance)]
+    names = [trace.name for trace in pieces] + list(ends.names)
+    lines = [[np.round(line, decimals) + 0.0 for line in trace.lines] for trace in pieces] + [
         [chain] for chain in chains
     ]
     flaws: list[Flaw] = []
@@ -158,3 +164,21 @@ def _cracks(geometry: Geometry, zones: list[Zone], cutting: Cutting, traces: lis
     if flaws:
         raise ShapeError(flaws)
     return cracks
+
+
+def _parted(trace: Trace, polygons: np.ndarray, tolerance: float) -> list[Trace]:
+    """A drawn crack where joints cross it: a crack in every block, "NAME 1", "NAME 2", …; else as it is. Pieces shorter than
+    ``tolerance`` m are left out."""
+    import shapely
+
+    whole = shapely.multilinestrings(shapely.linestrings(trace.lines)) if len(trace.lines) > 1 else None
+    whole = shapely.linestrings(trace.lines[0]) if whole is None else whole
+    near = shapely.STRtree(polygons).query(whole, predicate="intersects")
+    inside = shapely.intersection(polygons[near], whole)
+    inside = inside[shapely.length(inside) > tolerance]
+    if len(inside) < 2 or shapely.length(whole) - shapely.length(inside).sum() > tolerance:
+        # In one block; or partly outside the rock, which is for the network of cracks to say.
+        return [trace]
+    runs = shapely.get_parts(shapely.line_merge(inside))
+    runs = runs[shapely.length(runs) > tolerance]
+    return [Trace(f"{trace.name} {k}", (shapely.get_coordinates(run),)) for k, run in enumerate(runs, 1)]

@@ -1,4 +1,4 @@
-"""Parametric Gmsh models (.geo) read as drawings: named surfaces are zones, named curves are cracks and edges."""
+"""Gmsh models read as drawings: named surfaces are zones, named curves are joints, cracks and edges."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from .gmsh_session import gmsh_session
-from .parts import Trace, Zone
+from .parts import JOINT, Joint, Trace, Zone
 
 #: Curved edges become chords that leave the curve by at most this, in units of the model's largest side.
 CHORD = 1e-4
@@ -41,24 +41,28 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class GmshDrawing:
-    """What a model holds: ``zones`` (with named edges), ``traces``, its ``parameters`` by short name as used, and
-    ``warnings`` as (message, way out): whatever is drawn and left out."""
+    """What a model holds: ``zones`` (with named edges), ``traces`` of cracks, its ``parameters`` by short name as used,
+    ``warnings`` as (message, way out): whatever is drawn and left out; ``joints``; and where they stand in the model:
+    ``places`` says, for ("zones" | "cracks" | "joints", index), which entities they are."""
 
     zones: tuple[Zone, ...]
     traces: tuple[Trace, ...]
     parameters: dict[str, Parameter]
     warnings: tuple[tuple[str, str], ...] = ()
+    joints: tuple[Joint, ...] = ()
+    places: Mapping[tuple[str, int], str] = field(default_factory=dict)
 
 
 def read_gmsh_model(
     path: str | Path, parameters: Mapping[str, float | str] | None = None, chord_tolerance: float | None = None
 ) -> GmshDrawing:
-    """Read a .geo (or .brep, .step) model with ``parameters`` set.
+    """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep, .step.
 
     A parameter is known by the last part of its name in the side panel ("Parameters/Cracks/phi_deg" is ``phi_deg``)
     or by the whole; where the model offers named choices the name may be given. Physical surfaces are zones, one
-    block a surface; physical curves called "crack:NAME" are cracks; all other physical curves name the block edges on
-    them. Curved edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side).
+    block a surface; physical curves called "crack:NAME" are cracks; those called "joint:NAME" that bound no surface are
+    joints; all other physical curves name the block edges on them. A .brep or .step without physical surfaces gives a
+    zone a surface, and what its shapes are called there names surfaces and curves. Curved edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side).
 
     Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
     named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
@@ -75,6 +79,10 @@ def read_gmsh_model(
         known = _open(gmsh, path)
         if parameters:
             known = _with_parameters(gmsh, path, dict(parameters), known)
+        if path.suffix == ".msh":
+            from .gmsh_mesh import drawing_of_mesh
+
+            return drawing_of_mesh(gmsh, path)
         return _drawing(gmsh, path, known, chord_tolerance)
 
 
@@ -174,36 +182,41 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
     chord = CHORD * max(box[3] - box[0], box[4] - box[1]) if chord is None else chord
     curves = _Curves(gmsh, chord)
     warnings: list[tuple[str, str]] = []
+    if path.suffix in (".geo", ".geo_unrolled") and not path.read_bytes().endswith((b"\n", b"\r")):
+        warnings.append(
+            (f"{path.name}: its last line does not end, and Gmsh does not read it", "end it with a new line")
+        )
 
+    groups = _named_groups(gmsh, path, warnings)
+    used = {abs(t) for _, _, tags in groups[2] for tag in tags for t in _outline(gmsh, tag)}
     edge_name: dict[int, str] = {}
-    cracked: set[int] = set()
-    traces = []
-    for dim, group in gmsh.model.getPhysicalGroups(1):
-        name = gmsh.model.getPhysicalName(dim, group)
-        tags = [int(tag) for tag in gmsh.model.getEntitiesForPhysicalGroup(dim, group)]
-        if not name:
-            warnings.append(
-                (f"{path.name}: physical curve {group} has no name", 'name it: Physical Curve("NAME") = {…}')
-            )
-        elif name.startswith(CRACK):
+    traced: set[int] = set()
+    traces, joints, places = [], [], {}
+    for name, _, tags in groups[1]:
+        inner = [tag for tag in tags if tag not in used]
+        if name.startswith(CRACK):
+            places["cracks", len(traces)] = _entities("curve", tags)
             traces.append(Trace(name[len(CRACK) :], tuple(curves.chained(tags))))
-            cracked.update(tags)
-        else:
-            for tag in tags:
-                if edge_name.setdefault(tag, name) != name:
-                    raise GmshModelError(
-                        f"{path.name}: curve {tag} is called both {edge_name[tag]!r} and {name!r}",
-                        "give each edge one physical name",
-                    )
+            traced.update(tags)
+            continue
+        if name.startswith(JOINT) and inner:
+            places["joints", len(joints)] = _entities("curve", inner)
+            joints.append(Joint(name, tuple(curves.chained(inner))))
+            traced.update(inner)
+            tags = [tag for tag in tags if tag in used]
+        for tag in tags:
+            if edge_name.setdefault(tag, name) != name:
+                raise GmshModelError(
+                    f"{path.name}: curve {tag} is called both {edge_name[tag]!r} and {name!r}",
+                    "give each edge one physical name",
+                )
 
-    zones, named, used = [], set(), set()
-    for dim, group in gmsh.model.getPhysicalGroups(2):
-        name = gmsh.model.getPhysicalName(dim, group) or f"zone {group}"
-        for tag in gmsh.model.getEntitiesForPhysicalGroup(dim, group):
-            signed = gmsh.model.getBoundary([(2, int(tag))], combined=False, oriented=True)
-            used.update(abs(t) for _, t in signed)
-            zones.append(curves.zone(name, [int(t) for _, t in signed], edge_name))
-            named.add(int(tag))
+    zones, named = [], set()
+    for name, _, tags in groups[2]:
+        for tag in tags:
+            places["zones", len(zones)] = _entities("surface", [tag])
+            zones.append(curves.zone(name, path, tag, _outline(gmsh, tag), edge_name))
+            named.add(tag)
     if not zones:
         raise GmshModelError(
             f"{path.name} has no physical surface",
@@ -222,9 +235,42 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             warnings.append(
                 (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
             )
-    warnings += _lost_curves(gmsh, path, curves, zones, used | cracked | told)
+    warnings += _lost_curves(gmsh, path, curves, zones, used | traced | told)
     warnings += _out_of_plane(gmsh, path, max(box[3] - box[0], box[4] - box[1]))
-    return GmshDrawing(tuple(zones), tuple(traces), parameters, tuple(warnings))
+    return GmshDrawing(tuple(zones), tuple(traces), parameters, tuple(warnings), tuple(joints), places)
+
+
+def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:
+    """(name, physical tag, entities) of all physical curves (1) and surfaces (2). A file of shapes has no physical groups:
+    there every surface counts, and shapes are called what the file calls them."""
+    groups: dict[int, list[tuple[str, int, list[int]]]] = {1: [], 2: []}
+    for dim in (1, 2):
+        for _, group in gmsh.model.getPhysicalGroups(dim):
+            name = gmsh.model.getPhysicalName(dim, group)
+            if not name and dim == 1:
+                warnings.append(
+                    (f"{path.name}: physical curve {group} has no name", 'name it: Physical Curve("NAME") = {…}')
+                )
+                continue
+            tags = [int(tag) for tag in gmsh.model.getEntitiesForPhysicalGroup(dim, group)]
+            groups[dim].append((name or f"zone {group}", group, tags))
+    if path.suffix.lower() in (".brep", ".step", ".stp") and not groups[2]:
+        for dim in (1, 2):
+            called: dict[str, list[int]] = {}
+            for _, tag in gmsh.model.getEntities(dim):
+                name = gmsh.model.getEntityName(dim, tag).rpartition("/")[2]
+                if name or dim == 2:
+                    called.setdefault(name or "rock", []).append(int(tag))
+            groups[dim] += [(name, 0, tags) for name, tags in called.items()]
+    return groups
+
+
+def _outline(gmsh, surface: int) -> list[int]:
+    return [int(t) for _, t in gmsh.model.getBoundary([(2, surface)], combined=False, oriented=True)]
+
+
+def _entities(kind: str, tags: list[int]) -> str:
+    return f"{kind}{'s' if len(tags) > 1 else ''} {', '.join(map(str, tags))}"
 
 
 def _lost_curves(gmsh, path: Path, curves: _Curves, zones: list[Zone], known: set[int]) -> list[tuple[str, str]]:
@@ -245,7 +291,7 @@ def _lost_curves(gmsh, path: Path, curves: _Curves, zones: list[Zone], known: se
         listed = ", ".join(map(str, tags))
         what = f"curves {listed} lie" if len(tags) > 1 else f"curve {listed} lies"
         message = f"{path.name}: {what} inside zone {name!r} and {'are no cracks' if len(tags) > 1 else 'is no crack'}"
-        way_out = f'name a crack Physical Curve("{CRACK}NAME") = {{{listed}}}; delete what only helped to draw'
+        way_out = f'name a crack Physical Curve("{CRACK}NAME") = {{{listed}}}, a joint "{JOINT}NAME"; delete what only helped to draw'
         warnings.append((message, way_out))
     return warnings
 
@@ -336,8 +382,8 @@ class _Curves:
             lines.append(points)
         return lines
 
-    def zone(self, name: str, signed: list[int], edge_name: dict[int, str]) -> Zone:
-        """The loops that the ``signed`` boundary curves of a surface form, the widest one first."""
+    def zone(self, name: str, path: Path, surface: int, signed: list[int], edge_name: dict[int, str]) -> Zone:
+        """The loops that the ``signed`` boundary curves of a ``surface`` form, the widest one first."""
         waiting = list(signed)
         loops = []
         while waiting:
@@ -350,7 +396,11 @@ class _Curves:
                     # A curve listed against the loop's sense.
                     following = next((t for t in waiting if self.polyline(t)[2] == last), None)
                     if following is None:
-                        raise GmshModelError(f"the outline of zone {name!r} is not closed", "close its Curve Loop")
+                        raise GmshModelError(
+                            f"{path.name}: the outline of surface {surface}, zone {name!r}, is not closed after curve "
+                            f"{abs(tag)}",
+                            "close its Curve Loop",
+                        )
                     waiting.remove(following)
                     points, _, last = self.polyline(-following)
                 else:
