@@ -23,10 +23,11 @@ from ..model import (
 )
 from .checks import carrier
 from .errors import Check
-from .tables import BaseTable, BoltTable, ForceTable, SceneTables, TractionTable, _Timed
+from .tables import SceneTables
+from .tables.loads import BaseTable, BoltTable, ForceTable, Timed, TractionTable
 
 
-def history_of(table: _Timed) -> History:
+def history_of(table: Timed) -> History:
     """The history that ``table`` gives, two columns. Raises OSError or ValueError for a file that is no record."""
     value, rate, values, _ = table._parts()
     if value is not None and table.frequency_hz is not None:

@@ -30,7 +30,8 @@ from .drawing import Drawing
 from .edges import contact_names, joint_names
 from .errors import Check
 from .joints import joint_law
-from .tables import MaterialTable, SceneTables
+from .tables import SceneTables
+from .tables.rock import MaterialTable
 
 
 def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Problem:

@@ -14,7 +14,7 @@ from ..shapes import EdgeLine, Joint, ShapeError, Trace, Zone, assemble, rectang
 from ..shapes.parts import JOINT
 from .errors import Fault
 from .locator import Path
-from .tables import CrackShape, Geometry
+from .tables.geometry import CrackShape, Geometry
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from ..shapes.joint_sets import (
 )
 from ..shapes.network import crack_network
 from ..shapes.parts import JOINT, Flaw, ShapeError, extent_of, grid_decimals
-from .tables import Geometry, JointSetShape
+from .tables.geometry import Geometry, JointSetShape
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import math
 
 from ..model import JointLaw, Roughness
 from .errors import Check
-from .tables import JointTable
+from .tables.rock import JointTable
 
 #: Keys of a rough joint that mean nothing without its roughness.
 _OF_ROUGHNESS = ("joint_length_m", "sample_length_m", "stiffness_from_peak_slip")

@@ -9,7 +9,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from .tables import Finite, Four, NotNegative, Pair, Points, Positive, SceneTables
+from .tables import SceneTables
+from .tables.entries import Finite, Four, NotNegative, Pair, Points, Positive
 
 _SHAPES = {
     Pair: "[x, y]",

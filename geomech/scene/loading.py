@@ -22,7 +22,8 @@ from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
 from .overview import overview
 from .plausibility import check_plausible
-from .tables import OutputTable, RenderTable, SceneTables
+from .tables import SceneTables
+from .tables.output import OutputTable, RenderTable
 from .validation import DECIMAL_COMMA, nearest, validate
 
 #: The file that a pipeline folder holds.

@@ -7,7 +7,8 @@ import numpy as np
 from .actions import traction_history
 from .checks import material_of
 from .errors import Check
-from .tables import SceneTables, TractionTable
+from .tables import SceneTables
+from .tables.loads import TractionTable
 
 #: A crack end that misses an outline by less than this share of its crack's length was probably meant to reach it.
 NEAR_MISS = 0.01

@@ -1,0 +1,157 @@
+"""Where rock, cracks and joints are: [geometry]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, model_validator
+
+from .entries import Finite, Four, Names, NotNegative, Pair, Points, Positive, Table
+
+
+class ZoneShape(Table):
+    name: str = Field(description="name of the zone; several zones of one name are several blocks of one kind")
+    rectangle: Four | None = Field(None, description="two opposite corners, [x0, y0, x1, y1], m")
+    polygon: Points | None = Field(None, description="corners in order, [[x, y], …], m")
+    holes: Annotated[tuple[Points, ...], Strict(False)] = Field((), description="polygons cut out, [[[x, y], …], …], m")
+
+    @model_validator(mode="after")
+    def _one_outline(self):
+        if (self.rectangle is None) == (self.polygon is None):
+            raise ValueError("a zone has either `rectangle` or `polygon`")
+        return self
+
+
+class CrackShape(Table):
+    name: str = Field(description="name of the crack")
+    points: Points | None = Field(None, description="its polyline, [[x, y], …], m")
+    centre: Pair | None = Field(None, description="centre of a straight crack, [x, y], m")
+    length_m: Positive | None = Field(None, description="length of a straight crack, m")
+    angle_deg: Finite | None = Field(None, description="its angle from the horizontal, counter-clockwise, degrees")
+
+    @model_validator(mode="after")
+    def _one_line(self):
+        straight = [self.centre, self.length_m, self.angle_deg]
+        if self.points is not None and any(part is not None for part in straight):
+            raise ValueError("a crack has either `points` or `centre`, `length_m` and `angle_deg`, not both")
+        if self.points is None and any(part is None for part in straight):
+            raise ValueError("a crack needs `points`, or all of `centre`, `length_m` and `angle_deg`")
+        return self
+
+
+class EdgeShape(Table):
+    name: str = Field(description='name for block edges, used by loads and joints ("load:top", "joint:bedding")')
+    line: Annotated[tuple[Pair, Pair], Strict(False)] = Field(
+        description="a straight piece, [[x, y], [x, y]], m: all block edges on it get the name"
+    )
+    zone: str | None = Field(None, description="name only edges of this zone (unset: of all zones)")
+
+
+class JointShape(Table):
+    name: str = Field(description='name of the joints; the block edges they make are called "joint:NAME"')
+    points: Points = Field(description="a polyline along which rock parts, [[x, y], …], m")
+
+
+DistributionLaw = Literal["constant", "normal", "uniform", "lognormal", "exponential"]
+
+
+class JointSetShape(Table):
+    name: str = Field(description='name of the set; the block edges it makes are called "joint:NAME"')
+    kind: Literal["parallel", "poisson", "discs", "lines", "voronoi"] = Field(
+        "parallel",
+        description='"parallel" (spacing, length, gap), "poisson" (traces anywhere: p20), "discs" in space cut by the '
+        'section (p32), endless "lines" (p21), edges of "voronoi" cells',
+    )
+    angle_deg: Finite | None = Field(
+        None, description="angle of the traces from the horizontal, counter-clockwise, degrees"
+    )
+    angle_deviation_deg: NotNegative = Field(0.0, description="its standard deviation, degrees")
+    angle_law: DistributionLaw = Field("normal", description="its law")
+    dip_deg: Annotated[float, Field(ge=0, le=90)] | None = Field(
+        None, description="dip of the joints in space, with `dip_direction_deg` in place of `angle_deg`, degrees"
+    )
+    dip_direction_deg: Finite | None = Field(None, description="azimuth of the dip, clockwise from north, degrees")
+    fisher: NotNegative = Field(0.0, description='Fisher\'s constant of the poles of "discs" (0: all alike)')
+    spacing_m: Positive | None = Field(None, description='distance between the lines of a "parallel" set, m')
+    spacing_deviation_m: NotNegative = Field(0.0, description="its standard deviation, m")
+    spacing_law: DistributionLaw = Field("normal", description="its law")
+    length_m: Positive | None = Field(
+        None, description='length of traces, diameter of "discs", m (unset: right through)'
+    )
+    length_deviation_m: NotNegative = Field(0.0, description="its standard deviation, m")
+    length_law: DistributionLaw = Field("normal", description="its law")
+    gap_m: NotNegative = Field(0.0, description='rock between the traces of one line of a "parallel" set, m')
+    gap_deviation_m: NotNegative = Field(0.0, description="its standard deviation, m")
+    gap_law: DistributionLaw = Field("normal", description="its law")
+    p20_per_m2: Positive | None = Field(None, description='traces per area of a "poisson" set, 1/m²')
+    p21_per_m: Positive | None = Field(None, description='length of "lines" per area, m/m²')
+    p32_per_m: Positive | None = Field(None, description='area of "discs" per volume, m²/m³')
+    cell_area_m2: Positive | None = Field(None, description='mean area of "voronoi" cells, m²')
+    region: Points | None = Field(None, description="polygon that holds the set, [[x, y], …], m (unset: all rock)")
+    ends_on: Names = Field((), description="names of joints or sets before it that its traces end on")
+    ends_share: Annotated[float, Field(ge=0, le=1)] = Field(1.0, description="part of the traces that do so")
+
+    @model_validator(mode="after")
+    def _complete(self):
+        needs = {
+            "parallel": "spacing_m", "poisson": "p20_per_m2", "discs": "p32_per_m", "lines": "p21_per_m",
+            "voronoi": "cell_area_m2",
+        }  # fmt: skip
+        if getattr(self, needs[self.kind]) is None:
+            raise ValueError(f'a set of kind "{self.kind}" needs `{needs[self.kind]}`')
+        for kind, key in needs.items():
+            if kind != self.kind and getattr(self, key) is not None:
+                raise ValueError(f'`{key}` belongs to kind "{kind}", not to "{self.kind}"')
+        if self.kind in ("poisson", "discs") and self.length_m is None:
+            raise ValueError(f'a set of kind "{self.kind}" needs `length_m`')
+        dips = self.dip_deg is not None, self.dip_direction_deg is not None
+        if any(dips) and (not all(dips) or self.angle_deg is not None):
+            raise ValueError("give either `angle_deg`, or both `dip_deg` and `dip_direction_deg`")
+        if self.kind == "discs" and not all(dips):
+            raise ValueError('a set of kind "discs" needs `dip_deg` and `dip_direction_deg`')
+        if self.kind in ("parallel", "poisson") and not all(dips) and self.angle_deg is None:
+            raise ValueError(f'a set of kind "{self.kind}" needs `angle_deg`, or `dip_deg` and `dip_direction_deg`')
+        if self.gap_m > 0 and (self.kind != "parallel" or self.length_m is None):
+            raise ValueError('`gap_m` belongs to a "parallel" set with `length_m`')
+        return self
+
+
+class Geometry(Table):
+    model: str | None = Field(None, description="Gmsh model (.geo), relative to the scene file")
+    parameters: dict[str, Finite | str] = Field({}, description="values for the model's parameters, by name")
+    zones: Annotated[tuple[ZoneShape, ...], Strict(False)] = Field(
+        (), description="zones drawn here instead of a model"
+    )
+    cracks: Annotated[tuple[CrackShape, ...], Strict(False)] = Field((), description="cracks drawn here")
+    edges: Annotated[tuple[EdgeShape, ...], Strict(False)] = Field((), description="names for block edges drawn here")
+    joints: Annotated[tuple[JointShape, ...], Strict(False)] = Field((), description="joints that cut rock into blocks")
+    joint_sets: Annotated[tuple[JointSetShape, ...], Strict(False)] = Field(
+        (), description="joints by statistics, in order: later sets may end on those before"
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="seed of the joint sets: the same seed, the same joints")
+    section_azimuth_deg: Finite = Field(
+        90.0, description="azimuth to which the section's x axis points, clockwise from north, degrees"
+    )
+    dead_ends: Literal["cracks", "trim"] = Field(
+        "cracks", description='joints that stop in rock: "cracks" before a rock bridge, or "trim" them off'
+    )
+    shortest_crack_m: NotNegative = Field(0.0, description="dead ends shorter than this are trimmed, m")
+    smallest_block_m2: NotNegative = Field(0.0, description="smaller blocks join a neighbour, m²")
+    tolerance_m: Positive | None = Field(
+        None, description="nearer than this, crack ends touch outlines and cracks, m (unset: 1e-6 of the largest side)"
+    )
+    chord_tolerance_m: Positive | None = Field(
+        None, description="curved edges of a model become chords this near to it, m (unset: 1e-4 of the largest side)"
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self):
+        if self.model is None and not self.zones:
+            raise ValueError("no rock: give `model` (a Gmsh .geo file) or at least one [[geometry.zones]]")
+        if self.model is not None and (self.zones or self.cracks or self.edges):
+            raise ValueError(
+                "give either `model` or [[geometry.zones]], [[geometry.cracks]], [[geometry.edges]], not both"
+            )
+        if self.model is None and self.parameters:
+            raise ValueError("`parameters` belong to a Gmsh `model`; there is none")
+        return self

@@ -1,0 +1,314 @@
+"""What acts on the blocks: [loads]."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, model_validator
+
+from .entries import Finite, Names, NotNegative, Pair, Points, Positive, Table
+
+
+class Timed(Table):
+    """A vector in time: exactly one of value, rate, times with values, or a file; a value may swing."""
+
+    start_s: NotNegative = Field(0.0, description="the rate, or the sinusoid, counts from this time, s")
+    frequency_hz: Positive | None = Field(
+        None, description="the constant is the amplitude of a sinusoid of this frequency, Hz (unset: it is constant)"
+    )
+    phase_deg: Finite = Field(0.0, description="phase of the sinusoid at `start_s`, degrees")
+    until_s: Positive | None = Field(None, description="the sinusoid ends at this time, s (unset: never)")
+    file: str | None = Field(
+        None,
+        description="record in a text file, relative to the scene: time and values in a line, with a header "
+        '"time [s], x [kPa], y [kPa]" or in SI units',
+    )
+    direction: Pair | None = Field(None, description="[x, y] that a record with one column of values is multiplied by")
+    times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="times of a piecewise linear history, s, ascending"
+    )
+
+    def _parts(self) -> tuple:
+        raise NotImplementedError
+
+    @model_validator(mode="after")
+    def _one_history(self):
+        value, rate, values, names = self._parts()
+        given = [value is not None, rate is not None, values is not None or self.times_s is not None]
+        if sum(given) + (self.file is not None) != 1:
+            raise ValueError(
+                f"give exactly one of `{names[0]}`, `{names[1]}`, or `times_s` with `{names[2]}` (or a `file`)"
+            )
+        if given[2]:
+            if values is None or self.times_s is None or len(values) != len(self.times_s) or not values:
+                raise ValueError(f"`times_s` and `{names[2]}` need the same number of entries, at least one")
+            if any(b <= a for a, b in zip(self.times_s[:-1], self.times_s[1:])):
+                raise ValueError("`times_s` must ascend")
+        if self.frequency_hz is not None and value is None:
+            raise ValueError(f"`frequency_hz` belongs to `{names[0]}`, the amplitude")
+        if (self.phase_deg or self.until_s is not None) and self.frequency_hz is None:
+            raise ValueError("`phase_deg` and `until_s` belong to `frequency_hz`")
+        if self.until_s is not None and not self.until_s > self.start_s:
+            raise ValueError("the sinusoid must end after it starts")
+        if self.start_s and rate is None and self.frequency_hz is None:
+            raise ValueError(f"`start_s` belongs to `{names[1]}`")
+        if self.direction is not None and self.file is None:
+            raise ValueError("`direction` belongs to `file`")
+        return self
+
+
+class ProfileTable(Table):
+    start: Pair = Field(description="one point of the line along which the traction varies, [x, y], m")
+    end: Pair = Field(description="the other, [x, y], m")
+    factors: Pair = Field(description="what the traction is multiplied by at the two points, linear between and beyond")
+
+    @model_validator(mode="after")
+    def _two_points(self):
+        if self.start == self.end:
+            raise ValueError("`start` and `end` are the same point")
+        return self
+
+
+class TractionTable(Timed):
+    edge: str = Field(description="name of the edges it acts on")
+    follower: bool = Field(False, description="true: it turns with its block (unset: it keeps its direction)")
+    profile: ProfileTable | None = Field(None, description="linear distribution along the edges (unset: uniform)")
+    value_pa: Pair | None = Field(None, description="constant traction [x, y], Pa")
+    rate_pa_per_s: Pair | None = Field(None, description="traction that grows from zero, [x, y], Pa/s")
+    values_pa: Points | None = Field(None, description="tractions [[x, y], …] at `times_s`, Pa")
+
+    def _parts(self):
+        return self.value_pa, self.rate_pa_per_s, self.values_pa, ("value_pa", "rate_pa_per_s", "values_pa")
+
+
+class ForceTable(Timed):
+    at: Pair = Field(description="material point it acts on, [x, y], m")
+    zone: str | None = Field(None, description="zone of that point, where two zones touch")
+    follower: bool = Field(False, description="true: it turns with its block (unset: it keeps its direction)")
+    value_n_per_m: Pair | None = Field(None, description="constant force [x, y] per metre of thickness, N/m")
+    rate_n_per_m_s: Pair | None = Field(None, description="force that grows from zero, [x, y], N/m per s")
+    values_n_per_m: Points | None = Field(None, description="forces [[x, y], …] at `times_s`, N/m")
+
+    def _parts(self):
+        names = ("value_n_per_m", "rate_n_per_m_s", "values_n_per_m")
+        return self.value_n_per_m, self.rate_n_per_m_s, self.values_n_per_m, names
+
+
+class ViscousBoundaryTable(Table):
+    edge: str = Field(description="name of the edges that let waves out (dynamic runs)")
+    times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="times of `incoming_m_per_s`, s, ascending"
+    )
+    incoming_m_per_s: Points | None = Field(
+        None, description="particle velocity [[x, y], …] of a wave that enters there, at `times_s`, m/s (unset: none)"
+    )
+
+    @model_validator(mode="after")
+    def _one_history(self):
+        if (self.times_s is None) != (self.incoming_m_per_s is None):
+            raise ValueError("a wave takes `times_s` and `incoming_m_per_s` together")
+        if self.times_s is not None:
+            if len(self.times_s) != len(self.incoming_m_per_s) or not self.times_s:
+                raise ValueError("`times_s` and `incoming_m_per_s` need the same number of entries, at least one")
+            if any(b <= a for a, b in zip(self.times_s[:-1], self.times_s[1:])):
+                raise ValueError("`times_s` must ascend")
+        return self
+
+
+class MotionTable(Timed):
+    zone: str = Field(description="zone whose blocks are moved, fixed ones too")
+    axes: Literal["x", "y", "xy"] = Field("xy", description="components that are given; the others stay free")
+    turns: bool = Field(False, description="true: the blocks may turn (unset: they keep their direction)")
+    displacement_m: Pair | None = Field(None, description="constant displacement [x, y], m (an amplitude)")
+    velocity_m_per_s: Pair | None = Field(None, description="velocity [x, y], m/s, from `start_s` on")
+    displacements_m: Points | None = Field(None, description="displacements [[x, y], …] at `times_s`, m")
+
+    def _parts(self):
+        names = ("displacement_m", "velocity_m_per_s", "displacements_m")
+        return self.displacement_m, self.velocity_m_per_s, self.displacements_m, names
+
+
+class PointMotionTable(Timed):
+    at: Pair = Field(description="material point that is moved, [x, y], m")
+    zone: str | None = Field(None, description="zone of that point, where two zones touch")
+    axes: Literal["x", "y", "xy"] = Field("xy", description="components that are given; the others stay free")
+    stiffness_n_per_m: Positive | None = Field(
+        None, description="stiffness of the spring that moves it, N/m per metre of thickness (unset: exactly)"
+    )
+    displacement_m: Pair | None = Field(None, description="constant displacement [x, y], m (an amplitude)")
+    velocity_m_per_s: Pair | None = Field(None, description="velocity [x, y], m/s, from `start_s` on")
+    displacements_m: Points | None = Field(None, description="displacements [[x, y], …] at `times_s`, m")
+
+    def _parts(self):
+        names = ("displacement_m", "velocity_m_per_s", "displacements_m")
+        return self.displacement_m, self.velocity_m_per_s, self.displacements_m, names
+
+
+class BaseTable(Timed):
+    frame: Literal["ground", "base"] = Field(
+        "ground",
+        description='"ground": the fixed blocks move as the record says; "base": they stand, and blocks feel minus the '
+        "acceleration",
+    )
+    baseline: Literal["", "constant", "linear"] = Field(
+        "", description="baseline that is taken off a record or table so that the base comes to rest"
+    )
+    acceleration_m_s2: Pair | None = Field(None, description="constant acceleration [x, y], m/s² (an amplitude)")
+    jerk_m_s3: Pair | None = Field(None, description="acceleration that grows from zero, [x, y], m/s³")
+    accelerations_m_s2: Points | None = Field(None, description="accelerations [[x, y], …] at `times_s`, m/s²")
+
+    def _parts(self):
+        names = ("acceleration_m_s2", "jerk_m_s3", "accelerations_m_s2")
+        return self.acceleration_m_s2, self.jerk_m_s3, self.accelerations_m_s2, names
+
+    @model_validator(mode="after")
+    def _has_baseline(self):
+        if self.baseline and self.times_s is None and self.file is None:
+            raise ValueError("`baseline` belongs to a record: `file`, or `times_s` with `accelerations_m_s2`")
+        return self
+
+
+class WaterTableTable(Table):
+    points: Points = Field(description="the water table, [[x, y], …], m, x ascending, level beyond its ends")
+    unit_weight_n_per_m3: Positive = Field(9810.0, description="unit weight of water, N/m³")
+    dry_edges: Names = Field((), description="names of edges that no water reaches")
+    level_times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="times of `levels_m`, s, ascending"
+    )
+    levels_m: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="by how much the whole table is raised at `level_times_s`, m"
+    )
+
+    @model_validator(mode="after")
+    def _line(self):
+        xs = [x for x, _ in self.points]
+        if not xs or any(b <= a for a, b in itertools.pairwise(xs)):
+            raise ValueError("`points` must be at least one, ascending in x")
+        if (self.level_times_s is None) != (self.levels_m is None):
+            raise ValueError("give `level_times_s` and `levels_m` together")
+        if self.level_times_s is not None:
+            if len(self.level_times_s) != len(self.levels_m) or not self.levels_m:
+                raise ValueError("`level_times_s` and `levels_m` need the same number of entries, at least one")
+            if any(b <= a for a, b in zip(self.level_times_s[:-1], self.level_times_s[1:])):
+                raise ValueError("`level_times_s` must ascend")
+        return self
+
+
+class BoltTable(Table):
+    name: str = Field("bolt", description="name of the bolt in history.csv")
+    start: Pair = Field(description="its one end, a material point of a block, [x, y], m")
+    end: Pair = Field(description="its other end, [x, y], m")
+    zone: str | None = Field(None, description="zone of its one end, where two zones touch")
+    end_zone: str | None = Field(None, description="zone of its other end, where two zones touch")
+    end_in_ground: bool = Field(
+        False, description="true: its other end is held by the ground at rest, whatever is there"
+    )
+    stiffness_n_per_m: Positive | None = Field(None, description="EA/L, N/m per metre of thickness")
+    axial_stiffness_n: Positive | None = Field(
+        None, description="EA of a fully grouted bar, N per metre of thickness; it works at every joint it crosses"
+    )
+    active_length_m: Positive | None = Field(
+        None, description="length about a joint over which a grouted bar strains, m"
+    )
+    pretension_n_per_m: NotNegative = Field(0.0, description="force at installation, N/m")
+    yield_force_n_per_m: Positive | None = Field(None, description="force at which it yields, N/m (unset: it does not)")
+    breaking_strain: Positive | None = Field(None, description="strain at which it breaks (unset: it does not)")
+    shear_stiffness_n_per_m: NotNegative = Field(0.0, description="stiffness across its axis (dowel), N/m")
+    shear_strength_n_per_m: Positive | None = Field(
+        None, description="force across its axis that it bears at most, N/m"
+    )
+    start_s: NotNegative = Field(0.0, description="time of its installation, s")
+    compression: bool | None = Field(
+        None, description="true: it takes compression too (unset: a grouted bar does, another goes slack)"
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self):
+        grouted = self.axial_stiffness_n is not None
+        if grouted == (self.stiffness_n_per_m is not None):
+            raise ValueError("give `stiffness_n_per_m`, or `axial_stiffness_n` of a grouted bar")
+        if grouted != (self.active_length_m is not None):
+            raise ValueError("`axial_stiffness_n` and `active_length_m` go together")
+        if grouted and (self.end_in_ground or self.zone is not None or self.end_zone is not None):
+            raise ValueError("a grouted bar finds its blocks itself: leave out `zone`, `end_zone` and `end_in_ground`")
+        if self.start == self.end:
+            raise ValueError("both ends of the bolt are the same point")
+        if self.yield_force_n_per_m is not None and self.pretension_n_per_m > self.yield_force_n_per_m:
+            raise ValueError("the pretension is beyond the yield force")
+        return self
+
+
+class ExcavationTable(Table):
+    time_s: NotNegative = Field(description="when the blocks are taken out, s")
+    zones: Names = Field((), description="zones whose blocks are taken out")
+    polygon: Points | None = Field(None, description="blocks whose centroid lies in it are taken out, [[x, y], …], m")
+    drained: bool = Field(True, description="true: no water presses any more on what lay against them")
+
+    @model_validator(mode="after")
+    def _something(self):
+        if not self.zones and self.polygon is None:
+            raise ValueError("give `zones` or a `polygon`")
+        if self.polygon is not None and len(self.polygon) < 3:
+            raise ValueError("a polygon has at least three points")
+        return self
+
+
+class InSituTable(Table):
+    surface_m: Finite | None = Field(None, description="level of the surface, m: stress grows with the depth below it")
+    unit_weight_n_per_m3: NotNegative | None = Field(None, description="unit weight of the rock above, ρg, N/m³")
+    k0: NotNegative | None = Field(None, description="horizontal over vertical stress")
+    surcharge_pa: NotNegative = Field(0.0, description="pressure on the surface, Pa")
+    stress_pa: Annotated[tuple[Finite, Finite, Finite], Strict(False)] | None = Field(
+        None, description="stress [xx, yy, xy] at `about`, Pa, tension positive, instead of a surface"
+    )
+    gradient_x_pa_per_m: Annotated[tuple[Finite, Finite, Finite], Strict(False)] = Field(
+        (0.0, 0.0, 0.0), description="its change along x, Pa/m"
+    )
+    gradient_y_pa_per_m: Annotated[tuple[Finite, Finite, Finite], Strict(False)] = Field(
+        (0.0, 0.0, 0.0), description="its change along y, Pa/m"
+    )
+    about: Pair = Field((0.0, 0.0), description="point at which `stress_pa` is given, [x, y], m")
+
+    @model_validator(mode="after")
+    def _one_way(self):
+        level = [self.surface_m, self.unit_weight_n_per_m3, self.k0]
+        if self.stress_pa is None and any(part is None for part in level):
+            raise ValueError("give `surface_m`, `unit_weight_n_per_m3` and `k0`, or `stress_pa`")
+        if self.stress_pa is not None and any(part is not None for part in level):
+            raise ValueError("give either a surface with `k0`, or `stress_pa`, not both")
+        return self
+
+
+class LoadsTable(Table):
+    gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
+    gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
+    leading_edge: str | None = Field(
+        None,
+        description="edges whose traction is the load of a run, positive in compression (unset: the first traction's)",
+    )
+    tractions: Annotated[tuple[TractionTable, ...], Strict(False)] = Field((), description="tractions on named edges")
+    forces: Annotated[tuple[ForceTable, ...], Strict(False)] = Field((), description="forces on points")
+    viscous_boundaries: Annotated[tuple[ViscousBoundaryTable, ...], Strict(False)] = Field(
+        (), description="named edges that absorb waves, or let one in"
+    )
+    water: WaterTableTable | None = Field(None, description="water in all joints below a water table")
+    base: BaseTable | None = Field(None, description="shaking of the base that the blocks stand on")
+    motions: Annotated[tuple[MotionTable, ...], Strict(False)] = Field((), description="blocks whose motion is given")
+    point_motions: Annotated[tuple[PointMotionTable, ...], Strict(False)] = Field(
+        (), description="points whose motion is given"
+    )
+    bolts: Annotated[tuple[BoltTable, ...], Strict(False)] = Field((), description="bolts and anchors")
+    excavations: Annotated[tuple[ExcavationTable, ...], Strict(False)] = Field(
+        (), description="blocks that are taken out while the run goes on"
+    )
+    in_situ: InSituTable | None = Field(
+        None, description="stress of the rock before the run; displacements count from its equilibrium"
+    )
+
+    @property
+    def timed(self) -> list[tuple[tuple, Timed]]:
+        """Every load that is a function of time, with its place in the section."""
+        lists = ("tractions", "forces", "motions", "point_motions")
+        found = [((name, k), load) for name in lists for k, load in enumerate(getattr(self, name))]
+        return found + ([(("base",), self.base)] if self.base is not None else [])

@@ -1,0 +1,54 @@
+"""What a run records and draws: [gauge], [[monitors]], [output], [render]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .entries import NotNegative, Pair, Positive, Table
+
+
+class GaugeTable(Table):
+    start: Pair = Field(alias="from", description="one end of the axial strain gauge, [x, y], m")
+    to: Pair = Field(description="its other end, [x, y], m")
+    zone: str | None = Field(None, description="zone that carries it, where zones touch")
+
+
+class MonitorTable(Table):
+    name: str = Field(description="name of the monitor point in history.csv")
+    at: Pair = Field(description="material point whose displacement is recorded, [x, y], m")
+    zone: str | None = Field(None, description="zone of that point, where two zones touch")
+
+
+class OutputTable(Table):
+    every: Annotated[int, Field(ge=1)] = Field(
+        1, description="write every n-th cycle; cycles with growth or an event, the first and the last always"
+    )
+    joints: bool | None = Field(
+        None,
+        description="write opening, slip and forces of every joint (joints.csv) and what fixed and guided blocks carry "
+        "(reactions.csv) (unset: in scenes without cracks)",
+    )
+    interior: bool = Field(True, description="write stress inside cracked rock (interior.pvd)")
+    interior_every: Annotated[int, Field(ge=1)] = Field(
+        5,
+        description="write the interior every n-th cycle while cracks grow, every 10 n-th while none does; at the first "
+        "load, with events, before and after a block is cut and at the end always",
+    )
+    configuration: Literal["reference", "current"] = Field(
+        "reference", description='coordinates in files: "reference" with displacement, or "current"'
+    )
+
+
+class RenderTable(Table):
+    component: Literal["xx", "yy", "zz", "xy", "principal_max", "principal_min", "von_mises"] = Field(
+        "yy", description="stress component that pictures show"
+    )
+    width_px: Annotated[int, Field(ge=64)] = Field(800, description="width of pictures, pixels")
+    deformation_scale: NotNegative | None = Field(
+        None, description="displacements are drawn this much larger (unset: so that they are seen)"
+    )
+    crack_colour: Literal["birth", "opening"] = Field("birth", description="what the colour of cracks means")
+    gif: bool = Field(True, description="also make a moving picture of the growth")
+    frames_per_second: Positive = Field(10.0, description="pace of the moving picture")

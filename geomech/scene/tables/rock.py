@@ -1,0 +1,111 @@
+"""What rock, joints and crack faces are made of: [materials], [zones], [joints], [cracks]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, Strict, field_validator
+
+from .entries import Names, NotNegative, Positive, Table
+
+
+class MaterialTable(Table):
+    youngs_modulus_pa: Positive = Field(description="Young's modulus, Pa")
+    poissons_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
+    density_kg_m3: NotNegative = Field(description="density, kg/m³")
+    k_ic_pa_sqrt_m: Positive | None = Field(
+        None, description="fracture toughness in mode I, Pa √m; needed where cracks may grow"
+    )
+    k_iic_pa_sqrt_m: Positive | None = Field(
+        None, description='toughness against growth in shear, Pa √m, for growth.criterion = "f" (unset: no such growth)'
+    )
+    tensile_strength_pa: Positive | None = Field(
+        None, description="tensile strength of intact rock, Pa, for growth.initiation (unset: it does not tear)"
+    )
+    cohesion_pa: Positive | None = Field(
+        None, description="cohesion of intact rock, Pa, for growth.initiation (unset: it does not shear)"
+    )
+    internal_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
+        0.0, description="angle of internal friction of intact rock, beside its cohesion, degrees"
+    )
+    plane: Literal["strain", "stress"] = Field("strain", description='"strain" or "stress" in the plane')
+    rigid: bool = Field(
+        False,
+        description="true: its blocks move without straining; the modulus sets the springs of their contacts only",
+    )
+
+
+class ZoneTable(Table):
+    material: str | None = Field(None, description="a name of [materials] (unset: the only one there is)")
+    fixed: bool = Field(False, description="true: its blocks do not move")
+    guided: Literal["x", "y"] | None = Field(
+        None,
+        description='"x" or "y": its blocks move along that axis only and neither turn nor shear, as a press\'s platen',
+    )
+
+
+class JointTable(Table):
+    friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
+        0.0, description="friction angle, degrees: that of the peak, with jrc the residual one"
+    )
+    cohesion_pa: NotNegative = Field(0.0, description="cohesion, Pa, until the joint slips or parts")
+    tensile_strength_pa: NotNegative = Field(0.0, description="tensile strength, Pa, until the joint slips or parts")
+    residual_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] | None = Field(
+        None, description="friction angle after slip, degrees (unset: as before)"
+    )
+    residual_cohesion_pa: NotNegative = Field(0.0, description="cohesion after slip, Pa, of faces that have not parted")
+    softening_slip_m: NotNegative = Field(
+        0.0, description="slip over which friction and cohesion fall to their residual values, m (0: at once)"
+    )
+    dilation_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
+        0.0, description="angle at which sliding faces rise on each other, degrees"
+    )
+    dilation_slip_m: Positive | None = Field(
+        None, description="slip from the start after which they rise no more, m (unset: they go on)"
+    )
+    jrc: Annotated[float, Field(gt=0, le=20)] | None = Field(
+        None, description="joint roughness coefficient of Barton and Bandis (unset: straight Coulomb friction)"
+    )
+    jcs_pa: Positive | None = Field(None, description="compressive strength of the joint's wall, Pa, with jrc")
+    joint_length_m: Positive | None = Field(
+        None, description="length to which jrc and jcs_pa are corrected, m: of the joint's blocks (unset: the sample's)"
+    )
+    sample_length_m: Positive = Field(0.1, description="length of the sample that jrc and jcs_pa are of, m")
+    stiffness_from_peak_slip: bool = Field(
+        False, description="true: shear stiffness of a rough joint from its strength and the slip of its peak"
+    )
+    normal_stiffness_pa_per_m: Positive | None = Field(
+        None, description="normal stiffness, Pa/m (unset: the solver's penalty springs)"
+    )
+    shear_stiffness_pa_per_m: Positive | None = Field(
+        None, description="shear stiffness, Pa/m (unset: the solver's penalty springs)"
+    )
+    max_closure_m: Positive | None = Field(
+        None,
+        description="closure that a joint tends to, m: it stiffens hyperbolically from normal_stiffness_pa_per_m on",
+    )
+    edges: Names = Field(
+        (),
+        description='contacts where either edge has one of these names; "*" matches anything, "crack:NAME" is a '
+        "face that a crack's growth has made",
+    )
+    between: Annotated[tuple[Annotated[tuple[str, str], Strict(False)], ...], Strict(False)] = Field(
+        (), description="contacts between these pairs of edge names, [[a, b], …]; goes before `edges`"
+    )
+
+
+class CrackTable(Table):
+    aperture: float | str = Field(
+        "closed", description='"closed", "slot" (its faces never meet) or the initial aperture in m'
+    )
+    joint: str | None = Field(
+        None, description="a name of [joints] whose law its faces follow, its wings with friction only (unset: smooth)"
+    )
+
+    @field_validator("aperture", mode="before")
+    @classmethod
+    def _known(cls, value: Any) -> Any:
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if value in ("closed", "slot") or (number and 0 <= value < float("inf")):
+            return value
+        raise ValueError(f'the aperture is "closed", "slot" or a length in m, not {value!r}')

@@ -1,0 +1,155 @@
+"""How blocks are moved, cracks resolved and grown, and for how long: [dda], [ddm], [growth], [run]."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, field_validator, model_validator
+
+from ...model import rayleigh_coefficients
+from .entries import NotNegative, Pair, Positive, Table
+
+
+class DdaTable(Table):
+    time_step_s: Positive = Field(1.0, description="longest time step, s")
+    automatic_time_step: bool = Field(
+        False,
+        description="steps grow and shrink below `time_step_s` by displacement and open–close iterations",
+    )
+    dynamic_factor: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0, description="share of the velocity carried from step to step: 0 static, 1 dynamic"
+    )
+    damping: NotNegative = Field(
+        0.4,
+        description="damping of dynamic steps, as a fraction of the critical one of a block's lowest vibration (below 0.3 a "
+        "block that should stick may creep; waves that cross many blocks want less)",
+    )
+    newmark: Pair = Field(
+        (0.5, 1.0),
+        description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation; "
+        "2β ≥ γ ≥ 0.5",
+    )
+    spectral_radius: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None,
+        description="in place of `newmark`: a second-order scheme that damps to this part a step what the step does not "
+        "resolve; 1 not at all, 0 at once",
+    )
+    equilibrium: Literal["", "start", "loads"] = Field(
+        "",
+        description='when static equilibrium is sought, whatever the time step: "" never, "start" before the run begins, '
+        '"loads" at every load of a static run too; a run ends where there is none',
+    )
+    unbalanced_tolerance: Positive = Field(
+        1e-6, description="equilibrium: largest unbalanced force on a block, over the mean force on blocks"
+    )
+    rayleigh_fractions: Annotated[tuple[NotNegative, NotNegative], Strict(False)] | None = Field(
+        None,
+        description="Rayleigh damping of dynamic steps: fractions of the critical one at `rayleigh_frequencies_hz`, "
+        "beside `damping`",
+    )
+    rayleigh_frequencies_hz: Annotated[tuple[Positive, Positive], Strict(False)] | None = Field(
+        None, description="the two frequencies of `rayleigh_fractions`, Hz"
+    )
+    max_displacement_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.001, description="largest displacement in a step, in units of half the height of the domain"
+    )
+    normal_penalty_pa: Positive | None = Field(
+        None,
+        description="stiffness of normal contact springs, Pa (unset: from the stiffness of both blocks and the shape of the face)",
+    )
+    shear_penalty_pa: Positive | None = Field(
+        None, description="stiffness of shear contact springs, Pa (unset: from the normal one)"
+    )
+    contact: Literal["penalty", "augmented"] = Field(
+        "penalty",
+        description='"penalty": springs hold the faces of blocks; "augmented": forces are added until they neither '
+        "penetrate nor give, however soft the springs",
+    )
+    penetration_tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
+        1e-8,
+        description='what "augmented" contacts may still gape or give, in units of the smallest block\'s size, √area',
+    )
+    max_open_close_iterations: Annotated[int, Field(ge=1)] = Field(
+        60, description="open–close iterations before the time step is cut"
+    )
+    max_step_cuts: Annotated[int, Field(ge=0)] = Field(12, description="how often a step is cut before the run fails")
+
+    @field_validator("newmark")
+    @classmethod
+    def _stable(cls, value):
+        beta, gamma = value
+        if not 2 * beta >= gamma >= 0.5:
+            raise ValueError(f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: 2β ≥ γ ≥ 0.5")
+        return value
+
+    @model_validator(mode="after")
+    def _damped(self):
+        if (self.rayleigh_fractions is None) != (self.rayleigh_frequencies_hz is None):
+            raise ValueError("Rayleigh damping takes `rayleigh_fractions` and `rayleigh_frequencies_hz` together")
+        if self.rayleigh_fractions is not None:
+            rayleigh_coefficients(self.rayleigh_fractions, self.rayleigh_frequencies_hz)
+        return self
+
+
+class DdmTable(Table):
+    target_error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
+        None, description="relative error of K asked for; order, elements and grading then follow from it"
+    )
+    order: Annotated[int, Field(ge=0, le=10)] = Field(4, description="polynomial order of the elements")
+    nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points of an element")
+    elements_per_crack: Annotated[int, Field(ge=1)] = Field(4, description="elements of a straight crack")
+    elements_per_side: Annotated[int, Field(ge=1)] = Field(6, description="elements of a block's side")
+    grading_ratio: Annotated[float, Field(gt=0, lt=1)] = Field(
+        0.3, description="ratio of neighbouring elements at kinks, junctions and mouths"
+    )
+    grading_layers: Annotated[int, Field(ge=0)] = Field(2, description="layers of that grading")
+    solver: Literal["auto", "dense", "compressed"] = Field(
+        "auto", description="how the cracks' equations are solved: factored, or iterated when they are many"
+    )
+
+
+class GrowthTable(Table):
+    enabled: bool = Field(True, description="false: cracks open and slide, none grows")
+    criterion: Literal["mts", "g", "s", "f"] = Field(
+        "mts",
+        description='growth criterion: "mts" maximum tangential stress, "g" maximum energy release rate, "s" minimum '
+        'strain-energy density, "f" tension and shear, each against its own toughness',
+    )
+    increment_m: Positive | None = Field(
+        None, description="longest advance of a tip in a cycle, m (unset: a tenth of the shortest crack)"
+    )
+    min_increment_m: Positive | None = Field(None, description="shortest advance, m (unset: a tenth of the longest)")
+    join_distance: NotNegative = Field(
+        0.5, description="nearer than this to a crack or a surface a tip joins it, in units of the increment"
+    )
+    max_passes: Annotated[int, Field(ge=1)] = Field(200, description="growth passes at one load")
+    correct: bool = Field(
+        True, description="predict each step, then bend it towards where it would go on: paths of second order"
+    )
+    initiation: Literal["", "surface", "everywhere"] = Field(
+        "",
+        description='where cracks are born when intact rock reaches its strength: "" nowhere, "surface" on outlines, '
+        'holes and crack faces, "everywhere" inside blocks too',
+    )
+    initiation_distance_m: NotNegative = Field(
+        0.0, description="stress is averaged over this distance into the rock, m (0: at the point)"
+    )
+    initiation_spacing_m: NotNegative = Field(
+        0.0, description="least distance between cracks at birth, m (0: five increments)"
+    )
+    trial_kink_m: NotNegative = Field(
+        0.0,
+        description='length of the kinks that criterion "f" tries in all directions, faces in contact and with friction, m '
+        "(0: kinks of no length, on which nothing presses; an increment or less sees shear cracks under compression)",
+    )
+
+
+class RunTable(Table):
+    end_time_s: Positive = Field(description="the run ends at this time, s")
+    stop_at: Annotated[
+        tuple[Literal["initiation", "birth", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
+    ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
+    boundary_stress: Literal["contacts"] = Field(
+        "contacts",
+        description='how contact forces become tractions on cracked blocks: "contacts", linear over each face',
+    )
