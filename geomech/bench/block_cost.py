@@ -265,6 +265,9 @@ def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict],
         for c in costs
     ]
     lines += [f"  exponent of an iteration's cost, {name}: {e:.2f} (goal {EXPONENT})" for name, e in exponents.items()]
+    lines.append(
+        f"  largest share of the contact search: {max(c.search / c.step for c in costs):.0%} (goal {SEARCH:.0%})"
+    )
     lines += [
         "",
         "an iteration of a wall beside Shi's DDA in C (measured on a machine of the same kind, cost as n^1.8)",
