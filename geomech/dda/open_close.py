@@ -1,16 +1,13 @@
 """Open–close iterations: contact states that agree with the motion they produce.
 
-A set of states makes the step linear; its solution is checked against them. A closed contact must not pull beyond its
-tensile strength, an open one must not penetrate, a sticking one must hold less than its strength μN + cℓ, and a sliding
-one would carry more than it does if it stuck (the return mapping of an elastic-plastic spring, under which exactly one of the
-states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves cases in which none does). Every contact
-that fails is switched and the step solved again: Newton's method, which ends in two or three iterations where few contacts
-change. Bonds, lost for good, break only when all else is right.
+A set of states makes the step linear; its solution is checked against them (`contact_states`). Every contact that fails is
+switched and the step solved again: Newton's method, which ends in two or three iterations where few contacts change. Bonds,
+lost for good, break only when all else is right.
 
 Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states returns,
-the `CentralPath` proposes states to go on from, unless contacts are few. If it ends without, the sliding contacts stick again and only the worst
-contact of each block is switched, and if a combination still returns, only the first (the least-index rule, which cannot
-cycle where the problem has one solution; Murty 1974).
+the `CentralPath` proposes states to go on from, unless contacts are few. If it ends without, the sliding contacts stick
+again and only the worst contact of each block is switched, and if a combination still returns, only the first (the
+least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
 Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
 """
 
@@ -19,12 +16,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from ..model import OPEN, SLIP, STICK
+from ..model import SLIP, STICK
 from . import assembly
 from .central_path import CentralPath
 from .contact_springs import Springs
+from .contact_states import check_states, contact_forces
 from .contacts import ContactSet
 from .curved_joints import CurvedJoints
 
@@ -74,114 +71,6 @@ class Unsettled(Exception):
     def __init__(self, reason: str, contact: int = -1) -> None:
         super().__init__(reason)
         self.contact = contact
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _move(unknowns, block, other, order, vectors, c, k):
-    total = 0.0
-    i, j = order[block[c]], order[other[c]]
-    if i >= 0:
-        for a in range(6):
-            total += vectors[c, k, a] * unknowns[6 * i + a]
-    if j >= 0:
-        for a in range(6):
-            total += vectors[c, k, 6 + a] * unknowns[6 * j + a]
-    return total
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def contact_forces(
-    unknowns, block, other, order, vectors, state, direction, gap0, normal, shear, friction, sliding, lift, shear0
-):
-    """(n, 4): normal force, shear force, new gap and motion along the edge in the step, in the present states."""
-    n = block.shape[0]
-    forces = np.zeros((n, 4))
-    for c in range(n):
-        forces[c, 3] = _move(unknowns, block, other, order, vectors, c, 1)
-        forces[c, 2] = gap0[c] + _move(unknowns, block, other, order, vectors, c, 0) - lift[c] * forces[c, 3]
-        if state[c] != OPEN:
-            forces[c, 0] = -normal[c] * forces[c, 2]
-            if state[c] == STICK:
-                forces[c, 1] = shear0[c] - shear[c] * forces[c, 3]
-            else:
-                forces[c, 1] = direction[c] * (friction[c] * forces[c, 0] + sliding[c])
-    return forces
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def check_states(
-    forces,
-    partner,
-    state,
-    direction,
-    bonded,
-    normal,
-    shear,
-    friction,
-    sliding,
-    peak,
-    hold,
-    cohesion,
-    tension,
-    keeps,
-    shear0,
-    slack,
-):
-    """The states that the ``forces`` (n, 4) of `contact_forces` call for.
-
-    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). ``slack`` (m) is the
-    round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a thousand
-    times better.
-    """
-    n = state.shape[0]
-    new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
-    violation = np.zeros(n)
-    for c in range(n):
-        gap, slide = forces[c, 2], forces[c, 3]
-        if state[c] == OPEN:
-            if gap >= -slack:
-                continue
-            inside = True
-            for k in range(2):
-                p = partner[c, k]
-                # Corners overlap only where both lines are crossed; the lesser penetration, or the first of equals, acts.
-                if p >= 0 and (
-                    forces[p, 2] >= -slack or state[p] != OPEN or forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
-                ):
-                    inside = False
-            if inside:
-                violation[c] = -normal[c] * gap
-                # The state to try is that of the springs under the motion at hand: sticking where it would have to slide,
-                # a contact may pull, open, close again and never come to sliding.
-                trial = shear0[c] - shear[c] * slide
-                if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
-                    new_state[c], new_direction[c] = SLIP, np.sign(trial)
-                else:
-                    new_state[c] = STICK
-            continue
-        pull = tension[c] if bonded[c] == 1 else 0.0
-        out = False
-        for k in range(2):
-            p = partner[c, k]
-            out = out or (p >= 0 and forces[p, 2] > slack and gap < 0.0)
-        if -forces[c, 0] > pull * (1.0 + 1e-9) + normal[c] * slack or out:
-            new_state[c], new_bonded[c] = OPEN, 0
-            violation[c] = normal[c] * abs(gap)
-        elif state[c] == STICK:
-            strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
-            excess = abs(forces[c, 1]) - strength
-            if excess > 1e-9 * strength + 1e-3 * shear[c] * slack:
-                new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
-                new_direction[c] = np.sign(forces[c, 1])
-                violation[c] = excess
-        elif friction[c] > 0.0 or sliding[c] > 0.0:
-            strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
-            trial = direction[c] * (shear0[c] - shear[c] * slide)
-            if strength - trial > 1e-9 * strength + 1e-3 * shear[c] * slack:
-                # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
-                new_state[c] = STICK
-                violation[c] = strength - trial
-    return new_state, new_direction, new_bonded, violation
 
 
 def _plastic(forces: np.ndarray, state: np.ndarray, shear_force: np.ndarray, springs: Springs) -> np.ndarray:

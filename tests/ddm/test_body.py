@@ -275,3 +275,17 @@ def test_kink_is_graded_and_forgotten():
     assert np.allclose(two["k_i"], six["k_i"], rtol=3e-3) and np.allclose(two["k_ii"], six["k_ii"], atol=3e-3)
     on_first = [np.sum(body(n, 2).faces.source == 0) for n in (1, 2, 3, 4)]
     assert on_first[0] == on_first[1] == 6 and on_first[2] == on_first[3] == 4
+
+
+def test_principal_stresses_are_those_of_the_tensor():
+    """σ₁ ≥ σ₂ with their direction: of simple compression σ₂ = −1 along y, elsewhere the eigenvalues of the tensor (round-off)."""
+    points = np.array([[0.5, 0.4], [-0.8, 0.1], [0.05, -0.3]])
+    whole, angle = ddm.Body([SQUARE], NONE, ROCK).solve(pressed(-1.0)).principal_stress(points)
+    np.testing.assert_allclose(whole, [[0.0, -1.0]] * 3, atol=1e-9)
+    np.testing.assert_allclose(angle, 0.0, atol=1e-9)
+    cracked = ddm.Body([SQUARE], grown(0, aperture=math.inf), ROCK).solve(pressed(-1.0))
+    principal, angle = cracked.principal_stress(points)
+    for (xx, yy, xy), pair, a in zip(cracked.stress(points), principal, angle):
+        tensor, along = np.array([[xx, xy], [xy, yy]]), np.array([math.cos(a), math.sin(a)])
+        np.testing.assert_allclose(np.linalg.eigvalsh(tensor)[::-1], pair, atol=1e-13)
+        np.testing.assert_allclose(tensor @ along, pair[0] * along, atol=1e-13)

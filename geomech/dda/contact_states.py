@@ -1,0 +1,122 @@
+"""Forces that contacts carry in given states, and the states that these forces call for.
+
+A closed contact must not pull beyond its tensile strength, an open one must not penetrate, a sticking one must hold less than
+its strength μN + cℓ, and a sliding one would carry more than it does if it stuck (the return mapping of an elastic-plastic
+spring, under which exactly one of the states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves
+cases in which none does).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..model import OPEN, SLIP, STICK
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _move(unknowns, block, other, order, vectors, c, k):
+    total = 0.0
+    i, j = order[block[c]], order[other[c]]
+    if i >= 0:
+        for a in range(6):
+            total += vectors[c, k, a] * unknowns[6 * i + a]
+    if j >= 0:
+        for a in range(6):
+            total += vectors[c, k, 6 + a] * unknowns[6 * j + a]
+    return total
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def contact_forces(
+    unknowns, block, other, order, vectors, state, direction, gap0, normal, shear, friction, sliding, lift, shear0
+):
+    """(n, 4): normal force, shear force, new gap and motion along the edge in the step, in the present states."""
+    n = block.shape[0]
+    forces = np.zeros((n, 4))
+    for c in range(n):
+        forces[c, 3] = _move(unknowns, block, other, order, vectors, c, 1)
+        forces[c, 2] = gap0[c] + _move(unknowns, block, other, order, vectors, c, 0) - lift[c] * forces[c, 3]
+        if state[c] != OPEN:
+            forces[c, 0] = -normal[c] * forces[c, 2]
+            if state[c] == STICK:
+                forces[c, 1] = shear0[c] - shear[c] * forces[c, 3]
+            else:
+                forces[c, 1] = direction[c] * (friction[c] * forces[c, 0] + sliding[c])
+    return forces
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def check_states(
+    forces,
+    partner,
+    state,
+    direction,
+    bonded,
+    normal,
+    shear,
+    friction,
+    sliding,
+    peak,
+    hold,
+    cohesion,
+    tension,
+    keeps,
+    shear0,
+    slack,
+):
+    """The states that the ``forces`` (n, 4) of `contact_forces` call for.
+
+    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). ``slack`` (m) is the
+    round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a thousand
+    times better.
+    """
+    n = state.shape[0]
+    new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
+    violation = np.zeros(n)
+    for c in range(n):
+        gap, slide = forces[c, 2], forces[c, 3]
+        if state[c] == OPEN:
+            if gap >= -slack:
+                continue
+            inside = True
+            for k in range(2):
+                p = partner[c, k]
+                # Corners overlap only where both lines are crossed; the lesser penetration, or the first of equals, acts.
+                if p >= 0 and (
+                    forces[p, 2] >= -slack or state[p] != OPEN or forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
+                ):
+                    inside = False
+            if inside:
+                violation[c] = -normal[c] * gap
+                # The state to try is that of the springs under the motion at hand: sticking where it would have to slide,
+                # a contact may pull, open, close again and never come to sliding.
+                trial = shear0[c] - shear[c] * slide
+                if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
+                    new_state[c], new_direction[c] = SLIP, np.sign(trial)
+                else:
+                    new_state[c] = STICK
+            continue
+        pull = tension[c] if bonded[c] == 1 else 0.0
+        out = False
+        for k in range(2):
+            p = partner[c, k]
+            out = out or (p >= 0 and forces[p, 2] > slack and gap < 0.0)
+        if -forces[c, 0] > pull * (1.0 + 1e-9) + normal[c] * slack or out:
+            new_state[c], new_bonded[c] = OPEN, 0
+            violation[c] = normal[c] * abs(gap)
+        elif state[c] == STICK:
+            strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
+            excess = abs(forces[c, 1]) - strength
+            if excess > 1e-9 * strength + 1e-3 * shear[c] * slack:
+                new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
+                new_direction[c] = np.sign(forces[c, 1])
+                violation[c] = excess
+        elif friction[c] > 0.0 or sliding[c] > 0.0:
+            strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
+            trial = direction[c] * (shear0[c] - shear[c] * slide)
+            if strength - trial > 1e-9 * strength + 1e-3 * shear[c] * slack:
+                # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
+                new_state[c] = STICK
+                violation[c] = strength - trial
+    return new_state, new_direction, new_bonded, violation
