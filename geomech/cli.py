@@ -1,4 +1,4 @@
-"""The command line: ``geomech check | run | safety | render | report | bench | doctor``.
+"""The command line: ``geomech check | build | run | safety | render | report | bench | doctor``.
 
 Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input. Nothing heavy is imported before a
 verb asks for it.
@@ -75,6 +75,14 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     _scene_arguments(check)
     check.add_argument("--keys", action="store_true", help="list every key a scene may have, and what it means")
+
+    build = verb(
+        "build", _build, "write the blocks that a scene is cut into, and a picture of them, before anything runs",
+        "geomech build slope.toml\ngeomech build slope.toml --set geometry.seed=7 --out /tmp/seed7",
+    )  # fmt: skip
+    _scene_arguments(build)
+    build.add_argument("--out", type=Path, metavar="DIR", help="folder (default outputs/NAME[/VARIANT]/build)")
+    build.add_argument("--picture", type=Path, metavar="FILE", help="where the picture goes (default DIR/blocks.png)")
 
     run = verb(
         "run", _run, "run a scene, or a pipeline folder, and write its run folder",
@@ -165,6 +173,23 @@ def _check(options: argparse.Namespace) -> int:
         print("\n".join([f"{problem.title}: {problem.inventory}{tips}: no errors", *scene.overview()]))
     if first.variants and not options.variants:
         print(f"variants: {', '.join(first.variants)}")
+    return DONE
+
+
+def _build(options: argparse.Namespace) -> int:
+    from .output.block_system import write_block_system
+    from .render.block_map import draw_block_map
+    from .scene import load_scene
+
+    scenes = _scenes(load_scene(options.scene, options.overrides, None), options)
+    _say_warnings(scenes.values())
+    for name, scene in scenes.items():
+        folder = options.out or (default_folder(options.scene) / (name or "") / "build")
+        folder = folder / name if options.out and name and len(scenes) > 1 else folder
+        told = write_block_system(scene, folder)
+        picture = options.picture or folder / "blocks.png"
+        draw_block_map(scene, told, picture)
+        print("\n".join([f"{told['title']}: {told['summary']}", *told["lines"], f"  written   {folder}, {picture}"]))
     return DONE
 
 

@@ -186,11 +186,27 @@ EVENTS: dict[str, str] = {
     "detail": "-",
 }
 
+#: What `geomech build` leaves of a scene before anything has run: file name → its fields.
+PREPARED: dict[str, tuple[Field, ...]] = {
+    "block_system": (
+        Field("block_id", "cell", "-", "index of the block", dtype="int32"),
+        Field(
+            "zone", "cell", "-", "index of the zone it was cut from, in the order of block_system.json", dtype="int32"
+        ),
+        Field("material", "cell", "-", "index of the block's material", dtype="int32"),
+        Field("fixed", "cell", "-", "1 where the block does not move", dtype="int32"),
+        Field("area", "cell", "m²", "area of the whole block"),
+    ),
+    "joint_lines": (
+        Field("name_id", "cell", "-", "index of the edge name, crack or -1, in block_system.json", dtype="int32"),
+        Field("kind", "cell", "-", "0 edge between blocks or outline, 1 crack, 2 rock bridge", dtype="int32"),
+    ),
+}
 
 #: (series, place) → name → field.
 _DECLARED = {
     (series, place): {f.name: f for f in fields if f.place == place}
-    for series, fields in SERIES.items()
+    for series, fields in (SERIES | PREPARED).items()
     for place in ("point", "cell")
 }
 

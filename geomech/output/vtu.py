@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .fields import SERIES, declared
+from .fields import PREPARED, SERIES, declared
 
 #: Cell types of the VTK file format.
 VERTEX, LINE, TRIANGLE = 1, 3, 5
@@ -105,7 +105,7 @@ class _Layout:
         for section, place, count in (("PointData", "point", n_points), ("CellData", "cell", n_cells)):
             columns += [
                 _Column(section, f.name, np.dtype(f.dtype).str[1:], (count, *f.shape), f.components)
-                for f in SERIES[series]
+                for f in (SERIES | PREPARED)[series]
                 if f.place == place
             ]
         columns += [

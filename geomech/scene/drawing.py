@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,13 +17,16 @@ from .errors import Fault
 from .locator import Path
 from .tables.geometry import CrackShape, Geometry
 
+if TYPE_CHECKING:
+    from .jointing import Jointed
+
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """Blocks and cracks before materials and apertures are given. ``zones`` (n_blocks,) is the
     name of the zone each block belongs to, ``cracks_drawn`` the names of the cracks, ``parameters`` those of a Gmsh
     model, as used, ``choices`` the names of their values where they have such, ``model`` its file, ``joints`` what edges along
-    joints are called, whether or not a block has such an edge. ``blocks`` is None
+    joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock. ``blocks`` is None
     where the drawing cannot be assembled."""
 
     zones: tuple[str, ...]
@@ -33,6 +37,7 @@ class Drawing:
     choices: dict[str, Mapping[str, float]] = field(default_factory=dict)
     model: FilePath | None = None
     joints: tuple[str, ...] = ()
+    jointed: Jointed | None = None
 
     def choices_with_edge(self, name: str) -> str:
         """The choices of one parameter with which the model has edges called ``name``, as a scene says them; empty
@@ -111,6 +116,7 @@ def draw(
     names = tuple(zone.name for zone in zones)
     drawn = tuple(trace.name for trace in traces)
     joints: tuple[str, ...] = ()
+    cut: Jointed | None = None
     own_joints = len({joint.name for joint in geometry.joints})
     try:
         if geometry.joints or geometry.joint_sets or drawn_joints:
@@ -139,7 +145,7 @@ def draw(
                 message = f"{FilePath(geometry.model).name}: {f'{entity}: ' if entity else ''}{message}"
             faults.append(Fault(place(at), message, flaw.way_out))
         return Drawing(names, drawn, None, None, parameters, choices, model)
-    return Drawing(names, drawn, blocks, cracks, parameters, choices, model, joints)
+    return Drawing(names, drawn, blocks, cracks, parameters, choices, model, joints, cut)
 
 
 def _loops(zone) -> tuple[np.ndarray, ...]:

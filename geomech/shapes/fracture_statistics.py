@@ -25,12 +25,12 @@ class SetStatistics:
     angle_deviation: float
 
 
-def set_statistics(joint: Joint, region: np.ndarray, scan_lines: int = 200) -> SetStatistics:
-    """Statistics of ``joint`` inside ``region`` (n, 2); ``p10`` on equidistant ``scan_lines`` at right angles to its mean
+def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics:
+    """Statistics of ``joint`` inside ``region``, (n, 2) or a shapely polygon; ``p10`` on equidistant ``scan_lines`` at right angles to its mean
     direction."""
     import shapely
 
-    area = shapely.Polygon(region)
+    area = shapely.Polygon(region) if isinstance(region, np.ndarray) else region
     lines = shapely.linestrings([line[[0, -1]] for line in joint.lines]) if joint.lines else np.empty(0, object)
     inside = shapely.intersection(lines, area)
     length = shapely.length(inside)
