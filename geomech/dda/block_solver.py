@@ -103,43 +103,44 @@ class BlockSolver:
         """The number of each of the matrix blocks ``keys``."""
         return np.searchsorted(self.keys, keys)
 
-    def solve(self, data: np.ndarray, right: np.ndarray) -> np.ndarray:
-        """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row. Raises numpy.linalg.LinAlgError."""
+    def solve(self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL) -> np.ndarray:
+        """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row, with a residual ``within`` that part of ``right``, or of
+        round-off. Raises numpy.linalg.LinAlgError."""
         if self._factors.single:
             try:
-                x = self._solved(data, right)
+                x = self._solved(data, right, within)
             except np.linalg.LinAlgError:
                 x = None
             if x is not None:
                 return x
             # Beyond single precision: double from now on.
             self._factors, self._has_factors = Factors(*self._pattern), False
-        return self._solved(data, right)
+        return self._solved(data, right, within)
 
-    def _solved(self, data: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+    def _solved(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
         """`solve` with the factors as they are; None where single precision does not do."""
         if self._has_factors:
             changed = _changed(data, self._diagonal, self._factored, CHANGED)
             if np.count_nonzero(changed) > (0 if self._factors.tree.kept else FEW):
                 self.factor(data, changed)
-            x = self._iterate(data, right)
+            x = self._iterate(data, right, within)
             if x is not None:
                 return x
         self.factor(data)
         if self._factors.single:
-            return self._iterate(data, right)
+            return self._iterate(data, right, within)
         x = self.substitute(right)
         for _ in range(REFINEMENTS):
-            rest, target = self._residual(data, right, x)
+            rest, target = self._residual(data, right, x, within)
             if not np.abs(rest).max() > target:
                 break
             x += self.substitute(rest)
         return x
 
-    def _residual(self, data: np.ndarray, right: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, float]:
+    def _residual(self, data: np.ndarray, right: np.ndarray, x: np.ndarray, within: float) -> tuple[np.ndarray, float]:
         """b − A x, and how large its largest entry may be."""
         product, size = multiply(data, self.pointer, self.columns, x)
-        return right - product, max(RESIDUAL * float(np.abs(right).max(initial=0.0)), ROUND_OFF * size)
+        return right - product, max(within * float(np.abs(right).max(initial=0.0)), ROUND_OFF * size)
 
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> None:
         """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only. Raises
@@ -160,11 +161,11 @@ class BlockSolver:
         """The product with the matrix of ``data``."""
         return multiply(data, self.pointer, self.columns, x)[0]
 
-    def _iterate(self, data: np.ndarray, right: np.ndarray) -> np.ndarray | None:
+    def _iterate(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
         """GMRES with the factors at hand on the right; None when it takes too long."""
         x = self.substitute(right)
         for _ in range(3):
-            rest, target = self._residual(data, right, x)
+            rest, target = self._residual(data, right, x, within)
             largest = float(np.abs(rest).max(initial=0.0))
             if largest <= target:
                 return x

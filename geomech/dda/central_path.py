@@ -35,6 +35,8 @@ _CLEAR = 3.0
 _END, _STUCK = 1e-14, 1e-3
 #: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their difference.
 _LEAST_LEFT = 1e-14
+#: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces.
+_WITHIN = 1e-6
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -105,7 +107,7 @@ def _solver(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.ndarray
     """What solves with the matrix of ``data`` for one right side after the other. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is not None:
-        return lambda right: pattern.solver.solve(data, right)
+        return lambda right: pattern.solver.solve(data, right, _WITHIN)
     from scipy.linalg.lapack import dgetrf, dgetrs
 
     factors, pivots, info = dgetrf(data.reshape(6 * pattern.n, -1))

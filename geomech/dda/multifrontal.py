@@ -132,6 +132,10 @@ def _eliminate(
     ``units`` are 1, −1, 0."""
     one, minus, none = units[0:1], units[1:2], units[2:3]
     swapped = np.empty(PANEL, np.int64)
+    longest = 0
+    for g in range(len(child)):
+        longest = max(longest, reach[g + 1] - reach[g])
+    begins = np.empty(longest + 1, np.int64)
     for f in fronts:
         own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
         p, b = 6 * own, 6 * far
@@ -142,36 +146,45 @@ def _eliminate(
             rest = room[stack[f] : stack[f] + b * b].reshape((b, b))
         else:
             rest = np.empty((b, b), factors.dtype)
-        rest[:] = 0
+        # A leaf's rest is its own product alone: not cleared, for clearing takes as long as adding.
+        leaf = child[f] < 0 and p > 0
+        if not leaf:
+            rest[:] = 0
         upper[:] = 0
         lower[:] = 0
         for k in range(entries[f], entries[f + 1]):
-            i, j, s = row[k], column[k], 36 * entry[k]
+            i, j = row[k], column[k]
+            block = data[36 * entry[k] : 36 * entry[k] + 36]
             for a in range(6):
+                here = (upper[6 * i + a] if i < own else lower[6 * (i - own) + a])[6 * j : 6 * j + 6]
                 for c in range(6):
-                    if i < own:
-                        upper[6 * i + a, 6 * j + c] = data[s + 6 * a + c]
-                    else:
-                        lower[6 * (i - own) + a, 6 * j + c] = data[s + 6 * a + c]
+                    here[c] = block[6 * a + c]
         g = child[f]
         while g >= 0:
             first, n = reach[g], reach[g + 1] - reach[g]
+            # Neighbours in the child's boundary mostly stand side by side in the parent too: long rows are added at once.
+            runs = 0
+            for v in range(n):
+                j = seat[first + v]
+                if v == 0 or j != seat[first + v - 1] + 1 or j == own:
+                    begins[runs] = v
+                    runs += 1
+            begins[runs] = n
             for u in range(n):
                 i = seat[first + u]
                 for a in range(6):
-                    line = stack[g] + (6 * u + a) * 6 * n
+                    line = room[stack[g] + (6 * u + a) * 6 * n : stack[g] + (6 * u + a + 1) * 6 * n]
                     if i < own:
-                        own_row, far_row, skipped = upper[6 * i + a], upper[6 * i + a], 0
+                        own_row, far_row = upper[6 * i + a, :p], upper[6 * i + a, p:]
                     else:
-                        own_row, far_row, skipped = lower[6 * (i - own) + a], rest[6 * (i - own) + a], p
-                    for v in range(n):
-                        j = 6 * seat[first + v]
-                        if j < p:
-                            for c in range(6):
-                                own_row[j + c] += room[line + 6 * v + c]
-                        else:
-                            for c in range(6):
-                                far_row[j - skipped + c] += room[line + 6 * v + c]
+                        own_row, far_row = lower[6 * (i - own) + a], rest[6 * (i - own) + a]
+                    for r in range(runs):
+                        j, v, w = 6 * seat[first + begins[r]], 6 * begins[r], 6 * begins[r + 1]
+                        # Slices, for their indices need no check for a negative sign, which would keep loops from vectors.
+                        here = own_row[j : j + w - v] if j < p else far_row[j - p : j - p + w - v]
+                        added = line[v:w]
+                        for c in range(w - v):
+                            here[c] += added[c]
             g = sibling[g]
         for start in range(0, p, PANEL):
             end = min(start + PANEL, p)
@@ -183,7 +196,7 @@ def _eliminate(
             _add_product(minus, upper[end:, start:end], scaled, one, upper[end:, end:])
             _add_product(minus, lower[:, start:end], scaled[:, : p - end], one, lower[:, end:])
         if p > 0:
-            _add_product(minus, lower, upper[:, p:], one, rest)
+            _add_product(minus, lower, upper[:, p:], none if leaf else one, rest)
         if not kept:
             room[stack[f] : stack[f] + b * b] = rest.ravel()
     return True
