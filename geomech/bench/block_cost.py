@@ -82,10 +82,10 @@ def _watched() -> Iterator[Watch]:
         finally:
             watch.search += time.perf_counter() - began
 
-    def timed_solve(self, data, right):
+    def timed_solve(self, data, right, *within):
         began = time.perf_counter()
         try:
-            return solve(self, data, right)
+            return solve(self, data, right, *within)
         finally:
             watch.solution += time.perf_counter() - began
             watch.solutions += 1

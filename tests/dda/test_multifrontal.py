@@ -123,3 +123,30 @@ def test_every_block_is_eliminated_once_and_reaches_upwards_only():
         assert len(reached) == 0 or parent >= 0
     # A plane graph of n blocks falls apart at separators of √n blocks or so; the fill stays within a few n log n.
     assert np.diff(tree.pivots) @ np.diff(tree.reach) < 2.5 * 500 * np.log2(500)
+
+
+@pytest.mark.parametrize("turned", [0.0, np.radians(25)])
+def test_cuts_follow_the_short_rows_of_blocks(turned):
+    # Bricks in courses of twelve, thirty courses high, as wide as they are high; their beds level or inclined.
+    i, j = np.meshgrid(np.arange(12), np.arange(30), indexing="ij")
+    x, y = (i.ravel() + 0.5 * (j.ravel() % 2)) / 12, j.ravel() / 30
+    points = np.column_stack([np.cos(turned) * x - np.sin(turned) * y, np.sin(turned) * x + np.cos(turned) * y])
+    near = (np.abs(x[:, None] - x) < 1.1 / 12) & (np.abs(y[:, None] - y) < 1.1 / 30)
+    rows, columns = np.nonzero(near)
+    tree = dissection.plan(points, rows, columns)
+    assert np.diff(tree.pivots)[-1] <= 13
+
+
+def test_a_solution_goes_no_farther_than_it_is_asked_to():
+    points, rows, columns, data = springs_between(300, seed=8)
+    solver = BlockSolver(points, rows, columns)
+    solver.solve(data.ravel(), np.ones(1800))
+    data[rows == columns] *= 1.0 + 0.5 * block_solver.CHANGED  # the factors at hand will do
+    done = []
+    for within in (1e-3, 1e-12):
+        before = solver.counts["substitutions"]
+        x = solver.solve(data.ravel(), np.ones(1800), within)
+        product, size = block_solver.multiply(data.ravel(), solver.pointer, solver.columns, x)
+        assert np.abs(1.0 - product).max() <= max(within, block_solver.ROUND_OFF * size)
+        done.append(solver.counts["substitutions"] - before)
+    assert done[0] < done[1]
