@@ -7,20 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Motion, Problem, State
+from .side_by_side import side_by_side
 from .tractions import BoundaryLoad, boundary_load
 
 if TYPE_CHECKING:
-    from ..ddm import Body, Work
+    from ..ddm import Body
 
 
 def elastic_bodies(
-    problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, work: Work, removed: np.ndarray | None = None
+    problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, works: list[Work], removed: np.ndarray | None = None
 ) -> tuple[dict[int, Body], dict[int, np.ndarray]]:
     """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole network.
     What keeps a fixed block in place, and so what strains it, is not known; what is ``removed`` (n_blocks,) is not there.
 
-    ``kept``: earlier bodies of the same blocks, of which whatever has not changed is reused; ``work`` counts what was done.
+    ``kept``: earlier bodies of the same blocks. Those of which nothing has changed are taken as they are, of others whatever
+    has not is reused; the rest is made side by side. ``works``: the counts of what was done, of bodies without an earlier one
+    new ones at the end.
     """
     cracked = np.arange(blocks.n_blocks) if problem.growth.initiation else np.unique(cracks.block)
     rigid = np.array([m.rigid for m in problem.materials], bool)
@@ -31,20 +35,35 @@ def elastic_bodies(
         return {}, {}
     from .. import ddm
 
-    bodies, nodes_of = {}, {}
-    for b in cracked.tolist():
-        segments = np.flatnonzero(cracks.block == b)
+    bodies: dict[int, Body | None] = {}
+    nodes_of, to_make = {}, []
+    segments_of = _rows_of(cracks.block, cracked)
+    for b, segments in zip(cracked.tolist(), segments_of):
         nodes_of[b] = np.unique(cracks.segments[segments])
-        bodies[b] = ddm.Body(
-            blocks.loops(b),
-            cracks.take(segments),
-            problem.materials[blocks.material[b]],
-            problem.ddm,
-            previous=kept.get(b),
-            face_laws=problem.face_laws,
-            work=work,
+        own, material, old = cracks.take(segments), problem.materials[blocks.material[b]], kept.get(b)
+        bodies[b] = None if old is None else old.found_again(blocks.loops(b), own, material)
+        if bodies[b] is not None:
+            old.work.bodies_kept += 1
+            continue
+        if old is None:
+            works.append(Work())
+        to_make.append((b, own, material, old, works[-1] if old is None else old.work))
+
+    def made(of: tuple) -> Body:
+        b, own, material, old, work = of
+        return ddm.Body(
+            blocks.loops(b), own, material, problem.ddm, previous=old, face_laws=problem.face_laws, work=work
         )
+
+    bodies.update(zip([of[0] for of in to_make], side_by_side(made, to_make)))
     return bodies, nodes_of
+
+
+def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
+    """The rows of each of the ``wanted`` numbers, in order, in the time of one sorting."""
+    order = np.argsort(number, kind="stable")
+    first, last = (np.searchsorted(number[order], wanted, side) for side in ("left", "right"))
+    return [order[a:b] for a, b in zip(first.tolist(), last.tolist())]
 
 
 def boundary_loads(
@@ -52,7 +71,18 @@ def boundary_loads(
 ) -> dict[int, BoundaryLoad]:
     """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on that
     geometry the forces are in equilibrium."""
-    forces = result.forces
+    forces, numbers = result.forces, np.array(list(bodies), int)
+    acting = result.contacts[(result.contacts["normal_force"] != 0) | (result.contacts["shear_force"] != 0)]
+    touching = zip(_rows_of(acting["block"], numbers), _rows_of(acting["other"], numbers))
+    contacts, edges, points = (
+        dict(zip(bodies, rows))
+        for rows in (
+            # In the order of the contacts, a block's own and its neighbours' alike.
+            [acting[np.union1d(own, others)] for own, others in touching],
+            [forces.edges[rows] for rows in _rows_of(forces.edges["block"], numbers)],
+            [forces.points[rows] for rows in _rows_of(forces.points["block"], numbers)],
+        )
+    )
     return {
         b: boundary_load(
             b,
@@ -60,9 +90,9 @@ def boundary_loads(
             state.vertices,
             motion,
             float(state.rotation[b]),
-            result.contacts,
-            forces.edges[forces.edges["block"] == b],
-            forces.points[forces.points["block"] == b],
+            contacts[b],
+            edges[b],
+            points[b],
             problem.materials[blocks.material[b]].density,
             forces.inertia.gravity,
             result.acceleration[b],
@@ -73,27 +103,37 @@ def boundary_loads(
     }
 
 
-def solve_bodies(bodies: dict, loads: dict[int, BoundaryLoad], warm: dict, history: dict) -> dict:
-    """block → solution of its body; ``warm``: earlier solutions, whose face states are the first guess; ``history``: what
-    crack faces with friction remember of the load step before."""
+def solve_bodies(
+    bodies: dict, loads: dict[int, BoundaryLoad], warm: dict, history: dict, solved_from: dict | None = None
+) -> dict:
+    """block → solution of its body, side by side; ``warm``: earlier solutions, whose face states are the first guess;
+    ``history``: what crack faces with friction remember of the load step before. An earlier solution of the same geometry
+    under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same, too."""
     from .. import ddm
 
-    return {
-        b: body.solve(
-            ddm.BodyLoad(
-                segments=loads[b].segments,
-                tractions=loads[b].tractions,
-                body_force=loads[b].body_force,
-                body_force_gradient=loads[b].body_force_gradient,
-                about=loads[b].about,
-                points=loads[b].points,
-                forces=loads[b].forces,
-            ),
-            warm=warm.get(b),
-            history=history.get(b),
-        )
-        for b, body in bodies.items()
-    }
+    solved_from = {} if solved_from is None else solved_from
+
+    def solved(b: int):
+        body, known, load = bodies[b], warm.get(b), loads[b]
+        asked = {name: getattr(load, name) for name in _ASKED}
+        if known is not None and _same_question(body, known, asked) and history.get(b) is solved_from.get(b):
+            body.work.solutions_kept += 1
+            return known
+        return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
+
+    return dict(zip(bodies, side_by_side(solved, list(bodies))))
+
+
+#: What of a `BoundaryLoad` is a load.
+_ASKED = ("segments", "tractions", "body_force", "body_force_gradient", "about", "points", "forces")
+
+
+def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:
+    """Whether ``body`` under the load ``asked`` has been solved as ``known``."""
+    return known.body is body and all(
+        (of is None) == (before is None) and (of is None or np.array_equal(of, before))
+        for of, before in ((asked[name], getattr(known.load, name)) for name in _ASKED)
+    )
 
 
 def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:

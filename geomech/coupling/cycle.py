@@ -24,6 +24,7 @@ from .compliance import crack_response
 from .inherited_loads import on_children, on_moved
 from .mean_stress import rotated_mean_stress
 from .record import axial_strain, joined_faces, leading_load
+from .side_by_side import side_by_side
 from .splitting import split_blocks
 from .tractions import BoundaryLoad
 
@@ -57,7 +58,7 @@ class Coupling:
         self.gauge = problem.gauge
         self.monitors = dict(problem.monitors)
         self.seconds: dict[str, float] = {}
-        self.work = Work()
+        self.works: list[Work] = []
         self.number = 0
         self.load_step = 0
         self.known_motion: tuple[State, Motion] | None = None
@@ -67,6 +68,7 @@ class Coupling:
         self.compliances: dict[int, tuple] = {}
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
+        self.solved_from: dict[int, object] = {}
         self.budget = dda.EnergyBudget()
         self.length = dda.StepLength(problem.dda)
         self.removed: np.ndarray | None = None
@@ -256,21 +258,23 @@ class Coupling:
             loads = boundary_loads(self.problem, self.blocks, self.state, self._motion(self.state), result, self.bodies)
         self.loads = loads
         self.solutions = self._solve(self.bodies, loads, self.solutions)
+        self.solved_from = self.history
         return self.solutions
 
     def _solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
         with self._timed("ddm solve"):
-            return solve_bodies(bodies, loads, warm, self.history)
+            return solve_bodies(bodies, loads, warm, self.history, self.solved_from)
 
     def _take_response(self, state: State, solutions: dict) -> float:
         """Set what DDA should assume next, and say how far off the last assumption was (relative strain)."""
         worst = 0.0
         compliance, offset = self.response.compliance.copy(), self.response.offset.copy()
         with self._timed("compliance"):
+            own = side_by_side(lambda of: self._compliance(*of), list(solutions.items()))
+            self.compliances.update(zip(solutions, own))
             for b, solution in solutions.items():
-                body = self.bodies[b]
                 s, e = crack_response(
-                    self._compliance(b, body, solution),
+                    self.compliances[b][2],
                     solution.crack_strain,
                     state.stress[b],
                     float(state.rotation[b]),
@@ -284,13 +288,17 @@ class Coupling:
         self.response = dda.CrackResponse(compliance, offset)
         return worst
 
-    def _compliance(self, block: int, body, solution) -> np.ndarray:
-        """S in the block's own axes; it changes with the geometry and the states of crack faces, not with the load."""
+    def _compliance(self, block: int, solution) -> tuple:
+        """The geometry and the states of crack faces that S belongs to, and S in the block's own axes: it does not change
+        with the load."""
+        body = self.bodies[block]
         states = solution.closed.tobytes() if solution.memory is None else solution.face_states.key
         known = self.compliances.get(block)
-        if known is None or known[0] is not body or known[1] != states:
-            known = self.compliances[block] = (body, states, body.compliance(solution))
-        return known[2]
+        if known is not None and known[0] is body.crack_system and known[1] == states:
+            body.work.compliances_kept += 1
+            return known
+        s = body.compliance(solution)
+        return body.crack_system, states, s
 
     # -- growth --------------------------------------------------------------------------------------------------
 
@@ -388,7 +396,7 @@ class Coupling:
         self.history = inherited(self.history, split.parent, split.cracks)
         self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
         self.budget = self.budget.cut()
-        self._take_blocks()
+        self._take_blocks(split.parent)
 
     def _mean_stress(self, solutions: dict):
         """block → (polygon → mean stress there, current axes), from the last solved elastic body."""
@@ -401,16 +409,25 @@ class Coupling:
 
     # -- geometry changed ----------------------------------------------------------------------------------------
 
-    def _take_blocks(self) -> None:
-        """New blocks: a new block system, no kept bodies."""
+    def _take_blocks(self, parent: np.ndarray | None = None) -> None:
+        """New blocks: a new block system. Of blocks that are their ``parent`` (n_blocks,), whole, under another number what
+        is known of their cracks is kept."""
         problem = self.problem
         self.system = dda.BlockSystem(
             self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda
         )
         n = self.blocks.n_blocks
-        self.response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))
-        self.bodies, self.nodes_of = {}, {}
-        self.solutions, self.compliances = {}, {}
+        self.nodes_of = {}
+        response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))
+        whole = np.zeros(0, int) if parent is None else np.flatnonzero(np.bincount(parent)[parent] == 1)
+        if len(whole):
+            response.compliance[whole] = self.response.compliance[parent[whole]]
+            response.offset[whole] = self.response.offset[parent[whole]]
+        self.response = response
+        self.bodies, self.solutions, self.compliances, self.solved_from = (
+            {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
+            for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
+        )
         self._take_bodies()
 
     def _take_bodies(self) -> None:
@@ -419,7 +436,7 @@ class Coupling:
 
     def _bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
         with self._timed("ddm assembly"):
-            return elastic_bodies(self.problem, self.blocks, cracks, kept, self.work, self.removed)
+            return elastic_bodies(self.problem, self.blocks, cracks, kept, self.works, self.removed)
 
     # -- records -------------------------------------------------------------------------------------------------
 
@@ -441,7 +458,7 @@ class Coupling:
             monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in self.monitors.items()},
             statistics=statistics,
             seconds=dict(self.seconds),
-            work=dict(vars(self.work)) if any(vars(self.work).values()) else {},
+            work=vars(Work.total(self.works)) if self.works else {},
         )
         vars(cycle)["motion"] = motion  # known here: the property need not find it again
         return cycle

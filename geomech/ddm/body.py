@@ -132,6 +132,30 @@ class Body:
             face_laws=self.face_laws,
         )
 
+    def found_again(self, loops: list[np.ndarray], cracks: Cracks, material: Material) -> Body | None:
+        """This body where ``loops``, ``cracks`` and ``material`` are its own, else None. What cracks and blocks are called
+        and when they grew may differ: the body is then a copy that shares all else with this one."""
+        own = self.cracks
+        same = (
+            material == self.material
+            and len(self._given_loops) == len(loops)
+            and all(np.array_equal(a, b) for a, b in zip(self._given_loops, loops))
+            and all(
+                np.array_equal(getattr(own, name), getattr(cracks, name))
+                for name in ("nodes", "segments", "aperture", "surface", "law")
+            )
+            # Iteration goes by cracks.
+            and (not self.compressed or np.array_equal(own.crack, cracks.crack))
+        )
+        if not same:
+            return None
+        if all(np.array_equal(getattr(own, name), getattr(cracks, name)) for name in ("crack", "block", "birth_cycle")):
+            return self
+        again = copy(self)
+        again.cracks, again._functionals = cracks, None
+        vars(again).pop("tip_elements", None)
+        return again
+
     def _assemble(self, previous: Body | None) -> None:
         nu, tol = self.nu, self._tol
         c, old = self.faces, previous

@@ -187,6 +187,7 @@ def _line_forces(points, tangents, start, end, degree, nu, tol, side):
 _AT_END = 0.01
 
 
+@lru_cache(maxsize=1)
 def _clustered() -> tuple[np.ndarray, np.ndarray]:
     """Points in (0, 1) and weights (of a piece of length 2) of a quadrature for logarithms at both ends."""
     x, q = np.polynomial.legendre.leggauss(14)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 
 
 @dataclass(eq=False)
@@ -15,6 +16,7 @@ class Work:
     crack_borderings               of these factors by what is new, instead
     back_substitutions             right-hand sides solved for with these
     solutions, contact_solves      loads solved for, and passes of the contact of crack faces in them
+    bodies_kept, solutions_kept, compliances_kept     what was asked for again with nothing changed, and so not done
     """
 
     bodies: int = 0
@@ -26,3 +28,12 @@ class Work:
     back_substitutions: int = 0
     solutions: int = 0
     contact_solves: int = 0
+    bodies_kept: int = 0
+    solutions_kept: int = 0
+    compliances_kept: int = 0
+
+    @classmethod
+    def total(cls, parts: Iterable[Work]) -> Work:
+        """The sums of ``parts``: bodies that are made or solved side by side count apart."""
+        parts = list(parts)
+        return cls(**{each.name: sum(getattr(part, each.name) for part in parts) for each in fields(cls)})

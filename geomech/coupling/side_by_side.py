@@ -1,0 +1,31 @@
+"""Work on many blocks side by side: they are independent of each other as long as their loads are given."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+
+#: The processors this process may use, where the system tells.
+THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+_pools: dict[int, ThreadPoolExecutor] = {}
+
+
+def side_by_side(work: Callable[[_Item], _Result], items: Sequence[_Item], threads: int | None = None) -> list[_Result]:
+    """``work(item)`` of all ``items``, in their order, on ``threads`` threads (default `THREADS`).
+
+    Every item is worked on by one thread alone, so that results do not depend on how many there are; ``work`` must change
+    nothing that two items share. Of several exceptions that of the first item is raised, when all have ended.
+    """
+    threads = min(THREADS if threads is None else threads, len(items))
+    if threads < 2:
+        return [work(item) for item in items]
+    if threads not in _pools:
+        _pools[threads] = ThreadPoolExecutor(threads, thread_name_prefix="geomech-blocks")
+    running = [_pools[threads].submit(work, item) for item in items]
+    wait(running)
+    return [each.result() for each in running]

@@ -1,0 +1,110 @@
+"""Several cracked blocks in one run: solved side by side, and only where something has changed."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from geomech.coupling import bodies, cycles, side_by_side
+from geomech.ddm import Body
+from geomech.model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    DdmSettings,
+    EdgeTraction,
+    GrowthSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+)
+
+
+def plates(friction: bool) -> Problem:
+    """Four plates under tension that rises at unlike rates, in dynamics: halves fly apart. The first is cut in two while the others stand, the next one's
+    crack grows a little, that of the third is pressed shut (and may rub)."""
+    w, h = 0.03, 0.06
+    left = 0.1 * np.arange(4)
+    blocks = Blocks.from_polygons(
+        [np.array([[x - w, -h], [x + w, -h], [x + w, h], [x - w, h]]) for x in left],
+        edge_names=[[[f"load:bottom {k}", "", f"load:top {k}", ""]] for k in range(4)],
+    )
+    lines = [
+        np.array([[x - a, -b], [x + a, b]]) for x, a, b in zip(left, (0.02, 0.012, 0.01, 0.004), (0, 1e-3, 9e-3, 0))
+    ]
+    lines[0][0, 0] = -w  # an edge crack
+    loads = []
+    for k, rate in enumerate((0.9e6, 0.8e6, -1e6, 0.5e6)):
+        for name, way in (("top", 1.0), ("bottom", -1.0)):
+            loads.append(EdgeTraction(f"load:{name} {k}", History.ramp([0.0, 1e4 * way * rate])))
+    return Problem(
+        title="plates",
+        blocks=blocks,
+        cracks=Cracks.from_polylines(
+            lines, block=range(4), law=int(friction), surface=[(k == 0, False) for k in range(4)]
+        ),
+        materials=(Material("rock", 17e9, 0.21, 2200.0, 1e6),),
+        joints=(JointLaw("joint"),),
+        face_laws=(JointLaw("smooth"), JointLaw("rough", friction_angle=0.3)),
+        loads=Loads(edge_tractions=tuple(loads)),
+        dda=DdaSettings(time_step=1e-4, dynamic_factor=1.0),
+        ddm=DdmSettings(order=3),
+        growth=GrowthSettings(increment=4e-3),
+        run=RunSettings(end_time=5e-4, stop_at=()),
+        load_edge="load:top 0",
+    )
+
+
+def results(problem: Problem) -> tuple[list[np.ndarray], dict[str, int], list[str]]:
+    seen = list(islice(cycles(problem), 8))  # the halves fly ever faster then
+    last = seen[-1]
+    tips = [np.concatenate([cycle.tips[name] for cycle in seen]) for name in ("k_i", "k_ii", "grown", "k_eq")]
+    return (
+        [last.state.vertices, last.state.stress, last.cracks.nodes, *tips],
+        last.work,
+        [event.kind for cycle in seen for event in cycle.events],
+    )
+
+
+def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
+    found = {}
+    for threads in (1, 2, 3):
+        monkeypatch.setattr(side_by_side, "THREADS", threads)
+        found[threads] = results(plates(friction=False))
+    assert "split" in found[1][2]
+    for threads in (2, 3):
+        for one, many in zip(found[1][0], found[threads][0]):
+            assert one.tobytes() == many.tobytes()
+        assert found[1][1:] == found[threads][1:]
+
+
+@pytest.mark.parametrize("friction", [False, True])
+def test_leaving_out_what_has_not_changed_changes_nothing(monkeypatch, friction):
+    kept, work, events = results(plates(friction))
+    with monkeypatch.context() as always:
+        always.setattr(Body, "found_again", lambda *of: None)
+        always.setattr(bodies, "_same_question", lambda *of: False)
+        done, all_work, all_events = results(plates(friction))
+    assert work["bodies_kept"] > work["bodies"] - 4 > 0
+    assert work["solutions_kept"] > 0 and work["compliances_kept"] > 0
+    assert all_work["bodies"] == work["bodies"] + work["bodies_kept"]
+    assert events == all_events and "split" in events
+    for a, b in zip(kept, done):
+        # Round-off: loads that come again are scaled from unit loads, new ones are solved for.
+        assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max()
+
+
+def test_the_first_of_several_failures_is_told():
+    def work(item):
+        if item > 1:
+            raise ValueError(str(item))
+        return item
+
+    with pytest.raises(ValueError, match="2"):
+        side_by_side.side_by_side(work, list(range(5)), threads=3)
+    assert side_by_side.side_by_side(lambda k: k * k, range(4), threads=2) == [0, 1, 4, 9]
