@@ -26,6 +26,7 @@ from .applied import Applied, apply, check_equilibrium
 from .automatic import for_target
 from .bordered import SMALLEST, Base, Bordered
 from .boundary import BoundarySystem
+from .boundary_iteration import is_iterated
 from .contact import settle_faces
 from .crack_system import CrackSystem
 from .face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
@@ -109,7 +110,9 @@ class Body:
         else:
             self.area, self.centroid = np.inf, np.zeros(2)
         self._factored_after_all = previous is not None and previous._factored_after_all
-        self.compressed = is_compressed(settings.solver, self.faces.n_unknowns) and not self._factored_after_all
+        solver = "dense" if self._factored_after_all else settings.solver
+        many = is_iterated(solver, self.boundary.n_unknowns, bool(self.supports))
+        self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns)
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}
@@ -160,7 +163,9 @@ class Body:
         nu, tol = self.nu, self._tol
         c, old = self.faces, previous
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
-        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, old._outside if old else None, work=self.work)
+        solver = "dense" if self._factored_after_all else self.settings.solver
+        before = old._outside if old else None
+        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, before, work=self.work, solver=solver)
         self._outside = system
         self.boundary = g = system.elements
         g_old, same_boundary = system.at_old, system.unchanged
@@ -189,7 +194,8 @@ class Body:
 
         if self.compressed:
             on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
-            self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol)
+            iterated = system.factor if system.iterated else None
+            self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol, iterated)
             return
         # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
         # make again, should the boundary change, than to carry along.
@@ -264,7 +270,7 @@ class Body:
             return self._solved(load, warm, equilibrium_tolerance, history)
         except NotSolved as failure:
             # The iteration was picked by the number of unknowns; elements that are very unlike stop it.
-            if self.settings.solver != "auto" or self.faces.n_unknowns > FACTORABLE:
+            if self.settings.solver != "auto" or self.faces.n_unknowns + self.boundary.n_unknowns > FACTORABLE:
                 raise
             _log.info("%s; factored instead", failure)
             iterated = copy(self)

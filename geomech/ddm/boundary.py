@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .anchors import Anchors
+from .boundary_iteration import IteratedBoundary, is_iterated
 from .factor import Factor
+from .hierarchical import Compressed
 from .influence import ElementSet, influence, reuse
 from .mesh import Mesh
 from .supports import Holds
@@ -24,7 +26,8 @@ class BoundarySystem:
 
     elements      the boundary's elements
     holds         which of them supports hold, or None
-    matrix        (n, n) traction seen from outside from the displacement (times 2μ) or reaction of the boundary
+    matrix        (n, n) traction seen from outside from the displacement (times 2μ) or reaction of the boundary; an
+                  operator where it is ``iterated`` upon
     known         (n, h) the same from the displacement of held elements
     rigid         (n, k) rigid motions of every loop that no support resists, nodal values
     weights       (k, n) their mean over the loop
@@ -33,7 +36,7 @@ class BoundarySystem:
     factor        of ``matrix`` with the rigid motions lifted
     unchanged     whether all is ``previous``'s; ``at_old`` (n_elements,) the elements' numbers there, −1 where new
 
-    Raises numpy.linalg.LinAlgError when the equations are singular.
+    ``solver`` as in the settings. Raises numpy.linalg.LinAlgError when the equations are singular.
     """
 
     def __init__(
@@ -46,11 +49,18 @@ class BoundarySystem:
         previous: BoundarySystem | None = None,
         *,
         work: Work,
+        solver: str = "dense",
     ):
         g = mesh.boundary
+        self.iterated = is_iterated(solver, g.n_unknowns, holds is not None)
         self._nu, self._tol, self.work = nu, tol, work
         self.at_old = at_old = g.found_in(previous.elements if previous else None)
-        self.unchanged = previous is not None and g.n == previous.elements.n and np.array_equal(at_old, np.arange(g.n))
+        self.unchanged = (
+            previous is not None
+            and previous.iterated == self.iterated
+            and g.n == previous.elements.n
+            and np.array_equal(at_old, np.arange(g.n))
+        )
         if self.unchanged:
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
             self.matrix, self.known, self.factor = previous.matrix, previous.known, previous.factor
@@ -58,8 +68,15 @@ class BoundarySystem:
             self.anchors = previous.anchors
             return
         self.elements, self.holds, self.extent = g, holds, extent
+        if self.iterated:
+            self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
+            self.known, self.free_motions, self.anchors = np.empty((g.n_unknowns, 0)), None, None
+            self.matrix = Compressed(g, g, nu, tol)
+            self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol)
+            return
         # With holes anchored, the old matrix is not one of tractions alone.
-        known = previous.matrix if previous and previous.anchors is None else None
+        dense = previous is not None and previous.anchors is None and not previous.iterated
+        known = previous.matrix if dense else None
         self.matrix = reuse(known, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
         self.known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
         self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)

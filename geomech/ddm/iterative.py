@@ -9,6 +9,7 @@ that many patches cut have a few coarse elements besides (`coarse`), which carry
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .crack_system import Rows
 from .factor import Factor
 from .hierarchical import Compressed, Tree
 from .influence import ElementSet, influence
+
+if TYPE_CHECKING:
+    from .boundary_iteration import IteratedBoundary
 
 #: Elements of a patch. Larger ones cost more to factor than they save in products.
 PATCH = 60
@@ -120,10 +124,18 @@ def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, long
 
 
 class Patches:
-    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element."""
+    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element; ``lift(unknowns)`` is
+    what is added to the influence between them."""
 
-    def __init__(self, elements: ElementSet, crack: np.ndarray, nu: float, tol: float):
-        self._elements, self._nu, self._tol = elements, nu, tol
+    def __init__(
+        self,
+        elements: ElementSet,
+        crack: np.ndarray,
+        nu: float,
+        tol: float,
+        lift: Callable[[np.ndarray], np.ndarray] | None = None,
+    ):
+        self._elements, self._nu, self._tol, self._lift = elements, nu, tol, lift
         tree = Tree.over(elements, PATCH)
         middle = 0.5 * (elements.start + elements.end) @ np.array([1.0, 1j])
         at = np.argsort(crack, kind="stable")
@@ -149,6 +161,8 @@ class Patches:
                 continue
             part = self._elements.take(elements)
             matrix = influence(part, part, self._nu, self._tol)
+            if self._lift is not None:
+                matrix += self._lift(unknowns)
             moving = np.flatnonzero(mixed)
             matrix[moving] += mixed[moving, None] * matrix[moving + rows.per]
             matrix -= np.diag(spring)
@@ -210,14 +224,52 @@ class Reduced:
         return out - self._following.transposed_times(v @ self._on_cracks) if self._on_cracks.shape[1] else out
 
 
+class Coupled:
+    """The equations of boundary and cracks together, boundary first, where both are iterated on: S by itself would take an
+    iteration on the boundary for each of its products."""
+
+    def __init__(self, reduced: Reduced, boundary: IteratedBoundary, on_boundary: np.ndarray, on_cracks: np.ndarray):
+        self._reduced, self._boundary = reduced, boundary
+        self._on_boundary, self._on_cracks = on_boundary, on_cracks
+        self.first = boundary.n
+
+    def times(self, v: np.ndarray, transposed: bool = False) -> np.ndarray:
+        u, w = v[: self.first], v[self.first :]
+        own = self._boundary.times(u, transposed)
+        if transposed:
+            cracks = self._reduced.cracks.transposed_times(w)
+            return np.concatenate([own + w @ self._on_cracks, cracks + u @ self._on_boundary])
+        cracks = self._reduced.cracks @ w
+        return np.concatenate([own + self._on_boundary @ w, cracks + self._on_cracks @ u])
+
+    def roughly(self, v: np.ndarray, of_cracks: Callable[[np.ndarray], np.ndarray], transposed: bool) -> np.ndarray:
+        """Neighbourhoods' answer: the boundary's, and the cracks' to what that leaves them (transposed: the other way)."""
+        u, w = v[: self.first], v[self.first :]
+        if transposed:
+            w = of_cracks(w)
+            return np.concatenate([self._boundary.roughly(u - w @ self._on_cracks, True), w])
+        u = self._boundary.roughly(u)
+        return np.concatenate([u, of_cracks(w - self._on_cracks @ u)])
+
+
 class IterativeCrackSystem:
-    """`crack_system.CrackSystem` for many unknowns: ``matrix`` is S as an operator; see there.
+    """`crack_system.CrackSystem` for many unknowns: ``matrix`` is S as an operator; see there. ``coupled``: the equations
+    together with those of a boundary that is iterated on too.
 
     ``products`` counts those with S. The last solution is the first guess of the next one.
     """
 
-    def __init__(self, matrix: Reduced, elements: ElementSet, crack: np.ndarray, nu: float, tol: float):
-        self.matrix, self.n = matrix, elements.n_unknowns
+    def __init__(
+        self,
+        matrix: Reduced,
+        elements: ElementSet,
+        crack: np.ndarray,
+        nu: float,
+        tol: float,
+        coupled: Coupled | None = None,
+    ):
+        self.matrix, self.n, self._coupled = matrix, elements.n_unknowns, coupled
+        self._first = 0 if coupled is None else coupled.first
         self.products = 0
         self._per = elements.per
         self._patches = Patches(elements, crack, nu, tol)
@@ -248,23 +300,27 @@ class IterativeCrackSystem:
         moving = np.flatnonzero(rows.mixed)
 
         def times(v: np.ndarray) -> np.ndarray:
-            out = self.matrix @ v
-            out[moving] += rows.mixed[moving] * out[moving + rows.per]
-            out -= rows.spring * v
-            out[rows.held] = 0.0
+            out = self.matrix @ v if self._coupled is None else self._coupled.times(v)
+            own = out[self._first :]
+            own[moving] += rows.mixed[moving] * own[moving + rows.per]
+            own -= rows.spring * v[self._first :]
+            own[rows.held] = 0.0
             return out
 
-        def roughly(v: np.ndarray) -> np.ndarray:
-            smooth, rest = self._coarse.split(v)
+        def of_cracks(v: np.ndarray) -> np.ndarray:
+            smooth, rest = self._coarse.split(np.where(rows.held, 0.0, v))
             return smooth + self._patches.solve(rest)
+
+        def roughly(v: np.ndarray) -> np.ndarray:
+            return of_cracks(v) if self._coupled is None else self._coupled.roughly(v, of_cracks, False)
 
         self._patches.change(rows)
         self._coarse.change(rows.held)
-        right = np.where(rows.held, 0.0, right)
-        w, n = gmres(times, right, roughly, self._guess(right, rows.held))
+        right = np.concatenate([np.zeros(self._first), np.where(rows.held, 0.0, right)])
+        found, n = gmres(times, right, roughly, self._guess(right, rows.held))
         self.products += n
-        self._last = right, w
-        return w
+        self._last = right, found
+        return found[self._first :]
 
     def solve_transposed(self, right: np.ndarray, rows: Rows) -> np.ndarray:
         """(n,) what multiplies right-hand sides of `solve` in ``right`` ᵀ w; zero where held. Raises NotSolved."""
@@ -272,19 +328,29 @@ class IterativeCrackSystem:
 
         def times(v: np.ndarray) -> np.ndarray:
             mixed = v.copy()
-            mixed[moving + rows.per] += rows.mixed[moving] * v[moving]
-            out = self.matrix.transposed_times(mixed) - rows.spring * v
-            out[rows.held] = 0.0
+            own, before = mixed[self._first :], v[self._first :]
+            own[moving + rows.per] += rows.mixed[moving] * before[moving]
+            if self._coupled is None:
+                out = self.matrix.transposed_times(mixed)
+            else:
+                out = self._coupled.times(mixed, transposed=True)
+            out[self._first :] -= rows.spring * before
+            out[self._first :][rows.held] = 0.0
             return out
 
-        def roughly(v: np.ndarray) -> np.ndarray:
+        def of_cracks(v: np.ndarray) -> np.ndarray:
+            v = np.where(rows.held, 0.0, v)
             return self._coarse.split_transposed(v, self._patches.solve_transposed(v))
+
+        def roughly(v: np.ndarray) -> np.ndarray:
+            return of_cracks(v) if self._coupled is None else self._coupled.roughly(v, of_cracks, True)
 
         self._patches.change(rows)
         self._coarse.change(rows.held)
-        w, n = gmres(times, np.where(rows.held, 0.0, right), roughly)
+        right = np.concatenate([np.zeros(self._first), np.where(rows.held, 0.0, right)])
+        found, n = gmres(times, right, roughly)
         self.products += n
-        return w
+        return found[self._first :]
 
     def _guess(self, right: np.ndarray, held: np.ndarray) -> np.ndarray | None:
         """The last solution, as much of it as its right-hand side is in this one."""
@@ -292,7 +358,11 @@ class IterativeCrackSystem:
             return None
         before, w = self._last
         size = float(before @ before)
-        return np.where(held, 0.0, float(before @ right) / size * w) if size else None
+        if not size:
+            return None
+        guess = float(before @ right) / size * w
+        guess[self._first :][held] = 0.0
+        return guess
 
     def changed(self, rows: Rows) -> tuple[np.ndarray, Iterated]:
         """As `crack_system.CrackSystem.changed`."""
@@ -340,9 +410,12 @@ def compressed(
     on_cracks: np.ndarray,
     nu: float,
     tol: float,
+    boundary: IteratedBoundary | None = None,
 ) -> tuple[Following, IterativeCrackSystem]:
     """A_ΓΓ⁻¹ A_ΓC and the crack system of a body; ``crack`` (n,) is the crack of every element, ``solve(right,
-    transposed)`` applies A_ΓΓ⁻¹, ``on_boundary`` is A_ΓC and ``on_cracks`` is A_CΓ."""
+    transposed)`` applies A_ΓΓ⁻¹, ``on_boundary`` is A_ΓC and ``on_cracks`` is A_CΓ; ``boundary``: what stands for its
+    factors where it is iterated on too."""
     following = Following(solve, on_boundary)
     matrix = Reduced(Compressed(cracks, cracks, nu, tol), on_cracks, following)
-    return following, IterativeCrackSystem(matrix, cracks, crack, nu, tol)
+    coupled = None if boundary is None else Coupled(matrix, boundary, on_boundary, on_cracks)
+    return following, IterativeCrackSystem(matrix, cracks, crack, nu, tol, coupled)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Loads on so many different segments are remembered.
 _REMEMBERED = 400
+#: Edges or segments whose forces are worked out at once: all of a large boundary's on itself would fill the memory.
+_AT_ONCE = 256
 
 
 class UnitLoad:
@@ -128,7 +130,9 @@ class UnitLoads:
         """
         n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
         n = n_g + n_c
-        again = [unit for unit, _ in units if unit.used and unit.answered is None]
+        # Every part of a unit load is a load of its own; where each takes an iteration, their sum takes one.
+        worth = not boundary.iterated
+        again = [unit for unit, _ in units if unit.used and unit.answered is None and worth]
         if again:
             self._answer(again, boundary, cg, opened)
         total = np.zeros(2 * n + n_c)
@@ -171,10 +175,12 @@ class UnitLoads:
             placed = [
                 onto_boundary(self.mesh.edges, segments[k], f"load segment {k}", self.extent)[:2] for k in missing
             ]
-            straight = np.array([segment for segment, _ in placed])
-            parts = (self._linear_forces(targets, straight) for targets in (self.boundary, self.faces))
-            for k, (segment, against), *rows in zip(missing, placed, *parts):
-                self._segments[keys[k]] = UnitLoad(np.concatenate(rows), segment, against)
+            for first in range(0, len(missing), _AT_ONCE):
+                here = placed[first : first + _AT_ONCE]
+                straight = np.array([segment for segment, _ in here])
+                parts = (self._linear_forces(targets, straight) for targets in (self.boundary, self.faces))
+                for k, (segment, against), *rows in zip(missing[first:], here, *parts):
+                    self._segments[keys[k]] = UnitLoad(np.concatenate(rows), segment, against)
         self._recent = keys
         units = [self._segments[key] for key in keys]
         return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, tractions)]
@@ -246,9 +252,13 @@ class UnitLoads:
         ]
 
     def _from_edges(self, targets: ElementSet, densities: np.ndarray) -> np.ndarray:
-        a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
-        forces = line_forces(targets, a, b, 2, self.nu, self.tol, -1.0)
-        return forces.reshape(targets.n_unknowns, 6 * len(a)) @ densities.reshape(6 * len(a), -1)
+        out = np.zeros((targets.n_unknowns, densities.shape[-1]))
+        for first in range(0, len(densities), _AT_ONCE):
+            a, b = self.mesh.edges[first : first + _AT_ONCE].swapaxes(0, 1)
+            forces = line_forces(targets, a, b, 2, self.nu, self.tol, -1.0)
+            own = densities[first : first + _AT_ONCE].reshape(6 * len(a), -1)
+            out += forces.reshape(targets.n_unknowns, 6 * len(a)) @ own
+        return out
 
     def _on_faces(self, name: str | int, faces: ElementSet, densities: np.ndarray) -> np.ndarray:
         """What a load on whole edges does to the crack elements ``faces``."""

@@ -55,7 +55,7 @@ class DdaSettings:
 @dataclass(frozen=True)
 class DdmSettings:
     """How cracked blocks are meshed: order ``p``, node family, elements of a straight crack, of a boundary side; and how
-    they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the number of crack unknowns.
+    they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the number of unknowns.
 
     With ``target_error``, the relative error of K that is asked for, order, elements and grading follow from it instead.
     With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs there, in place

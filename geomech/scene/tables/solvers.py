@@ -104,7 +104,7 @@ class DdmTable(Table):
     )
     grading_layers: Annotated[int, Field(ge=0)] = Field(2, description="layers of that grading")
     solver: Literal["auto", "dense", "compressed"] = Field(
-        "auto", description="how the cracks' equations are solved: factored, or iterated when they are many"
+        "auto", description="how the equations of cracks and sides are solved: factored, or iterated when they are many"
     )
 
 
