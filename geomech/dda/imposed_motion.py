@@ -225,6 +225,15 @@ class ImposedMotion:
             unknowns[order[c.block]] = c.basis @ z
         return unknowns
 
+    def free_part(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
+        """(n, 6) the same of a change of the ``unknowns``, given ones standing still."""
+        unknowns = unknowns.copy()
+        for c in self._changed:
+            z = unknowns[order[c.block]]
+            z[: len(c.known)] = 0.0
+            unknowns[order[c.block]] = c.basis @ z
+        return unknowns
+
     def correct_velocity(self, velocity: np.ndarray) -> None:
         """Make the rates at the end of the step those that are given, in place: the integration's own swing about them."""
         velocity[self.fixed] = self.rate[self.fixed]

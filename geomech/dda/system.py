@@ -25,7 +25,8 @@ from .overlap import refuse_overlap
 from .rigid import mean_stress, with_rigid
 from .step import CrackResponse, NotConverged, StepResult
 from .step_length import StepLength
-from .time_integration import TimeScheme, advance, assemble_blocks
+from .stopping import Stopped, dissipating, stop
+from .time_integration import TimeScheme, advance, assemble_blocks, turned
 from .viscous_boundary import QuietEdges
 
 log = logging.getLogger(__name__)
@@ -262,6 +263,26 @@ class BlockSystem:
             return solve(found, springs, gap)
         return settle_augmented(solve, found, springs, gap, self._finder.on_penalty(found), self._tolerance)
 
+    def _stopped(
+        self, found, settled, slid, velocity, moments, density, dt, pattern, matrix, vectors, turn, imposed
+    ) -> tuple[np.ndarray, float]:
+        """``velocity`` without the sliding that friction has stopped in the step, and the energy that this takes (J/m)."""
+        mass = np.where(self._fixed, np.inf, self._mass)
+        stopped = Stopped.of(found, settled, slid, velocity, moments[:, 1:3], mass, dt, self._slack)
+        if stopped is None:
+            return velocity, 0.0
+        try:
+            change = stop(stopped, pattern, matrix, vectors, found, settled, dt)
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        if imposed is not None:
+            change = imposed.free_part(change, pattern.order)
+        rates = np.zeros_like(velocity)
+        rates[self._moving] = change[pattern.order[self._moving]] * (2.0 / dt)
+        rates[:, 2:] /= np.sqrt(moments[:, :1])
+        rates, lost = dissipating(turned(rates, turn), velocity, moments, density, self._fixed)
+        return velocity + rates, lost
+
     def _real_springs(self, found: ContactSet, settled: Settled) -> tuple[np.ndarray, np.ndarray]:
         """Contact springs that store energy, normal and shear: what multipliers hold does not."""
         normal, shear = found.springs.normal, settled.springs.shear
@@ -365,8 +386,16 @@ class BlockSystem:
         velocity, kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
         if heavier != 1.0:
             acceleration = 2.0 * heavier * (increment - begun * dt) / (dt * dt)
+        slid = sliding(vectors, settled.unknowns, order, found.block, found.other)
+        if actions is not None and n_free:
+            slid += actions.along
+        rubbed = 0.0
         if imposed is not None:
             imposed.correct_velocity(velocity)
+        if not static and n_free:
+            velocity, rubbed = self._stopped(
+                found, settled, slid, velocity, moments, density, dt, pattern, matrix, vectors, increment[:, 2], imposed
+            )
         rows = found.rows(settled)
         reaction, acting_right, largest_force, acted = None, right, 0.0, {}
         if actions is not None:
@@ -374,9 +403,6 @@ class BlockSystem:
             acting_right, largest_force = actions.with_bolt_forces(right), actions.largest_bolt_force
             load = generalised(points, edges, centroid) + actions.work_forces(reaction, rows, centroid)
         end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, weight)
-        slid = sliding(vectors, settled.unknowns, order, found.block, found.other)
-        if actions is not None and n_free:
-            slid += actions.along
         energy = StepEnergy._make(
             step_energies(
                 increment, state.velocity, carried, velocity, acceleration, dt, gravity, load, scheme.weight,
@@ -387,6 +413,7 @@ class BlockSystem:
                 weight if isinstance(weight, np.ndarray) else np.full(len(found), weight), found.law, self._finder.closure,
             ).tolist()
         )  # fmt: skip
+        energy = energy._replace(friction=energy.friction + rubbed, scheme=energy.scheme - rubbed)
         residual, ratio = imbalance(
             matrix, acting_right, vectors, found.block, found.other, order, settled.unknowns, settled.normal_force,
             settled.shear_force, acceleration, density, moments, gravity, load, largest_force,

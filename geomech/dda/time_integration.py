@@ -96,11 +96,11 @@ class TimeScheme:
         if self.memory == 0.0 and self.recall == 0.0:
             return velocity, None
         before = mean if before is None else before
-        change = _turned(before - mean, turn)
-        return velocity + self.memory * dt * change, _turned(mean - (1 - self.end) * before, turn) / self.end
+        change = turned(before - mean, turn)
+        return velocity + self.memory * dt * change, turned(mean - (1 - self.end) * before, turn) / self.end
 
 
-def _turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Rates (n, 6) of the unknowns with their strains on axes turned by ``angle`` (n,): the material turns."""
     out = rates.copy()
     half = np.array([1.0, 1.0, 0.5])

@@ -88,9 +88,9 @@ def test_block_slides_on_a_shaken_base_as_newmark_says(case, frame):
         + ", ".join(f"{e:.1e}" for e in errors)
         + f", order {order:.1f}"
     )
-    # A block that stops within a step keeps a speed of a dt: first order.
-    # On the level the record turns the block about again and again after a few millimetres.
-    assert errors[1] < (0.04 if case == "El Centro on the level" else 0.02)
+    # Within a step in which it stops or turns about, the block's way is off by a dt² / 8 (1e-3 at dt = 2 ms where it turns
+    # about six times). On the level the record does that again and again after a few millimetres.
+    assert errors[1] < {"El Centro on the level": 0.04, "El Centro on an incline": 0.02}.get(case, 1e-3)
     assert order > 0.5
 
 

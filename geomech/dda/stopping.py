@@ -1,0 +1,169 @@
+"""Sliding that friction stops within a step: what is left of its speed is taken away.
+
+A step weighs its forces over its whole length: friction that stops a block half way goes on pulling until the end, and leaves
+it with a speed of the order of a dt, often backwards, which no spring damps that is stiff beside m/dt² (there 2 d/dt − v
+only turns it about from step to step). What was missed is an impulse: over the rest r = dt − t* of the step, t* by the line
+from the sliding speed u₀ at the start to the one that friction all along would have left at the end, friction may have had any
+value |S| ≤ μN + c instead (Coulomb). Of these that is taken which leaves no sliding, or the one nearest to it (Moreau
+1988: Coulomb's law between velocities and impulses). Blocks answer as in the step: 2M/dt² Δd + (springs) Δd = impulse/dt,
+Δv = 2 Δd/dt, with all contacts that stay closed; so momentum is passed on between blocks, not lost, and a spring that the step
+does resolve keeps its vibration. Kinetic energy never grows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import SLIP, STICK
+from . import assembly
+from .contacts import ContactSet
+from .open_close import Settled
+
+#: Impulses found to be beyond what friction can have been are brought back to it so often.
+_ROUNDS = 4
+#: A spring k turns the speed of a mass m about in every step of Shi's, instead of swinging, from k dt² = 16 m on.
+_TURNS_ABOUT = 16.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stopped:
+    """Contacts ``rows`` whose sliding is to end: those that ``stops`` marks have come to a stop in the step, the others stuck
+    all along. ``sense`` ±1 along the edge is that of the sliding that stops; speeds (m/s) in that sense ``before`` and
+    ``after`` the step."""
+
+    rows: np.ndarray
+    stops: np.ndarray
+    sense: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+    @classmethod
+    def of(
+        cls, found: ContactSet, settled: Settled, slid: np.ndarray, velocity: np.ndarray, centroid: np.ndarray,
+        mass: np.ndarray, dt: float, slack: float,
+    ) -> Stopped | None:  # fmt: skip
+        """None where nothing stops. ``slid`` (n,) m along the edge in the step; ``velocity`` (n_blocks, 6), ``centroid``
+        (n_blocks, 2), ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry less than ``slack`` (m) in a step are none."""
+        stuck = (found.state == SLIP) & (settled.state == STICK) & (found.direction != 0.0)
+        rows = np.flatnonzero(stuck | ((settled.state == SLIP) & (settled.direction != 0.0)))
+        if not len(rows):
+            return None
+        after = _sliding_speed(found, rows, velocity, centroid)
+        # Friction acts against the sliding.
+        sense = -np.where(stuck[rows], found.direction[rows], settled.direction[rows])
+        before = sense * (2.0 * slid[rows] / dt - after)
+        keep = (np.abs(after) * dt > slack) & (before > 0.0) & (sense * after < 0.0)
+        if not keep.any():
+            return None
+        stops = np.zeros(len(found), bool)
+        stops[rows[keep]] = True
+        senses = np.ones(len(found))
+        senses[rows[keep]] = sense[keep]
+        # What sticks on a spring that is not resolved is turned about from step to step, and would turn with it what stops.
+        lighter = np.minimum(mass[found.block], mass[found.other])
+        stiff = (settled.state == STICK) & (settled.springs.shear * dt * dt > _TURNS_ABOUT * lighter)
+        rows = np.flatnonzero(stops | stiff)
+        after = senses[rows] * _sliding_speed(found, rows, velocity, centroid)
+        before = senses[rows] * 2.0 * slid[rows] / dt - after
+        return cls(rows, stops[rows], senses[rows], before, after)
+
+
+def _sliding_speed(found: ContactSet, rows: np.ndarray, velocity: np.ndarray, centroid: np.ndarray) -> np.ndarray:
+    """(n,) m/s of the vertex along the edge of contacts ``rows``, relative to the edge."""
+    normal, point = found.geometry[rows, 1:3], found.geometry[rows, 5:7]
+    speed = np.zeros((len(rows), 2))
+    for owner, sign in ((found.block[rows], 1.0), (found.other[rows], -1.0)):
+        v, (x, y) = velocity[owner], (point - centroid[owner]).T
+        speed[:, 0] += sign * (v[:, 0] + (0.5 * v[:, 5] - v[:, 2]) * y + v[:, 3] * x)
+        speed[:, 1] += sign * (v[:, 1] + (0.5 * v[:, 5] + v[:, 2]) * x + v[:, 4] * y)
+    return -normal[:, 1] * speed[:, 0] + normal[:, 0] * speed[:, 1]
+
+
+def stop(
+    stopped: Stopped, pattern: assembly.Pattern, matrix: np.ndarray, vectors: np.ndarray, found: ContactSet,
+    settled: Settled, dt: float,
+) -> np.ndarray:  # fmt: skip
+    """(n_free, 6) m: Δd by whose rate 2 Δd/dt the velocities change, in the unknowns of `assembly`. ``matrix`` (n, 6, 6) and
+    ``vectors`` (n_contacts, 2, 12) as solved with. Raises numpy.linalg.LinAlgError."""
+    springs, rows, sense = settled.springs, stopped.rows, stopped.sense
+    u0, u1 = stopped.before, stopped.after
+    n = len(found)
+    nothing = np.zeros(n)
+    data, side = np.empty(pattern.size), np.empty(6 * pattern.n)
+    resisted, pushed = -sense * settled.shear_force[rows], settled.normal_force[rows]
+    slips = settled.state[rows] == SLIP
+    slope, firm = np.where(slips | stopped.stops, springs.friction[rows], springs.peak[rows]), springs.hold[rows]
+    firm = np.where(slips | stopped.stops, springs.sliding[rows], firm + settled.bonded[rows] * springs.cohesion[rows])
+    strength = np.maximum(slope * pushed + firm, np.abs(resisted))
+    # Friction all along, which those that slid to the end had, leaves the speed ``full``.
+    full, bound = np.where(slips, u1, np.nan), np.full(len(rows), np.nan)
+    for _ in range(_ROUNDS):
+        given = ~np.isnan(bound)
+        state, push, pull = settled.state.copy(), nothing.copy(), nothing.copy()
+        state[rows] = np.where(given, SLIP, STICK)
+        push[rows] = np.where(given, -sense * (bound - resisted), 0.0)
+        pull[rows] = np.where(given, 0.0, -springs.shear[rows] * sense * u1 * 0.5 * dt)
+        # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their friction.
+        assembly.assemble_contacts(
+            data, side, matrix, np.zeros((pattern.n, 6)), pattern.stride, pattern.diagonal, pattern.upper, pattern.lower,
+            found.block, found.other, pattern.order, vectors, state, np.ones(n), nothing, springs.normal, springs.shear,
+            nothing, push, nothing, pull,
+        )  # fmt: skip
+        change = assembly.solve(pattern, data, side, True).reshape(-1, 6)
+        moved = _moved(found, rows, pattern.order, vectors, change)
+        force = np.where(given, push[rows], pull[rows] - springs.shear[rows] * moved)
+        total = resisted - sense * force
+        stuck = np.isnan(full)
+        # By how much a newton of friction more slows those that stuck: what the impulse has done, over the impulse.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slowed = np.abs(moved[stuck] * 2.0 / dt / force[stuck])
+        full[stuck] = u1[stuck] - np.nan_to_num(slowed, posinf=0.0) * (strength[stuck] - resisted[stuck])
+        slowing = u0 - full
+        share = np.clip(np.where(slowing > 0.0, u0 / np.where(slowing > 0.0, slowing, 1.0), 1.0), 0.0, 1.0)
+        least = strength * np.where(stopped.stops, 2.0 * share - 1.0, -1.0)
+        beyond = ~given & ((total < least) | (total > strength))
+        # What friction at its bound has stopped and more, sticks.
+        speed = u1 + sense * moved * 2.0 / dt
+        within = given & (np.where(bound < strength, speed, -speed) > 0.0)
+        if not (beyond.any() or within.any()):
+            break
+        bound[beyond] = np.clip(total, least, strength)[beyond]
+        bound[within] = np.nan
+    return change
+
+
+def _moved(
+    found: ContactSet, rows: np.ndarray, order: np.ndarray, vectors: np.ndarray, change: np.ndarray
+) -> np.ndarray:
+    """(n,) m along the edge of contacts ``rows`` under ``change`` (n_free, 6)."""
+    out = np.zeros(len(rows))
+    for k, owner in enumerate((found.block[rows], found.other[rows])):
+        free = order[owner] >= 0
+        part = vectors[rows[free], 1, 6 * k : 6 * k + 6]
+        out[free] += np.einsum("na,na->n", part, change[order[owner[free]]])
+    return out
+
+
+def _product(u: np.ndarray, w: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """(n_blocks,) ∫ u·w of two first-order velocity fields (n_blocks, 6)."""
+    area, xx, yy, xy = moments[:, 0], moments[:, 3], moments[:, 4], moments[:, 5]
+    p, q, r, s = 0.5 * u[:, 5] - u[:, 2], 0.5 * u[:, 5] + u[:, 2], 0.5 * w[:, 5] - w[:, 2], 0.5 * w[:, 5] + w[:, 2]
+    total = area * (u[:, 0] * w[:, 0] + u[:, 1] * w[:, 1])
+    total += (u[:, 3] * w[:, 3] + q * s) * xx + (p * r + u[:, 4] * w[:, 4]) * yy
+    return total + (u[:, 3] * r + p * w[:, 3] + q * w[:, 4] + u[:, 4] * s) * xy
+
+
+def dissipating(
+    change: np.ndarray, velocity: np.ndarray, moments: np.ndarray, density: np.ndarray, fixed: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The part of ``change`` (n_blocks, 6) of ``velocity`` that does not raise the kinetic energy of the blocks that are not
+    ``fixed``, and what it takes of it, J/m."""
+    mass = np.where(fixed, 0.0, density)
+    first = float((mass * _product(velocity, change, moments)).sum())
+    second = float((mass * _product(change, change, moments)).sum())
+    if first >= 0.0 or second == 0.0:
+        return np.zeros_like(change), 0.0
+    part = min(1.0, -2.0 * first / second)
+    return part * change, -part * (first + 0.5 * part * second)
