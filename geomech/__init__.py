@@ -27,7 +27,7 @@ _PUBLIC = {
     "factor_of_safety": "geomech.pipeline",
 }
 
-__all__ = ["__version__", *_PUBLIC]
+__all__ = ["__version__"] + list(_PUBLIC)
 
 
 def __getattr__(name: str):
