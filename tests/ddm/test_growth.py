@@ -290,9 +290,9 @@ def random_network(rng):
     return Cracks.from_polylines([np.array(line.coords) for line in lines]), loops
 
 
-@pytest.mark.parametrize("seed", [*range(8), *(pytest.param(k, marks=pytest.mark.slow) for k in range(8, 40))])
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 40))])
 def test_random_networks_stay_sound(seed):
-    """120 networks (600 with the slow ones) grown by random walks until nothing moves: every invariant holds at every increment."""
+    """45 networks (600 with the slow ones) grown by random walks until nothing moves: every invariant holds at every increment."""
     rng = np.random.default_rng(seed)
     kinds = set()
     for _ in range(15):

@@ -21,8 +21,8 @@ def cauchy(kind, order, zp, zm, y):
 
 
 def exact(kind, k, z, side):
-    """A_k, A_k', A_k'' by Gauss quadrature in 40 digits on a contour bent away from z (on the side z is seen from)."""
-    with mp.workdps(40):
+    """A_k, A_k', A_k'' by Gauss quadrature in 30 digits on a contour bent away from z (on the side z is seen from)."""
+    with mp.workdps(30):
         # The path from −1 to 1 passes below a point above; the integrand is analytic in between.
         mid = mp.mpc(0, -side if side else 0)
         w = WEIGHTS[kind]

@@ -47,7 +47,8 @@ def test_factor_of_safety_is_what_the_limit_says(seen):
 
 def test_forces_at_the_limit_are_the_published_ones(seen):
     for got, expected in zip(seen["table"], study.expected(), strict=True):
-        assert got == pytest.approx(expected, abs=60)  # kN of 4837 and more: what the higher friction moves
+        # kN of 4837 and more. 11 are found, 15 from a rest that was sought in another way; blocks' lean moves as much.
+        assert got == pytest.approx(expected, abs=25)
 
 
 def test_blocks_slide_topple_and_stand_as_published(seen):
