@@ -153,9 +153,11 @@ def assemble_contacts(
     for b in range(n):
         for a in range(6):
             right[6 * b + a] = base_right[b, a]
+            line = data[diagonal[b] + a * stride[b] : diagonal[b] + a * stride[b] + 6]
             for m in range(6):
-                data[diagonal[b] + a * stride[b] + m] = matrix[b, a, m]
+                line[m] = matrix[b, a, m]
     symmetric = True
+    push, pull = np.empty(12), np.empty(12)
     for c in range(block.shape[0]):
         if state[c] == OPEN:
             continue
@@ -164,32 +166,40 @@ def assemble_contacts(
             slope = direction[c] * friction[c]
             given = direction[c] * sliding[c]
             symmetric = symmetric and slope == 0.0 and lift[c] == 0.0
+        # Slices with indices that cannot be negative: only such loops become vector instructions.
+        along, across = vectors[c, 0], vectors[c, 1]
+        for a in range(12):
+            push[a] = along[a] + slope * across[a]
+            pull[a] = along[a] - lift[c] * across[a]
+        stiff_along = shear[c] if state[c] == STICK else 0.0
         for side in range(2):
             i = order[block[c]] if side == 0 else order[other[c]]
             if i < 0:
                 continue
+            mine, my_push, my_across = (
+                right[6 * i : 6 * i + 6],
+                push[6 * side : 6 * side + 6],
+                across[6 * side : 6 * side + 6],
+            )
             for a in range(6):
-                along, across = vectors[c, 0, 6 * side + a], vectors[c, 1, 6 * side + a]
-                push = along + slope * across
-                right[6 * i + a] -= normal[c] * gap[c] * push
-                right[6 * i + a] += given * across
-                for target in range(2):
-                    j = order[block[c]] if target == 0 else order[other[c]]
-                    if j < 0:
-                        continue
-                    if side == target:
-                        base = diagonal[i]
-                    elif side == 0:
-                        base = upper[c]
-                    else:
-                        base = lower[c]
-                    at = base + a * stride[i]
+                mine[a] -= normal[c] * gap[c] * my_push[a]
+                mine[a] += given * my_across[a]
+            for target in range(2):
+                j = order[block[c]] if target == 0 else order[other[c]]
+                if j < 0:
+                    continue
+                if side == target:
+                    base = diagonal[i]
+                elif side == 0:
+                    base = upper[c]
+                else:
+                    base = lower[c]
+                its_pull, its_across = pull[6 * target : 6 * target + 6], across[6 * target : 6 * target + 6]
+                for a in range(6):
+                    line = data[base + a * stride[i] : base + a * stride[i] + 6]
+                    pushed, dragged = normal[c] * my_push[a], stiff_along * my_across[a]
                     for m in range(6):
-                        aside = vectors[c, 1, 6 * target + m]
-                        value = normal[c] * push * (vectors[c, 0, 6 * target + m] - lift[c] * aside)
-                        if state[c] == STICK:
-                            value += shear[c] * across * aside
-                        data[at + m] += value
+                        line[m] += pushed * its_pull[m] + dragged * its_across[m]
     return symmetric
 
 

@@ -76,31 +76,37 @@ def _assemble(data, matrix, stride, diagonal, upper, lower, block, other, order,
     data[:] = 0.0
     for b in range(matrix.shape[0]):
         for a in range(6):
+            line = data[diagonal[b] + a * stride[b] : diagonal[b] + a * stride[b] + 6]
             for m in range(6):
-                data[diagonal[b] + a * stride[b] + m] = matrix[b, a, m]
+                line[m] = matrix[b, a, m]
+    push, pull = np.empty(12), np.empty(12)
     for c in range(block.shape[0]):
+        along, across = vectors[c, 0], vectors[c, 1]
+        for a in range(12):
+            push[a] = normal[c] * (along[a] + slope[c] * across[a])
+            pull[a] = along[a] - lift[c] * across[a]
         for side in range(2):
             i = order[block[c]] if side == 0 else order[other[c]]
             if i < 0:
                 continue
-            for a in range(6):
-                across = vectors[c, 1, 6 * side + a]
-                push = normal[c] * (vectors[c, 0, 6 * side + a] + slope[c] * across)
-                drag = shear[c] * across
-                for target in range(2):
-                    j = order[block[c]] if target == 0 else order[other[c]]
-                    if j < 0:
-                        continue
-                    if side == target:
-                        base = diagonal[i]
-                    elif side == 0:
-                        base = upper[c]
-                    else:
-                        base = lower[c]
-                    at = base + a * stride[i]
+            my_push, my_across = push[6 * side : 6 * side + 6], across[6 * side : 6 * side + 6]
+            for target in range(2):
+                j = order[block[c]] if target == 0 else order[other[c]]
+                if j < 0:
+                    continue
+                if side == target:
+                    base = diagonal[i]
+                elif side == 0:
+                    base = upper[c]
+                else:
+                    base = lower[c]
+                its_pull, its_across = pull[6 * target : 6 * target + 6], across[6 * target : 6 * target + 6]
+                for a in range(6):
+                    # Slices: indices that cannot be negative let the loop become vector instructions.
+                    line = data[base + a * stride[i] : base + a * stride[i] + 6]
+                    drag = shear[c] * my_across[a]
                     for m in range(6):
-                        aside = vectors[c, 1, 6 * target + m]
-                        data[at + m] += push * (vectors[c, 0, 6 * target + m] - lift[c] * aside) + drag * aside
+                        line[m] += my_push[a] * its_pull[m] + drag * its_across[m]
 
 
 def _solver(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
