@@ -103,7 +103,10 @@ class Body:
         self.mesh: Mesh = mesh(self.loops, cracks, settings, marked, previous.mesh if same else None)
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
-        if self.outlined:
+        if self.outlined and same:
+            self.area, self.centroid, self._second = previous.area, previous.centroid, previous._second
+            self._reach, self.hole_moments = previous._reach, previous.hole_moments
+        elif self.outlined:
             self.area, self.centroid, self._second = area_moments(self.loops)
             self._reach = float(np.ptp(self.loops[0], axis=0).max())
             self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
