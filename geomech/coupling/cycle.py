@@ -19,7 +19,7 @@ from ..dda.excavation import until_next_event
 from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Cycle, Event, Motion, Problem, State
 from ..model.polygon import winding_number
-from .bodies import boundary_loads, elastic_bodies, inherited, solve_bodies, tip_rows
+from .bodies import boundary_loads, elastic_bodies, inherited, solve_bodies, threads_for, tip_rows
 from .compliance import crack_response
 from .inherited_loads import on_children, on_moved
 from .mean_stress import rotated_mean_stress
@@ -270,7 +270,7 @@ class Coupling:
         worst = 0.0
         compliance, offset = self.response.compliance.copy(), self.response.offset.copy()
         with self._timed("compliance"):
-            own = side_by_side(lambda of: self._compliance(*of), list(solutions.items()))
+            own = side_by_side(lambda of: self._compliance(*of), list(solutions.items()), threads_for(self.bodies))
             self.compliances.update(zip(solutions, own))
             for b, solution in solutions.items():
                 s, e = crack_response(

@@ -72,6 +72,7 @@ def results(problem: Problem) -> tuple[list[np.ndarray], dict[str, int], list[st
 
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
+    monkeypatch.setattr(bodies, "LARGE", 0)
     found = {}
     for threads in (1, 2, 3):
         monkeypatch.setattr(side_by_side, "THREADS", threads)
