@@ -39,6 +39,9 @@ RELAXATION_STEP = np.dtype(
 _FIRST_TRANSITS = 100.0
 #: dt grows by this factor from step to step, unless blocks already move nearly as far as a step may move them.
 _GROWTH, _NEARLY = 4.0, 0.3
+#: Blocks that have gone this part of their size √area, with no more balance after so many steps than before them, go on; what
+#: flies freely, with nearly all its weight to move it, may still land. Walls and slopes that stand take 3 to 15 steps.
+_GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
 #: Inertia stays above this part of the contacts' stiffness, so that blocks that nothing pushes stay put.
 _LEAST_INERTIA = 1e-10
 #: Penalty over E', for that comparison.
@@ -81,8 +84,8 @@ def equilibrium(
     """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default: state.time).
 
     ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. A block that has gone ``reach`` m
-    (default: a tenth of the blocks' extent) and is out of balance still is taken to have collapsed. ``watch`` sees every step
-    and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in the answer.
+    and is out of balance still is taken to have collapsed; by default that is a tenth of the blocks' extent, or a twentieth of
+    the block's own size once the unbalanced force has stopped falling. ``watch`` sees every step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in the answer.
     """
     if not tolerance > 0:
         raise ValueError(f"the tolerance of the unbalanced force must be positive, got {tolerance!r}")
@@ -93,6 +96,9 @@ def equilibrium(
     free = np.flatnonzero(~blocks.fixed)
     if not len(free):
         return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), None)
+    judged = reach is None
+    size = np.sqrt(blocks.areas())
+    flights = 0
     reach = 0.1 * float(np.hypot(*np.ptp(blocks.vertices, axis=0))) if reach is None else reach
     dt, longest = _pseudo_times(static)
     history: list[np.void] = []
@@ -141,6 +147,15 @@ def equilibrium(
         travelled += moved
         if travelled.max() > reach:
             return answer(False, True, f"no equilibrium: blocks have moved {travelled.max():.3g} m and go on")
+        flights = len(history) if statistics["unbalanced_ratio"] > _FLYING else flights
+        since = len(history) - _IN_VAIN
+        if judged and since > flights and (travelled > _GONE * size).any():
+            forces = [float(row["unbalanced"]) for row in history]
+            if min(forces[since:]) >= min(forces[:since]):
+                return answer(
+                    False, True,
+                    f"no equilibrium: blocks have moved {travelled.max():.3g} m, and {_IN_VAIN} steps brought no more balance",
+                )  # fmt: skip
         moves_far = statistics["max_displacement_ratio"] > _NEARLY * static.allowed_ratio
         dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
     return answer(False, False, f"unbalanced force {history[-1]['unbalanced']:.2g} after {max_steps} steps")

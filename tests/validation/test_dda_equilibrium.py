@@ -115,6 +115,14 @@ def test_a_leaning_column_topples_and_its_top_is_named_first():
     assert found.moving[0] == 4
 
 
+def test_a_long_fall_is_no_collapse():
+    # Half a hundred steps of what a step may move, and as much out of balance all the way.
+    system = system_of([rectangle(-1, -1, 2, 0), rectangle(0, 0.3, 1, 1.3)], 0.5, max_displacement_ratio=0.005)
+    found = rest(system)
+    assert found.converged
+    assert moved(system, found.state)[1, 1] == pytest.approx(-0.3, abs=1e-4)
+
+
 def test_what_is_not_found_is_told_and_nothing_to_move_is_at_rest():
     system = wall(4, 3)
     found = rest(system, max_steps=1)

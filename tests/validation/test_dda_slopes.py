@@ -177,6 +177,17 @@ def test_toppling_slope_limit_friction(youngs_modulus):
     assert found == pytest.approx(toppling_slope.LIMIT_FRICTION, abs=1.2e-3 + 5e7 / youngs_modulus)
 
 
+@pytest.mark.parametrize("friction", [0.77, 0.78])
+def test_toppling_slope_just_below_its_limit_is_told_to_go(friction):
+    # Its columns lean, meet and lean on for metres, in ever shorter steps, before one of them has gone a tenth of the slope.
+    system = toppling(friction)
+    found = dda.equilibrium(system, State.at_rest(system.blocks), TOPPLING_WEIGHT)
+    print(f"tan φ = {friction}: {found.reason}; {len(found.history)} steps")
+    assert found.collapsed and not found.converged
+    assert len(found.history) <= 80
+    assert len(found.moving) > 5
+
+
 def test_toppling_slope_carries_the_published_forces():
     """R_n, S_n and the thrusts of all sixteen blocks just above the limit: the biggest, 4837 kN, to a per cent."""
     friction = 1.0015 * toppling_slope.LIMIT_FRICTION
