@@ -149,8 +149,8 @@ def _kept(
     keep = ~(joint & (left < 0) & (right < 0))
     dead = arrangement.dead & keep & joint
     if dead.any():
-        gone = _short_dead_ends(arrangement, dead, np.inf if dead_ends == "trim" else max(shortest, tolerance), mends)
-        keep[gone] = False
+        shortest, told = (np.inf, []) if dead_ends == "trim" else (max(shortest, tolerance), mends)
+        keep[_short_dead_ends(arrangement, dead, shortest, told)] = False
     import shapely
 
     area, rim = shapely.area(shapes), shapely.length(shapes)
