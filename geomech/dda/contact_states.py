@@ -28,6 +28,16 @@ def _move(unknowns, block, other, order, vectors, c, k):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def moved(unknowns, block, other, order, vectors):
+    """(n, 2): motion in the step along the normal and along the edge."""
+    out = np.empty((block.shape[0], 2))
+    for c in range(block.shape[0]):
+        for k in range(2):
+            out[c, k] = _move(unknowns, block, other, order, vectors, c, k)
+    return out
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def contact_forces(
     unknowns, block, other, order, vectors, state, direction, gap0, normal, shear, friction, sliding, lift, shear0
 ):
@@ -50,6 +60,7 @@ def contact_forces(
 def check_states(
     forces,
     partner,
+    rounding,
     state,
     direction,
     bonded,
@@ -67,7 +78,8 @@ def check_states(
 ):
     """The states that the ``forces`` (n, 4) of `contact_forces` call for.
 
-    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). ``slack`` (m) is the
+    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on a
+    corner holds until it has slid off by ``rounding`` (n,) m. ``slack`` (m) is the
     round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a thousand
     times better.
     """
@@ -101,7 +113,7 @@ def check_states(
         out = False
         for k in range(2):
             p = partner[c, k]
-            out = out or (p >= 0 and forces[p, 2] > slack and gap < 0.0)
+            out = out or (p >= 0 and forces[p, 2] > rounding[c] and gap < 0.0)
         if -forces[c, 0] > pull * (1.0 + 1e-9) + normal[c] * slack or out:
             new_state[c], new_bonded[c] = OPEN, 0
             violation[c] = normal[c] * abs(gap)

@@ -24,6 +24,9 @@ _TOUCH = 1e-7
 _ALIGNED = 0.99
 _UNKNOWN = -2
 _NEVER = -1
+#: Radius of corners, in sizes (√area) of the smaller block. Two corners that press on each other would slip off by less than
+#: they press each other in, and no state would fit; corners of rock are rounder than this.
+_ROUNDING = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +35,7 @@ class ContactSet:
 
     vertex, edge, block, other, law   as in CONTACT rows
     partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
+    rounding    (n,)     m, radius of corners: lines that miss each other by less still hold
     geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2)
     springs              stiffness and strengths
     state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
@@ -46,6 +50,7 @@ class ContactSet:
     other: np.ndarray
     law: np.ndarray
     partner: np.ndarray
+    rounding: np.ndarray
     geometry: np.ndarray
     springs: Springs
     state: np.ndarray
@@ -159,6 +164,7 @@ class ContactFinder:
             other=other,
             law=law,
             partner=np.ascontiguousarray(partner),
+            rounding=_ROUNDING * np.sqrt(np.minimum(self._area[block], self._area[other])),
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
             **remembered,

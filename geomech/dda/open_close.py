@@ -5,7 +5,8 @@ switched and the step solved again: Newton's method, which ends in two or three 
 lost for good, break only when all else is right.
 
 Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states returns,
-the `CentralPath` proposes states to go on from, unless contacts are few. If it ends without, the sliding contacts stick
+the `CentralPath` proposes states to go on from, unless contacts are few. If it ends without, rounds of `LaggedFriction` do,
+slowly and surely. If these end without, the sliding contacts stick
 again and only the worst contact of each block is switched, and if a combination still returns, only the first (the
 least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
 Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
@@ -13,17 +14,19 @@ Laws that are curved are lines within an iteration, and the iteration goes on un
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import SLIP, STICK
+from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .central_path import CentralPath
 from .contact_springs import Springs
 from .contact_states import check_states, contact_forces
 from .contacts import ContactSet
 from .curved_joints import CurvedJoints
+from .lagged_friction import LaggedFriction
 
 #: Which of the contacts that are wrong are switched: all, those of each block that are half as wrong as its worst, its
 #: worst, the first.
@@ -40,6 +43,11 @@ _FEW, _CAUTIOUS = 40, 12
 #: The central path proposes states when no more than this part of the contacts are undecided, and no more than this part of
 #: the forces on blocks is out of balance.
 _DECIDED, _BALANCED = 0.006, 1e-3
+#: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces change
+#: by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
+_PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
+#: Iterations to go from such states to the end.
+_FINISH = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +113,11 @@ class _States:
         """These states, and where ``wrong`` those of ``to``."""
         pairs = ((self.state, to.state), (self.direction, to.direction), (self.bonded, to.bonded))
         return _States(*(np.where(wrong, theirs, mine) for mine, theirs in pairs))
+
+    def sliding(self, which: np.ndarray, shear: np.ndarray) -> _States:
+        """These states, with the contacts ``which`` that have no bond sliding under ``shear`` (n,) N."""
+        which = which & (self.bonded == 0) & (shear != 0)
+        return _States(np.where(which, SLIP, self.state), np.where(which, np.sign(shear), self.direction), self.bonded)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +185,7 @@ class _Equations:
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
         *called, violation = check_states(
-            forces, found.partner, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
+            forces, found.partner, found.rounding, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
             known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
         )  # fmt: skip
         return _Answer(unknowns, forces, _States(*called), violation, missed, slip, springs, gap)
@@ -217,6 +230,30 @@ def _proposed(path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget
     return None, max(budget, 0)
 
 
+def _lagged(
+    equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
+) -> Iterator[tuple[_States, int]]:
+    """States that rounds of lagged friction propose once their normal forces hardly change, and the solutions spent since the
+    last; at most ``budget`` in all. Raises `Unsettled`."""
+    of = equations
+    friction = LaggedFriction(
+        of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded
+    )  # fmt: skip
+    told, bound = 0, _CHANGE
+    try:
+        for state, direction, change in friction.rounds():
+            states = _States(state, direction, bonded)
+            if change < bound and states.key not in offered:
+                offered.add(states.key)
+                bound = _CLOSER * change
+                yield states, friction.solutions - told
+                told = friction.solutions
+            if friction.solutions > budget or change < _SAME:
+                return
+    except np.linalg.LinAlgError as error:
+        raise Unsettled(str(error)) from error
+
+
 def settle(
     pattern: assembly.Pattern,
     matrix: np.ndarray,
@@ -241,13 +278,17 @@ def settle(
     seen: set[bytes] = set()
     offered: set[bytes] = set()
     path: CentralPath | None = None
+    lagged: Iterator[tuple[_States, int]] | None = None
     caution, fewest, tries = _ALL, np.inf, 0
     few = len(found) <= _FEW
     iteration = 0
+    # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states fits.
+    closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
     while True:
         iteration += 1
         answer = equations.answer(states, normal_force, slip)
         normal_force, slip = answer.forces[:, 0], answer.slip
+        sheared = np.where(states.state == STICK, answer.forces[:, 1], sheared)
         wrong = answer.violation > 0
         if not wrong.any() and (answer.missed is None or not answer.missed.any()):
             return _settled(equations, states, answer, iteration)
@@ -263,6 +304,9 @@ def settle(
             states, caution, fewest, tries = states.switched(wrong, answer.called), _ALL, np.inf, 0
             continue
         wrong &= ~bonds
+        closing = wrong & (states.state == OPEN) & (answer.called.state == STICK)
+        called = answer.called.sliding(closing & (closed > 0), sheared)
+        closed += closing
         returned = states.key in seen
         seen.add(states.key)
         tries = 0 if number <= _FEWER * fewest else tries + 1
@@ -275,12 +319,23 @@ def settle(
             caution, tries = _SOME, 0
             seen.clear()
         elif tired or (stuck and not (few and path is None)):
-            if path is None or not np.array_equal(path.bonded, states.bonded):
-                path = CentralPath(pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded)
-            # The last sixth of the iterations is kept for the careful ways.
-            proposal, spent = _proposed(path, states.bonded, offered, (5 * max_iterations) // 6 - iteration)
-            iteration += spent
+            proposal = None
+            if lagged is None:
+                if path is None or not np.array_equal(path.bonded, states.bonded):
+                    path = CentralPath(
+                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded
+                    )
+                # The last sixth of the iterations is kept for the careful ways.
+                budget = (5 * max_iterations) // 6 - iteration
+                proposal, spent = _proposed(path, states.bonded, offered, budget)
+                iteration += spent
             seen.clear()
+            if proposal is None and not springs.lift.any():
+                if lagged is None:
+                    lagged = _lagged(equations, answer, states.bonded, offered, _PATIENCE * max_iterations)
+                proposal, spent = next(lagged, (None, 0))
+                # What it takes is its own affair: without it the step would be cut, and cut again.
+                iteration, max_iterations = iteration + spent, max_iterations + spent + _FINISH
             if proposal is not None:
                 states, caution, fewest, tries = proposal, _ALL, np.inf, 0
                 continue
@@ -303,7 +358,7 @@ def settle(
             wrong &= _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, share)
         elif caution == _FIRST:
             wrong[int(wrong.argmax()) + 1 :] = False
-        states = states.switched(wrong, answer.called)
+        states = states.switched(wrong, called)
     worst = int((answer.violation if answer.violation.any() else answer.missed).argmax())
     name = ("open", "sticking", "sliding")
     raise Unsettled(
