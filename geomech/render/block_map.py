@@ -135,10 +135,10 @@ def _conditions(axes: Any, problem: Problem, edges: np.ndarray, size: float) -> 
         for n in blocks.edge_names
         if n and not n.startswith(JOINT) and n not in {t.edge_name for t in loads.edge_tractions}
     ]
-    for name, mark in zip(named, ("#6a994e", "#bc6c25", "#457b9d", "#9d4edd", "#ad2831", "#118ab2")):
+    for name, mark in zip(named, ("#6a994e", "#bc6c25", "#9d4edd", "#118ab2", "#ad2831", "#3d405b")):
         for edge in edges[blocks.edges_named(name)]:
-            axes.plot(*edge.T, color=mark, lw=2.6, solid_capstyle="butt", zorder=5)
-        keys.append(Line2D([], [], color=mark, lw=2.6, label=f'edges "{name}"'))
+            axes.plot(*edge.T, color=mark, lw=7, alpha=0.35, solid_capstyle="butt", zorder=0.5)
+        keys.append(Line2D([], [], color=mark, lw=7, alpha=0.35, label=f'edges "{name}"'))
     if loads.bolts:
         for bolt in loads.bolts:
             axes.plot(*np.array([bolt.start, bolt.end]).T, color="#1b1d21", lw=1.6, zorder=6)

@@ -6,6 +6,7 @@ import difflib
 import fnmatch
 
 from ..shapes.gmsh_model import CRACK
+from ..shapes.parts import JOINT
 from .drawing import Drawing
 from .errors import Check
 from .locator import Path
@@ -81,7 +82,8 @@ def _unused(c: Check) -> None:
     used.update(() if t.loads.water is None else t.loads.water.dry_edges)
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
-    idle = [name for name in _edge_names(c) if name not in used]
+    # Joints without a law of their own follow the default one, as is usual.
+    idle = [name for name in _edge_names(c) if name not in used and not name.startswith(JOINT)]
     if idle:
         c.warn(
             ("geometry", "model"),

@@ -54,7 +54,7 @@ def jointed(
     Raises ShapeError where joints or cracks are wrong.
     """
     named = [Zone(zone.name, tuple(blocks.loops(k)), _names(blocks, k)) for k, zone in enumerate(zones)]
-    joints = make_joints(geometry, [zone.loops[0] for zone in named], drawn)
+    joints = make_joints(geometry, named, drawn)
     cutting = cut(
         named,
         joints,
@@ -66,8 +66,9 @@ def jointed(
     return Jointed(tuple(joints), cutting, _cracks(geometry, named, cutting, traces))
 
 
-def make_joints(geometry: Geometry, outlines: list[np.ndarray], drawn: Sequence[Joint] = ()) -> list[Joint]:
-    """Joints drawn in the scene and elsewhere, one a name, and the scene's sets over the rock within ``outlines``."""
+def make_joints(geometry: Geometry, zones: Sequence[Zone], drawn: Sequence[Joint] = ()) -> list[Joint]:
+    """Joints drawn in the scene and elsewhere, one a name, and the scene's sets over the rock of ``zones``."""
+    outlines = [zone.loops[0] for zone in zones]
     lines: dict[str, list[np.ndarray]] = {}
     for joint in geometry.joints:
         lines.setdefault(JOINT + joint.name, []).append(np.array(joint.points, dtype=float).reshape(-1, 2))
@@ -92,11 +93,29 @@ def make_joints(geometry: Geometry, outlines: list[np.ndarray], drawn: Sequence[
         except ValueError as error:
             flaws.append(Flaw("joint_sets", k, str(error), "check its means and deviations"))
             continue
+        strangers = [name for name in shape.zones if name not in {zone.name for zone in zones}]
+        if strangers:
+            known = ", ".join(repr(name) for name in dict.fromkeys(zone.name for zone in zones))
+            flaws.append(Flaw("joint_sets", k, f"there is no zone {strangers[0]!r}", f"there are {known}"))
+            continue
+        if shape.zones:
+            joint = _within(joint, [zone for zone in zones if zone.name in shape.zones])
         walls = [other for other in joints if other.name.removeprefix(JOINT) in shape.ends_on]
         joints.append(terminated(joint, walls, shape.ends_share, rng) if walls else joint)
     if flaws:
         raise ShapeError(flaws)
     return joints
+
+
+def _within(joint: Joint, zones: Sequence[Zone]) -> Joint:
+    """What of ``joint`` lies in ``zones``."""
+    import shapely
+
+    rock = shapely.union_all([shapely.Polygon(zone.loops[0], zone.loops[1:]) for zone in zones])
+    inside = shapely.get_parts(
+        shapely.intersection(np.array([shapely.LineString(line) for line in joint.lines], object), rock)
+    )
+    return Joint(joint.name, tuple(shapely.get_coordinates(line) for line in inside if shapely.length(line) > 0))
 
 
 def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.random.Generator) -> Joint:

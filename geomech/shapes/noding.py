@@ -105,7 +105,7 @@ def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> G
     start, end, source = drawn.start, drawn.end, drawn.source
     for _ in range(_ROUNDS):
         graph = _crossed(start, end, source, drawn.n_outlines, decimals, mends)
-        moved, start, end, source = _met(graph, drawn.n_outlines, tolerance, mends)
+        moved, start, end, source = _met(graph, drawn.n_outlines, tolerance, 10.0 ** (3 - decimals), mends)
         if not moved:
             return graph
     raise ShapeError(
@@ -122,7 +122,7 @@ def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> G
 
 def _crossed(start, end, source, n_outlines, decimals, mends) -> Graph:
     """All crossings made nodes. What merely touches meets in `_met`."""
-    one, other, t, u = _crossings(start, end)
+    one, other, t, u = _crossings(start, end, source < n_outlines, 10.0 ** (3 - decimals))
     at = np.round(start[one] + t[:, None] * (end[one] - start[one]), decimals) + 0.0
     n = len(start)
     segment = np.concatenate([np.arange(n), one, other, np.arange(n)])
@@ -161,8 +161,9 @@ def _distinct(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return ranked[new], number
 
 
-def _crossings(start: np.ndarray, end: np.ndarray):
-    """Pairs of segments that cross inside both, and where along each (0 to 1): (one, other, t, u)."""
+def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, roundoff: float):
+    """Pairs of segments that cross inside both, and where along each (0 to 1): (one, other, t, u). Outlines that lie on one
+    another but for ``roundoff`` m do not cross."""
     one, other = _near_pairs(start, end)
     p, r = start[one], end[one] - start[one]
     q, s = start[other], end[other] - start[other]
@@ -173,6 +174,9 @@ def _crossings(start: np.ndarray, end: np.ndarray):
         u = (gap[:, 0] * r[:, 1] - gap[:, 1] * r[:, 0]) / turn
         # Comparisons with the nan of parallel lines are False.
         cross = (t > 0) & (t < 1) & (u > 0) & (u < 1)
+        away = np.maximum(np.abs(gap[:, 0] * r[:, 1] - gap[:, 1] * r[:, 0]),
+                          np.abs((gap + s)[:, 0] * r[:, 1] - (gap + s)[:, 1] * r[:, 0]))  # fmt: skip
+        cross &= ~(outline[one] & outline[other] & (away <= roundoff * np.hypot(*r.T)))
     # Straight lines from one point meet nowhere else, whatever round-off says.
     for a in (start, end):
         for b in (start, end):
@@ -202,7 +206,7 @@ def _near_pairs(start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndar
     return pairs // len(start), pairs % len(start)
 
 
-def _met(graph: Graph, n_outlines: int, tolerance: float, mends: list[Mend]):
+def _met(graph: Graph, n_outlines: int, tolerance: float, roundoff: float, mends: list[Mend]):
     """Whether anything within ``tolerance`` of something else was made to meet it, and the segments after that."""
     import shapely
     from scipy.sparse import coo_array
@@ -220,6 +224,8 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, mends: list[Mend]):
         | (other == FREE)
         | ((one != other) & ((one == CORNER) | (other == CORNER)))
         | ((one == other) & (one >= 0))
+        # One corner, crossed by another outline a digit away.
+        | (np.hypot(*(nodes[pairs[:, 1]] - nodes[pairs[:, 0]]).T) <= roundoff)
     ]
     if len(pairs):
         links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
@@ -227,6 +233,7 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, mends: list[Mend]):
         rank = np.lexsort((np.arange(n), home == FREE, home != CORNER, cluster))
         chief = rank[np.searchsorted(cluster[rank], np.arange(cluster.max() + 1))][cluster]
         follows = (home == FREE) | ((home >= 0) & ((home[chief] == home) | (home[chief] == CORNER)))
+        follows |= np.hypot(*(nodes - nodes[chief]).T) <= roundoff
         for k in np.flatnonzero((chief != np.arange(n)) & follows):
             away = float(np.hypot(*(nodes[k] - graph.nodes[chief[k]])))
             if away > _TOLD * tolerance:
@@ -241,8 +248,10 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, mends: list[Mend]):
     node, edge = tree.query(shapely.points(nodes), predicate="dwithin", distance=tolerance)
     near = ~(nodes[edges[edge]] == nodes[node][:, None]).all(axis=2).any(axis=1)
     outline = source[edge] < n_outlines
-    # A node on an outline divides it wherever round-off has put it; other outlines are not led through it.
-    near &= ~(outline & firm[node] & (home[node] != source[edge])) & ~settled[node]
+    # A node on an outline divides it wherever round-off has put it; other outlines are led through it only where it lies on
+    # them, as a brick's corner does on the course below.
+    apart = shapely.distance(shapely.points(nodes[node]), tree.geometries[edge]) > roundoff
+    near &= ~(outline & firm[node] & (home[node] != source[edge]) & apart) & ~settled[node]
     degree = np.bincount(edges.ravel(), minlength=n)
     through: dict[int, list[int]] = {}
     for k, e in zip(node[near].tolist(), edge[near].tolist()):

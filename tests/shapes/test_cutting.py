@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 import shapely
@@ -214,3 +216,14 @@ def test_euler_holds_on_random_networks():
         links = coo_array((np.ones(len(graph.edges)), pairs), shape=(len(used), len(used)))
         components = connected_components(links, directed=False)[0]
         assert len(used) - len(graph.edges) + len(faces) == components
+
+
+def test_courses_of_bricks_keep_their_bricks():
+    """Corners of one course on the sides of the next: zones that touch between their corners stay what they are."""
+    course = [[(0, 1), (1, 2)], [(0, 0.5), (0.5, 1.5), (1.5, 2)]]
+    bricks = [np.array([[a, y], [b, y], [b, y + 1], [a, y + 1]], float) for y in (0, 1) for a, b in course[y]]
+    turn = np.array([[math.cos(0.3), math.sin(0.3)], [-math.sin(0.3), math.cos(0.3)]])
+    for turned in (np.eye(2), turn):
+        result = cut([Zone("brick", (brick @ turned,)) for brick in bricks], [])
+        assert sorted(result.blocks.areas()) == pytest.approx([0.5, 0.5, 1, 1, 1], rel=1e-10)
+        assert result.cracks.n_cracks == 0

@@ -88,6 +88,7 @@ class JointSetShape(Table):
     p32_per_m: Positive | None = Field(None, description='area of "discs" per volume, m²/m³')
     cell_area_m2: Positive | None = Field(None, description='mean area of "voronoi" cells, m²')
     region: Points | None = Field(None, description="polygon that holds the set, [[x, y], …], m (unset: all rock)")
+    zones: Names = Field((), description="names of the zones that the set cuts (unset: all)")
     ends_on: Names = Field((), description="names of joints or sets before it that its traces end on")
     ends_share: Annotated[float, Field(ge=0, le=1)] = Field(1.0, description="part of the traces that do so")
 

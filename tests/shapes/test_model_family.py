@@ -1,0 +1,95 @@
+"""Every model under geometry/ builds, with its own parameters and others, and its scene starts to run."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import geomech
+from geomech.reference import masonry, toppling_slope
+from geomech.scene import load_scene
+from geomech.shapes import cut, read_gmsh_model
+
+GEOMETRY = Path(__file__).parents[2] / "geometry"
+MODELS = sorted(path.stem for path in GEOMETRY.glob("*.geo"))
+#: Coordinates are kept to twelve digits; a block's area is the difference of larger ones.
+ROUNDOFF = 1e-10
+#: What a default run has time for; the others run as studies.
+QUICK = ("benched_slope", "brazilian_disc", "brick_wall", "masonry_arch", "planar_slope", "toppling_slope")
+SCENES = sorted(path.stem for path in GEOMETRY.glob("*.toml"))
+
+
+def built(model, **parameters):
+    drawing = read_gmsh_model(GEOMETRY / f"{model}.geo", parameters)
+    return drawing, cut(drawing.zones, drawing.joints)
+
+
+def drawn_area(drawing):
+    def area(loop):
+        x, y = loop.T
+        return abs(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+    return sum(area(zone.loops[0]) - sum(area(hole) for hole in zone.loops[1:]) for zone in drawing.zones)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_model_builds_and_loses_no_rock(model):
+    drawing, cutting = built(model)
+    assert drawing.warnings == () and cutting.blocks.areas().sum() == pytest.approx(drawn_area(drawing), rel=ROUNDOFF)
+    # All its parameters stand in the side panel, each with a label and a place of its own.
+    assert len(drawing.parameters) >= 5 and all(p.path.count("/") == 2 for p in drawing.parameters.values())
+
+
+@pytest.mark.parametrize(
+    ("model", "parameters"),
+    [
+        ("benched_slope", {"benches": 1, "fault": "none"}),
+        ("benched_slope", {"benches": 6, "face_angle_deg": 85, "fault_dip_deg": 60}),
+        ("two_set_slope", {"dip_a_deg": 45, "angle_b_deg": 90, "height_m": 35}),
+        ("two_set_slope", {"bridge_a_m": 0, "bridge_b_m": 0}),
+        ("planar_slope", {"tension_crack": "none", "toe_height_m": 4}),
+        ("planar_slope", {"tension_crack": "none", "plane_dip_deg": 10}),
+        ("toppling_slope", {"columns": 4, "crest_column": 2}),
+        ("tunnel", {"shape": "circle", "fault_angle_deg": 90}),
+        ("tunnel", {"fault": "none"}),
+        ("masonry_arch", {"half_angle_deg": 60, "voussoirs": 31}),
+        ("brick_wall", {"courses": 1, "bricks": 1}),
+        ("brazilian_disc", {"crack_ratio": 0, "flat_angle_deg": 30}),
+    ],
+)
+def test_parameters_may_be_others(model, parameters):
+    drawing, cutting = built(model, **parameters)
+    assert drawing.warnings == () and cutting.blocks.areas().sum() == pytest.approx(drawn_area(drawing), rel=ROUNDOFF)
+
+
+def test_what_the_models_draw_is_what_their_sources_say():
+    # Goodman & Bray (1976): heights of the columns rise to 40 m at the crest, the tenth, and fall to 4 m behind it.
+    drawing, _ = built("toppling_slope")
+    columns = [zone.loops[0] for zone in drawing.zones if zone.name == "columns"]
+    tall = [float(np.hypot(*(loop[2] - loop[1]))) for loop in columns]
+    # The paper rounds the steps of the tops and feet to whole and tenth metres; six steps behind the crest add up.
+    assert tall == pytest.approx(toppling_slope.HEIGHTS, abs=0.7)
+    assert tall[:10] == pytest.approx(toppling_slope.HEIGHTS[:10], abs=0.1)
+    # The arch of the limit analysis, voussoir for voussoir.
+    drawing, _ = built("masonry_arch", voussoirs=9, radius_m=2.0)
+    arch = [zone.loops[0] for zone in drawing.zones if zone.name == "voussoirs"]
+    for loop, outline in zip(arch, masonry.voussoirs(9, 0.15, 2.0), strict=True):
+        assert np.abs(np.sort(loop, axis=0) - np.sort(outline, axis=0)).max() < 1e-12
+    # A wall of two courses of three and four bricks.
+    _, cutting = built("brick_wall", courses=2, bricks=3)
+    assert cutting.blocks.n_blocks == 3 + 4 + 1
+    # The block between the face, the plane and the tension crack: the strip under the crest less the triangle under the plane.
+    _, cutting = built("planar_slope")
+    brink, far = 30 / math.tan(math.radians(60)), 30 / math.tan(math.radians(60)) + 6
+    wedge = 0.5 * brink * 30 + 6 * 30 - 0.5 * far**2 * math.tan(math.radians(35))
+    assert np.abs(cutting.blocks.areas() - wedge).min() < 1e-9 * wedge
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SCENES])
+def test_its_scene_starts_to_run(name):
+    scene = load_scene(GEOMETRY / f"{name}.toml", ["run.end_time_s=1e9"])
+    assert scene.problem().blocks.n_blocks > 2
+    runs = iter(geomech.cycles(scene))
+    cycle = [next(runs) for _ in range(3)][-1]
+    assert np.isfinite(cycle.state.vertices).all()
