@@ -13,6 +13,7 @@ from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, S
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import JointTable, Springs, contact_springs, penalties
 from .curved_joints import CurvedJoints
+from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class ContactSet:
     normal, shear, slip        forces N and sliding m
     wear, lift                 m: way slid to and fro, and how far that has forced the faces apart
     stretch                    m: motion along the edge that the multipliers of sticking contacts still have to take back
+    relies_on_glue             corners have been left out that hold as long as all bonds do
     """
 
     vertex: np.ndarray
@@ -62,6 +64,7 @@ class ContactSet:
     wear: np.ndarray
     lift: np.ndarray
     stretch: np.ndarray
+    relies_on_glue: bool = False
 
     @cached_property
     def gap(self) -> np.ndarray:
@@ -127,8 +130,9 @@ class ContactFinder:
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
         self._near = NearPairs(self._start, self._fixed)
 
-    def find(self, state: State, vertices: np.ndarray, window: float) -> ContactSet:
-        """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it."""
+    def find(self, state: State, vertices: np.ndarray, window: float, glue_holds: bool = True) -> ContactSet:
+        """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it; without
+        corners that are held to each other by the glue around them, if that ``glue_holds``."""
         old = state.contacts
         if len(old):
             # Faces that slid apart press at a distance.
@@ -157,9 +161,22 @@ class ContactFinder:
         remembered = self._remembered(old, parent, state.time, geometry, partner, springs)
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
+        vertex, edge = table[:, 0].copy(), table[:, 1].copy()
+        glued = None
+        if glue_holds and remembered["bonded"].any():
+            along = vertices[self._next[edge]] - vertices[edge]
+            share = geometry[:, 4] / np.hypot(along[:, 0], along[:, 1])
+            glued = held_by_glue(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
+        if glued is not None:
+            keep = ~glued
+            renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
+            vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
+            partner, geometry = renumber[partner[keep]], geometry[keep]
+            springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
+            remembered = {name: value[keep] for name, value in remembered.items()}
         return ContactSet(
-            vertex=table[:, 0].copy(),
-            edge=table[:, 1].copy(),
+            vertex=vertex,
+            edge=edge,
             block=block,
             other=other,
             law=law,
@@ -167,6 +184,7 @@ class ContactFinder:
             rounding=_ROUNDING * np.sqrt(np.minimum(self._area[block], self._area[other])),
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
+            relies_on_glue=glued is not None,
             **remembered,
         )
 

@@ -183,6 +183,9 @@ class BlockSystem:
                 reason = f"{failure}{self._finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
             else:
+                if found.relies_on_glue and (result.contacts["bonded"] < found.bonded).any():
+                    found = self._finder.find(state, vertices, _WINDOW * limit, glue_holds=False)
+                    continue
                 if largest <= 1.0001 * limit:
                     self._refuse_crushed(result.state)
                     return result
@@ -191,7 +194,7 @@ class BlockSystem:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     limit = 1.1 * largest
-                    found = self._finder.find(state, vertices, _WINDOW * limit)
+                    found = self._finder.find(state, vertices, _WINDOW * limit, found.relies_on_glue)
                     continue
                 before = largest
                 shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
