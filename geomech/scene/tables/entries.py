@@ -19,4 +19,5 @@ Names = Annotated[tuple[str, ...], Strict(False)]
 class Table(BaseModel):
     """A table of the scene: no unknown keys, no silent conversions."""
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, populate_by_name=True)
+    # Validators are built with those of the whole scene, not for each table as it is defined.
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, populate_by_name=True, defer_build=True)
