@@ -185,7 +185,8 @@ def test_toppling_slope_just_below_its_limit_is_told_to_go(friction):
     print(f"tan φ = {friction}: {found.reason}; {len(found.history)} steps")
     assert found.collapsed and not found.converged
     assert len(found.history) <= 80
-    assert len(found.moving) > 5
+    # The toe of three sliding blocks goes, with what topples behind it (blocks count from the base on).
+    assert {1, 2, 3} <= set(found.moving) and len(found.moving) > 3
 
 
 def test_toppling_slope_carries_the_published_forces():
