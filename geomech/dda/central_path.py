@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 
 from ..model import OPEN, SLIP, STICK
-from . import assembly
+from . import assembly, contact_states
 from .contact_springs import Springs
 from .contacts import ContactSet
 
@@ -38,23 +38,6 @@ _LEAST_LEFT = 1e-14
 #: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. Walls of 1 000
 #: bricks take as many steps as with 1e-12, of 10 000 as with 1e-6.
 _WITHIN = 1e-4
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _moved(unknowns, block, other, order, vectors, lift):
-    """(n, 2): change of gap and motion along the edge under ``unknowns``."""
-    n = block.shape[0]
-    out = np.zeros((n, 2))
-    for c in range(n):
-        for side in range(2):
-            i = order[block[c]] if side == 0 else order[other[c]]
-            if i < 0:
-                continue
-            for a in range(6):
-                out[c, 0] += vectors[c, 0, 6 * side + a] * unknowns[6 * i + a]
-                out[c, 1] += vectors[c, 1, 6 * side + a] * unknowns[6 * i + a]
-        out[c, 0] -= lift[c] * out[c, 1]
-    return out
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -237,14 +220,15 @@ class CentralPath:
             side = residual.copy()
             _add_forces(side, *self._at, given, given_along + slope * given)
             step = solve(side)
-            moved = _moved(step, *self._at, self._lift)
-            d_normal = given - stiff * moved[:, 0]
-            d_shear = given_along - stiff_along * moved[:, 1] + slope * d_normal
-            d_width = moved[:, 0] + d_normal / kn + gap_missed
+            motion = contact_states.moved(step, *self._at)
+            motion[:, 0] -= self._lift * motion[:, 1]
+            d_normal = given - stiff * motion[:, 0]
+            d_shear = given_along - stiff_along * motion[:, 1] + slope * d_normal
+            d_width = motion[:, 0] + d_normal / kn + gap_missed
             d_above, d_below = mu * d_normal - d_shear, mu * d_normal + d_shear
             d_back = to_back / above - back - back / above * d_above
             d_ahead = to_ahead / below - ahead - ahead / below * d_below
-            return step, moved, d_shear, (d_normal, d_width, d_back, d_ahead, d_above, d_below)
+            return step, motion, d_shear, (d_normal, d_width, d_back, d_ahead, d_above, d_below)
 
         numbers = (normal, width, back, ahead, above, below)
 

@@ -153,9 +153,8 @@ class ContactFinder:
         partner = table[:, 2:]
         if (law == _NEVER).any():
             keep = law != _NEVER
-            renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
             table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
-            partner = renumber[table[:, 2:]]
+            partner = _among(keep, partner)
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
         remembered = self._remembered(old, parent, state.time, geometry, partner, springs)
@@ -169,9 +168,8 @@ class ContactFinder:
             glued = held_by_glue(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
         if glued is not None:
             keep = ~glued
-            renumber = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
             vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
-            partner, geometry = renumber[partner[keep]], geometry[keep]
+            partner, geometry = _among(keep, partner), geometry[keep]
             springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
             remembered = {name: value[keep] for name, value in remembered.items()}
         return ContactSet(
@@ -298,3 +296,9 @@ class ContactFinder:
         x, y = found.geometry[contact, 5:7]
         a, b = self.names[found.block[contact]], self.names[found.other[contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
+
+
+def _among(keep: np.ndarray, partner: np.ndarray) -> np.ndarray:
+    """``partner`` (n, 2) of the rows ``keep`` (n,), counted among these; −1 for those that are left out, as for none."""
+    number = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
+    return number[partner[keep]]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..model import Blocks, Cracks
 from ..shapes import Cutting, Joint, Trace, Zone, cut
+from ..shapes.assembly import TOLERANCE
 from ..shapes.joint_sets import (
     Law,
     apparent_dip,
@@ -166,7 +167,7 @@ def _cracks(geometry: Geometry, zones: list[Zone], cutting: Cutting, traces: lis
 
     every = [loop for zone in zones for loop in zone.loops]
     decimals = grid_decimals(every)
-    tolerance = 1e-6 * extent_of(every) if geometry.tolerance_m is None else geometry.tolerance_m
+    tolerance = TOLERANCE * extent_of(every) if geometry.tolerance_m is None else geometry.tolerance_m
     loops = [cutting.blocks.loops(b) for b in range(cutting.blocks.n_blocks)]
     polygons = np.array([shapely.Polygon(own[0], own[1:]) for own in loops])
     ends = cutting.cracks

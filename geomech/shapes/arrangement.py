@@ -16,6 +16,7 @@ class Arrangement:
     left, right (n_edges,)    the face on either side of each edge, −1 outside all; the same on both sides of a dead end
     loops      per face: the node indices of its outline (counter-clockwise), then of its holes (clockwise)
     loop_edges per face and loop: the edge that leaves each node along the loop
+    faces      (n_faces,)      Shapely polygons
     """
 
     nodes: np.ndarray
@@ -24,6 +25,7 @@ class Arrangement:
     right: np.ndarray
     loops: list[list[np.ndarray]]
     loop_edges: list[list[np.ndarray]]
+    faces: np.ndarray
 
     @property
     def dead(self) -> np.ndarray:
@@ -76,21 +78,20 @@ def arrange(nodes: np.ndarray, edges: np.ndarray) -> Arrangement:
     left, right = np.full(len(edges), -1), np.full(len(edges), -1)
     half = face_of_cycle[of_half] if len(of_half) else np.empty(0, int)
     left[numbers], right[numbers] = half[0::2], half[1::2]
+    faces = polygons(nodes, loops) if loops else np.empty(0, object)
     rest = np.flatnonzero(~ring)
     if len(rest):
-        middle = nodes[edges[rest]].mean(axis=1)
-        left[rest] = right[rest] = faces_at(nodes, loops, middle)
-    return Arrangement(nodes, edges, left, right, loops, loop_edges)
+        left[rest] = right[rest] = _faces_at(faces, nodes[edges[rest]].mean(axis=1))
+    return Arrangement(nodes, edges, left, right, loops, loop_edges, faces)
 
 
-def faces_at(nodes: np.ndarray, loops: list[list[np.ndarray]], points: np.ndarray) -> np.ndarray:
-    """(n,) the face that holds each of ``points`` (n, 2), −1 for none."""
+def _faces_at(faces: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(n,) the one of ``faces`` that holds each of ``points`` (n, 2), −1 for none."""
     import shapely
 
     out = np.full(len(points), -1)
-    if len(loops):
-        tree = shapely.STRtree(polygons(nodes, loops))
-        hit, face = tree.query(shapely.points(points), predicate="within")
+    if len(faces):
+        hit, face = shapely.STRtree(faces).query(shapely.points(points), predicate="within")
         out[hit] = face
     return out
 

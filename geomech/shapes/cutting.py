@@ -15,13 +15,10 @@ from itertools import pairwise
 import numpy as np
 
 from ..model import Blocks, Cracks
-from .arrangement import Arrangement, arrange, polygons
-from .assembly import block_names
+from .arrangement import Arrangement, arrange
+from .assembly import TOLERANCE, block_names
 from .noding import FREE, Drawn, Graph, Mend, noded
 from .parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
-
-#: Near things meet within this part of the drawing's largest side, unless said otherwise.
-TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,11 +67,8 @@ def cut(
     graph = noded(drawn, tolerance, decimals, mends)
     while True:
         arrangement = arrange(graph.nodes, graph.edges)
-        shapes = polygons(arrangement.nodes, arrangement.loops)
-        zone = _zones_of(shapes, zones, origin)
-        keep = _kept(
-            arrangement, shapes, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, mends
-        )
+        zone = _zones_of(arrangement.faces, zones, origin)
+        keep = _kept(arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, mends)
         if keep.all():
             break
         graph = graph.only(keep)
@@ -139,7 +133,7 @@ def _zones_of(faces: np.ndarray, zones: Sequence[Zone], origin: np.ndarray) -> n
 
 
 def _kept(
-    arrangement, shapes, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, mends
+    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, mends
 ) -> np.ndarray:
     """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, the longest joint of
     blocks too small."""
@@ -153,7 +147,7 @@ def _kept(
         keep[_short_dead_ends(arrangement, dead, shortest, told)] = False
     import shapely
 
-    area, rim = shapely.area(shapes), shapely.length(shapes)
+    area, rim = shapely.area(arrangement.faces), shapely.length(arrangement.faces)
     small = (zone >= 0) & ((area < smallest) | (2 * area < tolerance * rim))
     if small.any():
         span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
@@ -166,7 +160,7 @@ def _kept(
             neighbours, which = np.unique(other, return_inverse=True)
             best = neighbours[np.argmax(np.bincount(which, weights=span[own]))]
             keep[own[other == best]] = inner[own[other == best]] = False
-            at = shapely.point_on_surface(shapes[face])
+            at = shapely.point_on_surface(arrangement.faces[face])
             mends.append(Mend("sliver", at.x, at.y, float(area[face])))
     return keep
 

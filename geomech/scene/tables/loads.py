@@ -10,6 +10,14 @@ from pydantic import Field, Strict, model_validator
 from .entries import Finite, Names, NotNegative, Pair, Points, Positive, Table
 
 
+def _refuse_uneven(times: tuple | None, values: tuple | None, name: str) -> None:
+    """A table in time has a value, the key ``name``, for every one of its ascending times."""
+    if values is None or times is None or len(values) != len(times) or not values:
+        raise ValueError(f"`times_s` and `{name}` need the same number of entries, at least one")
+    if any(b <= a for a, b in itertools.pairwise(times)):
+        raise ValueError("`times_s` must ascend")
+
+
 class Timed(Table):
     """A vector in time: exactly one of value, rate, times with values, or a file; a value may swing."""
 
@@ -41,10 +49,7 @@ class Timed(Table):
                 f"give exactly one of `{names[0]}`, `{names[1]}`, or `times_s` with `{names[2]}` (or a `file`)"
             )
         if given[2]:
-            if values is None or self.times_s is None or len(values) != len(self.times_s) or not values:
-                raise ValueError(f"`times_s` and `{names[2]}` need the same number of entries, at least one")
-            if any(b <= a for a, b in zip(self.times_s[:-1], self.times_s[1:])):
-                raise ValueError("`times_s` must ascend")
+            _refuse_uneven(self.times_s, values, names[2])
         if self.frequency_hz is not None and value is None:
             raise ValueError(f"`frequency_hz` belongs to `{names[0]}`, the amplitude")
         if (self.phase_deg or self.until_s is not None) and self.frequency_hz is None:
@@ -109,10 +114,7 @@ class ViscousBoundaryTable(Table):
         if (self.times_s is None) != (self.incoming_m_per_s is None):
             raise ValueError("a wave takes `times_s` and `incoming_m_per_s` together")
         if self.times_s is not None:
-            if len(self.times_s) != len(self.incoming_m_per_s) or not self.times_s:
-                raise ValueError("`times_s` and `incoming_m_per_s` need the same number of entries, at least one")
-            if any(b <= a for a, b in zip(self.times_s[:-1], self.times_s[1:])):
-                raise ValueError("`times_s` must ascend")
+            _refuse_uneven(self.times_s, self.incoming_m_per_s, "incoming_m_per_s")
         return self
 
 
