@@ -1,13 +1,52 @@
-"""What a cycle's record says of the whole scene: its leading load, its axial strain, all crack faces in one table."""
+"""The record of a cycle: with the scene's leading load, its axial strain, all crack faces in one table; and of events."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model import Blocks, CrackFaces, Cracks, Motion, Problem
+from ..ddm.work import Work
+from ..model import Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
+
+if TYPE_CHECKING:
+    from .cracked_blocks import CrackedBlocks
+
+
+def record(
+    now: CrackedBlocks, state: State, tips: np.ndarray, solutions: dict, events: tuple[Event, ...], growth_pass: int,
+    statistics: dict[str, float],
+) -> Cycle:  # fmt: skip
+    """What observers see of a pass that brought the blocks to ``state`` (or of blocks that stand at it)."""
+    motion = now.motion(state)
+    cycle = Cycle(
+        number=now.number,
+        load_step=now.load_step,
+        growth_pass=growth_pass,
+        load=leading_load(now.problem, now.blocks, state.time),
+        strain=axial_strain(now.gauge, motion),
+        blocks=now.blocks,
+        state=state,
+        cracks=now.cracks,
+        tips=tips,
+        faces=joined_faces(now.cracks, solutions),
+        bodies=solutions,
+        events=tuple(events),
+        monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in now.monitors.items()},
+        statistics=statistics,
+        seconds=dict(now.timed.seconds),
+        work=vars(Work.total(now.works)) if now.works else {},
+    )
+    vars(cycle)["motion"] = motion  # known here: the property need not find it again
+    return cycle
+
+
+def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Event:
+    """What happened at ``state`` in the present cycle, at ``point`` (reference coordinates)."""
+    load = leading_load(now.problem, now.blocks, state.time)
+    return Event(kind, now.number, state.time, load, (float(point[0]), float(point[1])), detail)
 
 
 def leading_load(problem: Problem, blocks: Blocks, now: float) -> float:

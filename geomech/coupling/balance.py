@@ -1,0 +1,105 @@
+"""One pass at one load: the blocks move, their forces load the cracked ones, and the strain that cracks bring is the one
+that the blocks assumed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .. import dda
+from ..dda import StepResult
+from ..model import State
+from .bodies import boundary_loads, threads_for
+from .compliance import crack_response
+from .cracked_blocks import CrackedBlocks
+from .side_by_side import side_by_side
+
+#: A pass is repeated while the crack strain it assumed and the one it found differ by more than this part of the
+#: block's elastic strain.
+COMPLIANCE_TOLERANCE = 1e-6
+
+#: … but not more often than this at one geometry: a lag of one step is corrected by the next.
+COMPLIANCE_PASSES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """The step of the blocks, the solutions of the cracked ones (block → `ddm.Solution`), and how well the two agree."""
+
+    result: StepResult
+    solutions: dict
+    statistics: dict[str, float] = field(default_factory=dict)
+
+
+def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
+    """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds.
+
+    ``load_time``: when the loads are those of that time, whatever step the blocks take; it then is the new time. Of ``now``
+    the response, loads and solutions are renewed, nothing else. Raises `dda.NotConverged`.
+    """
+    for attempt in range(COMPLIANCE_PASSES):
+        with now.timed("dda"):
+            result = now.system.step(now.state, now.problem.loads, dt, now.response, load_time)
+            if load_time is not None and result.state.time != load_time:
+                result = replace(result, state=replace(result.state, time=load_time))
+        if not now.bodies:
+            return Balance(result, {})
+        _solve_bodies(now, result)
+        mismatch = _take_response(now, result.state)
+        if mismatch < COMPLIANCE_TOLERANCE:
+            break
+    imbalance = max(load.imbalance for load in now.loads.values())
+    statistics = {
+        "compliance_passes": attempt + 1,
+        "compliance_mismatch": mismatch,
+        "traction_imbalance": imbalance,
+    }
+    return Balance(result, now.solutions, statistics)
+
+
+def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
+    """Every body under what the block solver's forces are on it."""
+    with now.timed("tractions"):
+        # Equilibrium holds on the geometry at the start of the step.
+        now.loads = boundary_loads(now.problem, now.blocks, now.state, now.motion(now.state), result, now.bodies)
+    now.solutions = now.solve(now.bodies, now.loads, now.solutions)
+    now.solved_from = now.history
+
+
+def _take_response(now: CrackedBlocks, state: State) -> float:
+    """Set what DDA should assume next, and say how far off the last assumption was (relative strain)."""
+    worst = 0.0
+    solutions = now.solutions
+    compliance, offset = now.response.compliance.copy(), now.response.offset.copy()
+    with now.timed("compliance"):
+        own = side_by_side(lambda of: _compliance(now, *of), list(solutions.items()), threads_for(now.bodies))
+        now.compliances.update(zip(solutions, own))
+        for b, solution in solutions.items():
+            s, e = crack_response(
+                now.compliances[b][2],
+                solution.crack_strain,
+                state.stress[b],
+                float(state.rotation[b]),
+            )
+            found, assumed = e + s @ state.stress[b], state.crack_strain[b]
+            elastic = now.system.compliance[b] @ state.stress[b]
+            size = np.abs(elastic).max() + np.abs(found).max()
+            if size > 0:
+                worst = max(worst, float(np.abs(found - assumed).max() / size))
+            compliance[b], offset[b] = s, e
+    now.response = dda.CrackResponse(compliance, offset)
+    return worst
+
+
+def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:
+    """The geometry and the states of crack faces that S belongs to, and S in the block's own axes: it does not change
+    with the load."""
+    body = now.bodies[block]
+    states = solution.closed.tobytes() if solution.memory is None else solution.face_states.key
+    known = now.compliances.get(block)
+    if known is not None and known[0] is body.crack_system and known[1] == states:
+        body.work.compliances_kept += 1
+        return known
+    s = body.compliance(solution)
+    return body.crack_system, states, s

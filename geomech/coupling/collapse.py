@@ -1,0 +1,45 @@
+"""Blocks that nothing holds: static equilibrium sought and not found, or a block gone out of reach."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from .. import dda
+from ..model import Event, State
+from .cracked_blocks import CrackedBlocks
+from .record import event
+
+log = logging.getLogger(__name__)
+
+
+def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
+    """Bring the blocks to rest under the loads of ``load_time``; a collapse when there is no equilibrium."""
+    with now.timed("dda"):
+        found = dda.equilibrium(
+            now.system, now.state, now.problem.loads, load_time=load_time, crack=now.response,
+            tolerance=now.problem.dda.unbalanced_tolerance,
+        )  # fmt: skip
+    # The budget is one of the steps that are recorded.
+    now.state, now.budget = found.state, now.budget.cut()
+    if not found.collapsed:
+        if not found.converged:
+            log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+        return ()
+    log.warning("t = %g s: %s; the run ends", load_time, found.reason)
+    first = int(now.blocks.vertex_start[found.moving[0]])
+    return (event(now, "collapse", now.state, now.blocks.vertices[first], found.reason),)
+
+
+def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
+    """A collapse, when a block has gone farther than the blocks reach: in statics nothing will hold it any more, and
+    ever shorter steps would follow it for ever."""
+    moved = np.hypot(*(state.vertices - now.blocks.vertices).T)
+    farthest = int(np.argmax(moved))
+    if not moved[farthest] > np.hypot(*np.ptp(now.blocks.vertices, axis=0)):
+        return ()
+    name = now.blocks.names[now.blocks.vertex_block[farthest]]
+    detail = f"nothing holds {name}: it has moved {moved[farthest]:.3g} m"
+    log.warning("t = %g s: %s; the run ends", state.time, detail)
+    return (event(now, "collapse", state, now.blocks.vertices[farthest], detail),)

@@ -1,0 +1,154 @@
+"""Blocks and cracks as a coupled run has them at present, with what the solvers keep of them from step to step."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .. import dda
+from ..ddm.work import Work
+from ..model import Blocks, Cracks, Motion, Problem, State
+from ..model.polygon import winding_number
+from .bodies import elastic_bodies, inherited, solve_bodies
+from .inherited_loads import on_children, on_moved
+from .phases import Phases
+from .tractions import BoundaryLoad
+
+
+class CrackedBlocks:
+    """What a load step begins with, and what its passes change.
+
+    ``state`` is that at the start of the step; ``problem`` has the loads as they are on the present blocks. ``number`` and
+    ``load_step`` count cycles and load steps. ``bodies`` (block → elastic body), ``nodes_of`` (block → its nodes in the whole
+    network), ``solutions``, ``loads`` and ``compliances`` are of the last pass; ``response`` is what the blocks are to
+    assume of their cracks.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.blocks: Blocks = problem.blocks
+        self.cracks: Cracks = problem.cracks
+        self.state = State.at_rest(problem.blocks)
+        self.gauge = problem.gauge
+        self.monitors = dict(problem.monitors)
+        self.number = 0
+        self.load_step = 0
+        self.timed = Phases()
+        self.works: list[Work] = []
+        self.bodies: dict[int, object] = {}
+        self.solutions: dict[int, object] = {}
+        self.loads: dict[int, BoundaryLoad] = {}
+        self.compliances: dict[int, tuple] = {}
+        # What crack faces with friction remember of the load step before: its passes all begin there.
+        self.history: dict[int, object] = {}
+        self.solved_from: dict[int, object] = {}
+        self.budget = dda.EnergyBudget()
+        self.removed: np.ndarray | None = None
+        self._motion: tuple[State, Motion] | None = None
+        self._take_blocks()
+        if problem.in_situ is not None:
+            self._settle_in_situ()
+
+    def motion(self, state: State) -> Motion:
+        """The blocks' motion in ``state``; the record of one step and the loads of the next ask for the same one."""
+        if self._motion is None or self._motion[0] is not state:
+            self._motion = state, Motion.of(self.blocks, state.vertices)
+        return self._motion[1]
+
+    # -- the elastic bodies --------------------------------------------------------------------------------------------
+
+    def take_cracks(self, cracks: Cracks) -> None:
+        """Go on with ``cracks`` in the same blocks."""
+        self.cracks = cracks
+        self._take_bodies()
+
+    def _take_bodies(self) -> None:
+        """The elastic bodies of the present cracks, keeping what has not changed."""
+        self.bodies, self.nodes_of = self.bodies_of(self.cracks, self.bodies)
+
+    def bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
+        """The elastic bodies that ``cracks`` would make of the present blocks, and their nodes; see `elastic_bodies`."""
+        with self.timed("ddm assembly"):
+            return elastic_bodies(self.problem, self.blocks, cracks, kept, self.works, self.removed)
+
+    def solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
+        """block → solution of its body under its load, with the memory of crack faces at the start of the step."""
+        with self.timed("ddm solve"):
+            return solve_bodies(bodies, loads, warm, self.history, self.solved_from)
+
+    # -- changes of the blocks -----------------------------------------------------------------------------------------
+
+    def _take_blocks(self, parent: np.ndarray | None = None) -> None:
+        """New blocks: a new block system. Of blocks that are their ``parent`` (n_blocks,), whole, under another number what
+        is known of their cracks is kept."""
+        problem = self.problem
+        self.system = dda.BlockSystem(
+            self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda
+        )
+        n = self.blocks.n_blocks
+        self.nodes_of = {}
+        response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))
+        whole = np.zeros(0, int) if parent is None else np.flatnonzero(np.bincount(parent)[parent] == 1)
+        if len(whole):
+            response.compliance[whole] = self.response.compliance[parent[whole]]
+            response.offset[whole] = self.response.offset[parent[whole]]
+        self.response = response
+        self.bodies, self.solutions, self.compliances, self.solved_from = (
+            {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
+            for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
+        )
+        self._take_bodies()
+
+    def take_split(self, split) -> None:
+        """Blocks, state and cracks of the `Split`; gauges and monitors go to the child that holds their point."""
+
+        def child(block: int, point) -> int:
+            parts = np.flatnonzero(split.parent == block)
+            if len(parts) == 1:
+                return int(parts[0])
+            inside = [winding_number(split.blocks.loops(p), np.asarray(point, dtype=float)) for p in parts]
+            return int(parts[int(np.argmax(np.abs(inside)))])
+
+        if self.gauge is not None:
+            self.gauge = tuple((child(b, p), p) for b, p in self.gauge)
+        self.monitors = {name: (child(b, p), p) for name, (b, p) in self.monitors.items()}
+        self.problem = replace(self.problem, loads=on_children(self.problem.loads, split.parent, child))
+        if self.removed is not None:
+            self.removed = self.removed[split.parent]
+        self.history = inherited(self.history, split.parent, split.cracks)
+        self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
+        self.budget = self.budget.cut()
+        self._take_blocks(split.parent)
+
+    def take_out(self) -> list[int]:
+        """Leave out the elastic bodies of blocks that are taken out at the present time, and return these blocks."""
+        removed = self.system.removed(self.problem.loads, self.state.time)
+        if removed is self.removed:
+            return []
+        new = removed if self.removed is None else removed & ~self.removed
+        self.removed = removed
+        self._take_bodies()
+        return np.flatnonzero(new).tolist()
+
+    def _settle_in_situ(self) -> None:
+        """Begin with the blocks at rest under the in-situ stress; where they are then is the reference. Cracks are as if cut
+        into them then: they open and slide from the first step on."""
+        with self.timed("dda"):
+            found = dda.in_situ_state(self.system, self.problem.in_situ, self.problem.loads)
+        motion = Motion.of(self.blocks, found.state.vertices)
+
+        def moved(block: int, point) -> tuple[float, float]:
+            return tuple(motion.current(block, np.asarray(point, dtype=float)).tolist())
+
+        nodes = self.cracks.nodes.copy()
+        for block in np.unique(self.cracks.block).tolist():
+            own = np.unique(self.cracks.segments[self.cracks.block == block])
+            nodes[own] = motion.current(block, nodes[own])
+        self.cracks = replace(self.cracks, nodes=nodes)
+        self.problem = replace(self.problem, loads=on_moved(self.problem.loads, moved))
+        if self.gauge is not None:
+            self.gauge = tuple((b, moved(b, p)) for b, p in self.gauge)
+        self.monitors = {name: (b, moved(b, p)) for name, (b, p) in self.monitors.items()}
+        self.blocks, self.state = found.blocks, found.state
+        self._take_blocks()

@@ -1,0 +1,103 @@
+"""Growth at one load: which cracks grow or are born, what they meet, which blocks that cuts through."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import Event, State
+from .bodies import tip_rows
+from .cracked_blocks import CrackedBlocks
+from .mean_stress import rotated_mean_stress
+from .record import event
+from .splitting import split_blocks
+
+
+def growth_of_tips(now: CrackedBlocks, tips: np.ndarray, k_ic: np.ndarray):
+    """The new network (`ddm.growth.Growth`) when some of ``tips`` has reached its toughness ``k_ic`` (n_tips,), else None.
+    Sets the angles that were followed."""
+    if not np.any(tips["k_eq"] >= k_ic):
+        return None
+    from ..ddm.growth import advance
+    from ..ddm.path import corrected
+
+    trial = now.bodies
+
+    def grow():
+        with now.timed("growth"):
+            return advance(now.cracks, now.blocks.loops, tips, now.problem.growth, k_ic, now.number)
+
+    def look_ahead(cracks):
+        nonlocal trial
+        trial, nodes_of = now.bodies_of(cracks, trial)
+        ahead = now.solve(trial, now.loads, now.solutions)
+        return tip_rows(now.problem, now.blocks, ahead, nodes_of)
+
+    growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct)
+    if growth is not None:
+        now.bodies = trial  # most of it is what the corrected step needs
+    return growth
+
+
+def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
+    """(n_tips,) K_Ic of the rock that each tip stands in, Pa √m."""
+    return np.array([now.problem.materials[m].k_ic for m in now.blocks.material[tips["block"]]])
+
+
+def births(now: CrackedBlocks, solutions: dict, state: State):
+    """New cracks, and their events, where no tip grows and whole rock is strained to its strength."""
+    from .births import bear_in_blocks
+
+    with now.timed("growth"):
+        growth, born = bear_in_blocks(
+            now.cracks, now.blocks, now.problem.materials, solutions, now.problem.growth, now.number
+        )
+    names = growth.cracks.names[now.cracks.n_cracks :] if growth is not None else ()
+    return growth, tuple(
+        event(now, "birth", state, birth.start, f"{name} starts in {birth.kind} ({birth.place})")
+        for name, birth in zip(names, born)
+    )
+
+
+def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Event, ...]:
+    """An event for every tip that grows for the first time; wings inherit their crack and end by position."""
+    events = []
+    first = {int(s): k for k, s in reversed(list(enumerate(now.cracks.segments.ravel())))}
+    for tip in tips[tips["grown"] > 0]:
+        segment = first[int(tip["node"])] // 2
+        if now.cracks.birth_cycle[segment] == 0:
+            events.append(
+                event(now, "initiation", state, tip["point"], f"{now.cracks.names[tip['crack']]} starts to grow")
+            )
+    return tuple(events)
+
+
+def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tuple[Event, ...]:
+    """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought, at ``state``."""
+    names = now.cracks.names
+    events = []
+    for join in growth.joins:
+        other = f" {names[join.other_crack]}" if join.other_crack >= 0 else " the surface"
+        events.append(event(now, join.kind, state, join.point, f"{names[join.crack]} meets{other}"))
+    split = None
+    if growth.joins:
+        with now.timed("growth"):
+            split = split_blocks(now.blocks, now.state, growth.cracks, _mean_stress(now.state, solutions))
+    if split is None:
+        now.take_cracks(growth.cracks)
+        return tuple(events)
+    for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1):
+        parts = np.flatnonzero(split.parent == b)
+        centre = now.blocks.loops(b)[0].mean(axis=0)
+        events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
+    now.take_split(split)
+    return tuple(events)
+
+
+def _mean_stress(state: State, solutions: dict):
+    """block → (polygon → mean stress there, current axes), from the last solved elastic body."""
+
+    def of_block(block: int):
+        solution = solutions[block]
+        return lambda loops: rotated_mean_stress(solution, loops, float(state.rotation[block]))
+
+    return {b: of_block(b) for b in solutions}
