@@ -8,6 +8,7 @@ from importlib import import_module
 #: Topic → module with ``measure(quick: bool) -> str``, the printed table.
 TOPICS = {
     "accuracy": "geomech.bench.accuracy",
+    "boundary": "geomech.bench.boundary_stress",
     "coupling": "geomech.bench.coupling_cost",
     "dda": "geomech.bench.block_cost",
     "ddm": "geomech.bench.work_precision",

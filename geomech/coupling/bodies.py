@@ -98,6 +98,7 @@ def boundary_loads(
             result.acceleration[b],
             problem.dda.dynamic_factor * float(state.velocity[b, 2]),
             None if forces.reaction is None else forces.reaction[b],
+            problem.run.boundary_stress,
         )
         for b in bodies
     }
@@ -136,7 +137,7 @@ def threads_for(bodies: dict[int, Body]) -> int | None:
 
 
 #: What of a `BoundaryLoad` is a load.
-_ASKED = ("segments", "tractions", "body_force", "body_force_gradient", "about", "points", "forces")
+_ASKED = ("segments", "tractions", "body_force", "body_force_gradient", "about", "points", "forces", "kelvin")
 
 
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:

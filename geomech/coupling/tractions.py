@@ -7,6 +7,10 @@ breaks it as a whole. A lone vertex pressed into an edge spreads over a short pi
 block's own corner is resolved along the corner's two edges and enters there as shear, which keeps both force and
 moment exactly.
 
+Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force on
+the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al. (2023,
+eqs. 2-4) write.
+
 All of it lives in the block's reference frame: points are mapped back by the block's affine motion, forces turned
 back by its rotation. What the forces then leave out of balance is the block's inertia (d'Alembert): it is put on as
 a body force, linear in x, so that the elastic problem is in equilibrium to round-off.
@@ -42,7 +46,7 @@ class BoundaryLoad:
     """Load of one block's elastic body, reference frame.
 
     segments (m, 2, 2) pieces of the outline, directed along it; tractions (m, 2, 2) at their two ends, linear between;
-    points and forces (k, 2) what acts inside the rock, None without;
+    points and forces (k, 2) what acts at points, None without, ``kelvin`` as in `ddm.BodyLoad`;
     body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
     resultant that inertia had to balance beyond the solver's own acceleration, relative to the forces' size.
     """
@@ -55,6 +59,7 @@ class BoundaryLoad:
     imbalance: float
     points: np.ndarray | None = None
     forces: np.ndarray | None = None
+    kelvin: bool = False
 
 
 def linear_pressure(length: float, force: float, moment: float) -> tuple[float, float, float, float]:
@@ -90,17 +95,22 @@ def boundary_load(
     acceleration: np.ndarray | None = None,
     spin: float = 0.0,
     reaction: np.ndarray | None = None,
+    route: str = "contacts",
 ) -> BoundaryLoad:
     """The load of ``block``.
 
     ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
     that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
     ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which is
-    spread over the block as its inertia is.
+    spread over the block as its inertia is; ``route``: "contacts", "springs" or "kelvin-springs".
     """
     c, s = math.cos(rotation), math.sin(rotation)
     pieces = _Pieces()
-    faces, lone = _faces_and_lone(blocks, vertices, _touches(block, motion, contacts, c, s))
+    touches = _touches(block, motion, contacts, c, s)
+    pointed = route != "contacts"
+    if pointed:
+        pieces.points += [(_on_outline(blocks, touch), np.array(touch.force)) for touch in touches]
+    faces, lone = ({}, []) if pointed else _faces_and_lone(blocks, vertices, touches)
     for (edge, _), touches in faces.items():
         _add_face(pieces, blocks, blocks.sides[edge], touches)
     for touch in lone:
@@ -116,8 +126,9 @@ def boundary_load(
     segments, tractions = pieces.arrays()
     inside = pieces.inside()
     return _balanced(
-        block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction
-    )
+        block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
+        route == "kelvin-springs",
+    )  # fmt: skip
 
 
 class _Pieces:
@@ -173,6 +184,15 @@ def _touches(block: int, motion: Motion, contacts: np.ndarray, c: float, s: floa
         x, y = push * normal[0] - shear * normal[1], push * normal[1] + shear * normal[0]
         touches.append(_Touch(own, vertex, edge, normal, point, (c * x + s * y, c * y - s * x)))
     return touches
+
+
+def _on_outline(blocks: Blocks, touch: _Touch) -> np.ndarray:
+    """Where a contact's spring stands on the block, reference frame: its vertex, or the foot of the other's on its edge."""
+    start = blocks.vertices[touch.edge]
+    if touch.own:
+        return blocks.vertices[touch.vertex]
+    side = blocks.vertices[blocks.next_vertex[touch.edge]] - start
+    return start + float(np.clip((np.array(touch.point) - start) @ side / (side @ side), 0.0, 1.0)) * side
 
 
 def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: list[float]) -> tuple[int, float]:
@@ -333,7 +353,7 @@ def _add_point_load(pieces, blocks, block: int, point: np.ndarray, force: np.nda
 
 
 def _balanced(
-    block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction
+    block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction, kelvin
 ) -> BoundaryLoad:
     area, centroid, second = blocks.area_moments(block)
     (xx, xy), (_, yy) = second.tolist()
@@ -364,4 +384,5 @@ def _balanced(
     if size > 0:
         missed = math.hypot(*(body_force - carried)) * area + abs(torque - angular) * (xx + yy) / math.sqrt(area)
         imbalance = missed / size
-    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, *(inside or (None, None)))
+    points, forces = inside or (None, None)
+    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, points, forces, kelvin)

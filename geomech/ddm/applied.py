@@ -30,7 +30,7 @@ class Applied:
     particular   field of the body force and the uniform stress
     segments, tractions  (m, 2, 2) linear tractions, the load's own and those that sides and spread point loads come to
     functions    tractions that are functions
-    kelvin       point loads inside the rock
+    kelvin       point loads inside the rock, or wherever they are asked to be Kelvin's
     wedges       point loads on its boundary
     left_over    minus what the wedges' fields are on the boundary
     """
@@ -160,6 +160,11 @@ def _point(out: Applied, body: Body, k: int, point, force, segments: list, tract
         corner, at = True, edges[edge, 0]
     else:
         before, corner, at = edge, False, a[edge] + s[edge] * d[edge]
+    if out.load.kelvin:
+        # At a corner no element's node is near; along a side a node may be, and would take all of it.
+        core = 0.0 if corner else min(SPREAD * body._extent, s[edge] * length, (1 - s[edge]) * length)
+        out.kelvin.append(KelvinLoad(at, force, body.material, core=0.5 * core))
+        return
     out_way = d[edge] / np.hypot(*d[edge])
     back = -d[before] / np.hypot(*d[before])
     opening = np.arctan2(out_way[0] * back[1] - out_way[1] * back[0], out_way @ back) % (2 * np.pi) if corner else np.pi

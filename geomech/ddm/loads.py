@@ -65,6 +65,9 @@ class BodyLoad:
     points, forces       (k, 2) m and N/m: point loads, inside the rock or on its boundary. They are singular, except
                          on holes and where the plane beyond the boundary holds rock: there a hundredth of the extent
                          carries them
+    kelvin               True: those on the boundary, too, are Kelvin's in the infinite plane. The rock beyond the boundary then
+                         keeps its share of them, about half on a side, three quarters at a right-angled corner: no element's
+                         displacement is singular enough to bring it back
 
     Raises ValueError naming the part that is not finite or of the wrong shape.
     """
@@ -81,6 +84,7 @@ class BodyLoad:
     sides: Mapping | Sequence[tuple] = ()
     points: np.ndarray | None = None
     forces: np.ndarray | None = None
+    kelvin: bool = False
 
     def scaled(self, factor: float) -> BodyLoad:
         """``factor`` times everything."""
@@ -99,7 +103,10 @@ class BodyLoad:
         return replace(self, **changed, displacements=displacements, hole_pressure=holes, sides=sides)
 
     def with_added(self, other: BodyLoad) -> BodyLoad:
-        """Both loads together. Raises ValueError when body forces are given about different points."""
+        """Both loads together. Raises ValueError when body forces are given about different points, or point loads in
+        different ways."""
+        if self.kelvin != other.kelvin and self.points is not None and other.points is not None:
+            raise ValueError("point loads on the boundary cannot be Kelvin's in one load and not in the other")
         joined = {
             name: _joined(getattr(self, name), getattr(other, name))
             for name in ("segments", "tractions", "points", "forces")
@@ -132,6 +139,7 @@ class BodyLoad:
             hole_pressure=pressure,
             displacements=displacements,
             sides=self.sides + other.sides,
+            kelvin=self.kelvin or other.kelvin,
         )
 
     def hole_pressures(self, n_holes: int) -> list[Pressure]:

@@ -13,18 +13,22 @@ from ..model import Material
 class KelvinLoad:
     """A force (2,) N/m at ``point`` (2,) of the infinite plane (Kelvin 1848; Crouch & Starfield 1983, §4.2).
 
-    Logarithms in displacement are of distances in units of ``unit`` (m).
+    Logarithms in displacement are of distances in units of ``unit`` (m). Nearer than ``core`` m the force counts as spread,
+    evenly to both sides: no stress.
     """
 
     point: np.ndarray
     force: np.ndarray
     material: Material
     unit: float = 1.0
+    core: float = 0.0
 
     def stress(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) Pa."""
         rel = points - self.point
         r2 = np.sum(rel * rel, axis=1)
+        if self.core:
+            r2[r2 <= self.core**2] = np.inf
         nu = self.material.effective_poissons_ratio
         x, y = rel.T / r2
         nx, ny = rel.T / np.sqrt(r2)
@@ -45,7 +49,7 @@ class KelvinLoad:
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 2) m."""
         rel = points - self.point
-        r2 = np.sum(rel * rel, axis=1)[:, None]
+        r2 = np.maximum(np.sum(rel * rel, axis=1), self.core**2)[:, None]
         mu, nu = self.material.shear_modulus, self.material.effective_poissons_ratio
         along = (rel @ self.force)[:, None] / r2
         return (-(3 - 4 * nu) * 0.5 * np.log(r2 / self.unit**2) * self.force + along * rel) / (

@@ -98,7 +98,9 @@ class GrowthSettings:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``."""
+    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``. ``boundary_stress``
+    says how contact forces load cracked blocks: "contacts" spread over faces, "springs" at points,
+    "kelvin-springs" at points of the infinite plane."""
 
     end_time: float = 1.0
     stop_at: tuple[str, ...] = ("coalescence", "split")

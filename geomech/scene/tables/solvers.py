@@ -149,7 +149,8 @@ class RunTable(Table):
     stop_at: Annotated[
         tuple[Literal["initiation", "birth", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
     ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
-    boundary_stress: Literal["contacts"] = Field(
+    boundary_stress: Literal["contacts", "springs", "kelvin-springs"] = Field(
         "contacts",
-        description='how contact forces become tractions on cracked blocks: "contacts", linear over each face',
+        description='how contact forces load cracked blocks: "contacts", linear over each face; "springs", as point forces '
+        'where they are; "kelvin-springs", as those of the infinite plane (for comparison: most of a force is then lost)',
     )
