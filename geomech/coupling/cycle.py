@@ -7,8 +7,9 @@ At each load the cycle is repeated from the same start of the step until no tip 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -34,24 +35,56 @@ def cycles(problem: Problem) -> Iterator[Cycle]:
     return Coupling(problem).cycles()
 
 
+@dataclass(frozen=True)
+class UnderWay:
+    """A load step of which a pass has grown cracks: what its next pass, number ``next_pass``, goes on with. ``told`` are the
+    events of the pass before, ``pending`` those that taking the growth has brought."""
+
+    dt: float
+    load_time: float | None
+    told: tuple[Event, ...]
+    pending: tuple[Event, ...]
+    next_pass: int
+
+
 class Coupling:
-    """The load steps of one coupled problem: what there is ``now``, and how long the next step is to be."""
+    """The load steps of one coupled problem: what there is ``now``, and how long the next step is to be.
+
+    ``between`` is called between any two passes, when all that the run goes on with is here, and nothing of it in the
+    generators' own variables: what is stored then goes on with `load_steps`.
+    """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.now = CrackedBlocks(problem)
         self.length = dda.StepLength(problem.dda)
+        self.under_way: UnderWay | None = None
+        self.between: Callable[[], None] = _go_on
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "between"}
+
+    def __setstate__(self, stored: dict[str, Any]) -> None:
+        vars(self).update(stored, between=_go_on)
+
+    @property
+    def stops_next(self) -> bool:
+        """Whether the next pass is the last one, because of what has happened."""
+        return self.under_way is not None and self._stops(self.under_way.told + self.under_way.pending)
 
     def cycles(self) -> Iterator[Cycle]:
-        now, settings = self.now, self.problem.run
+        now = self.now
         collapse = relax(now, now.state.time) if self.problem.dda.equilibrium else ()
         yield self._still(collapse)
-        if collapse:
-            return
+        if not collapse:
+            yield from self.load_steps()
+
+    def load_steps(self) -> Iterator[Cycle]:
+        """The cycles from between two passes to the end."""
         # Rounding of the summed steps must not add a last, empty one.
-        end = settings.end_time - 1e-9 * self.problem.dda.time_step
-        while now.state.time < end:
-            now.load_step += 1
+        end = self.problem.run.end_time - 1e-9 * self.problem.dda.time_step
+        while self.under_way is not None or self.now.state.time < end:
+            self.between()
             stopped = yield from self._load_step()
             if stopped:
                 return
@@ -59,11 +92,14 @@ class Coupling:
     def _load_step(self):
         """All passes at one load. Returns True when a stop event happened."""
         now, growing = self.now, self.problem.growth
-        dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
-        pending: tuple[Event, ...] = self._excavated()
-        stops, load_time = False, None
         static = self.problem.dda.dynamic_factor == 0.0
-        if static and self.problem.dda.equilibrium == "loads":
+        begun, self.under_way = self.under_way, None
+        if begun is None:
+            now.load_step += 1
+            dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
+            begun = UnderWay(dt, None, (), self._excavated(), 0)
+        dt, load_time, pending, stops = begun.dt, begun.load_time, begun.pending, self._stops(begun.told)
+        if begun.next_pass == 0 and static and self.problem.dda.equilibrium == "loads":
             load_time = now.state.time + until_next_event(now.problem.loads, now.state.time, dt)
             collapse = relax(now, load_time)
             if collapse:
@@ -71,7 +107,7 @@ class Coupling:
                 now.state = replace(now.state, time=load_time)
                 yield self._still(collapse)
                 return True
-        for growth_pass in range(growing.max_passes + 1):
+        for growth_pass in range(begun.next_pass, growing.max_passes + 1):
             now.number += 1
             try:
                 found = balanced(now, dt, load_time)
@@ -119,6 +155,8 @@ class Coupling:
                 now.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
                 return stops
             pending = take_growth(now, growth, result.state, solutions)
+            self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1)
+            self.between()
         raise AssertionError("unreachable: the last pass takes no growth")
 
     def _excavated(self) -> tuple[Event, ...]:
@@ -135,3 +173,7 @@ class Coupling:
 
     def _stops(self, events: tuple[Event, ...]) -> bool:
         return any(event.kind in self.problem.run.stop_at for event in events)
+
+
+def _go_on() -> None:
+    """Nobody wants anything between two passes."""

@@ -16,7 +16,6 @@ class Factor:
     def __init__(self, matrix: np.ndarray, what: str):
         from scipy.linalg import lapack
 
-        self._solve = lapack.dgetrs
         self.n = len(matrix)
         if self.n == 0:
             self.rcond = 1.0
@@ -39,7 +38,9 @@ class Factor:
         """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
         if self.n == 0 or right.size == 0:
             return np.zeros_like(right)
+        from scipy.linalg.lapack import dgetrs  # not kept: a compiled function cannot be stored in a checkpoint
+
         scale = self._scale if right.ndim == 1 else self._scale[:, None]
         if transposed:
-            return scale * self._solve(self._lu, self._pivots, right, trans=1 - self._transposed)[0]
-        return self._solve(self._lu, self._pivots, right * scale, trans=self._transposed, overwrite_b=True)[0]
+            return scale * dgetrs(self._lu, self._pivots, right, trans=1 - self._transposed)[0]
+        return dgetrs(self._lu, self._pivots, right * scale, trans=self._transposed, overwrite_b=True)[0]

@@ -96,7 +96,7 @@ class TipFunctionals:
     def _of(self, unit: UnitLoad) -> np.ndarray:
         """(2 n_tips, m) K per unit size of each of the unit's loads."""
         known = self._known.get(id(unit))
-        if known is None:
+        if known is None or known[0] is not unit:
             if len(self._known) >= _KEPT:
                 self._known.clear()
             n_g = len(self.on_boundary)
