@@ -173,6 +173,7 @@ class Body:
         self.boundary = g = system.elements
         g_old, same_boundary = system.at_old, system.unchanged
         c_old = c.found_in(old.faces if old else None)
+        c_seen = c.seen_in(old.faces if old else None, c_old)
         self.counts["elements"] = g.n + c.n
         self.counts["elements_new"] += int((g_old < 0).sum() + (c_old < 0).sum())
         if not same_boundary:
@@ -182,14 +183,14 @@ class Body:
         self.work.elements_assembled += self.counts["elements_new"]
         self.work.bodies += 1
 
-        self._cg = reuse(old._cg if old else None, c_old, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k))
+        self._cg = reuse(old._cg if old else None, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k))
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
         self._loads = UnitLoads(
             self.mesh, self.centroid, self.material, tol, self._extent, self.outlined, system.anchors
         )
         if same_boundary:
-            self._loads.inherit(old._loads, c_old)
+            self._loads.inherit(old._loads, c_seen)
 
         def gc(k):
             rows = influence(g, c.take(k), nu, tol)
@@ -228,7 +229,7 @@ class Body:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
             matrix = Bordered(c, Base(c, whole))
         else:
-            matrix = known.grown(c, c_old, schur)
+            matrix = known.grown(c, c_old, c_seen, schur)
         self.crack_system = CrackSystem(matrix, self.work)
 
     def _imposed(self, applied: Applied) -> np.ndarray:

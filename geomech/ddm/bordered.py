@@ -5,11 +5,12 @@ equations of G, which are given up for w_G = 0,
 
     S_BB w_B + S_BN w_N + I_BG λ = r_B,     S_NB w_B + S_NN w_N = r_N,     w_G = 0.
 
-Eliminating w_B leaves a small matrix T = K − D X for (w_N, λ), X = S_BB⁻¹ (S_BN, I_BG): a column of X is made once and
-outlasts growth (block elimination; its part for G is Woodbury's formula). Elements that come and go between two
-increments cost no more than their columns. A border that has grown wide becomes, with its base, the base of another one.
+Eliminating w_B leaves a small matrix T = K − Z R for (w_N, λ), R = (S_BN, I_BG) and Z = (S_NB; I_GB) S_BB⁻¹: a row of Z is
+made once and outlasts growth (block elimination; its part for G is Woodbury's formula). Rows, not columns: a tip's element
+that becomes an ordinary one has other shape functions and the same collocation points. Elements that come and go between two
+increments cost no more than that. A border that has grown wide becomes, with its base, the base of another one.
 
-Block elimination does not pivot between B and the border and loses ‖D‖ ‖X‖ / ‖T‖ in accuracy over an elimination that
+Block elimination does not pivot between B and the border and loses ‖Z‖ ‖R‖ / ‖T‖ in accuracy over an elimination that
 does (Higham 2002, §13.2). S is factored anew where that would be felt, and after some borders upon borders.
 """
 
@@ -31,7 +32,7 @@ WIDEST, WIDE = 0.25, 80
 DEEPEST = 3
 #: Fewer unknowns are factored in less time than a border takes.
 SMALLEST = 200
-#: Loss of accuracy, ‖D‖ ‖X‖ / ‖T‖ over the reciprocal condition of T, from which all is factored anew: K then still
+#: Loss of accuracy, ‖Z‖ ‖R‖ / ‖T‖ over the reciprocal condition of T, from which all is factored anew: K then still
 #: agrees with that of factors made anew to 1e-10.
 LOSS = 1e5
 #: What it means when there are no factors.
@@ -94,22 +95,26 @@ class Bordered:
         self._known: Eliminated | None = None
 
     def grown(
-        self, elements: ElementSet, was: np.ndarray, compute: Callable[[np.ndarray, np.ndarray], np.ndarray]
+        self,
+        elements: ElementSet,
+        was: np.ndarray,
+        seen: np.ndarray,
+        compute: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> Bordered:
-        """S between ``elements``, of which ``was`` (n,) are the numbers here, −1 where new; ``compute(rows, columns)``
-        makes blocks of it between elements."""
+        """S between ``elements``, of which ``was`` (n,) are the numbers here, −1 where new, and ``seen`` (n,) those of
+        elements in their place, whose rows are theirs; ``compute(rows, columns)`` makes blocks of it between elements."""
         kept = was >= 0
         if kept.all() and np.array_equal(was, np.arange(self.elements.n)):
             return self
         if not self._wide:
-            return self._changed(elements, was, compute)
+            return self._changed(elements, was, seen, compute)
         if self.depth == DEEPEST:
             inner, now = Bordered(self.elements, Base(self.elements, self.dense)), was
         else:
             staying = self.elements.take(was[kept])
-            base = Base(staying, self._changed(staying, was[kept], compute))
+            base = Base(staying, self._changed(staying, was[kept], was[kept], compute))
             inner, now = Bordered(staying, base), np.where(kept, np.cumsum(kept) - 1, -1)
-        return inner._changed(elements, now, compute)
+        return inner._changed(elements, now, now, compute)
 
     @property
     def _wide(self) -> bool:
@@ -119,31 +124,39 @@ class Bordered:
         unknowns = width * (len(border.added) + int((border.at < 0).sum()))
         return unknowns > max(WIDEST * self.base.elements.n_unknowns, WIDE)
 
-    def _changed(self, elements: ElementSet, was: np.ndarray, compute) -> Bordered:
+    def _changed(self, elements: ElementSet, was: np.ndarray, seen: np.ndarray, compute) -> Bordered:
         """As `grown`, on the same base."""
         border = Border.none(self.elements) if self.border is None else self.border
-        new = np.flatnonzero(was < 0)
         now = np.full(self.elements.n, -1)
         now[was[was >= 0]] = np.flatnonzero(was >= 0)
         at = np.where(border.at >= 0, now[border.at], -1)
         survives = now[border.added] >= 0
-        added = np.concatenate([now[border.added[survives]], new])
-        stays = np.flatnonzero(np.repeat(survives, 2 * elements.per))
-        old, n, n_base = len(stays), elements.per * 2 * len(added), self.base.elements.n_unknowns
+        # Of elements that came before in another kind the rows are in the border: these first.
+        place = np.full(self.elements.n + 1, -1)
+        place[border.added] = np.arange(len(border.added))
+        new = np.flatnonzero(was < 0)
+        moved, fresh = new[place[seen[new]] >= 0], new[place[seen[new]] < 0]
+        rows = np.concatenate([np.flatnonzero(survives), place[seen[moved]]])
+        added = np.concatenate([now[border.added[survives]], moved, fresh])
+        columns, rows = (_spread(x, 2 * elements.per) for x in (np.flatnonzero(survives), rows))
+        old, k, n, n_base = len(columns), len(rows), elements.per * 2 * len(added), self.base.elements.n_unknowns
         right, down, corner = np.empty((n_base, n), order="F"), np.empty((n, n_base)), np.empty((n, n), order="F")
-        right[:, :old], down[:old] = border.right[:, stays], border.down[stays]
-        corner[:old, :old] = border.corner[np.ix_(stays, stays)]
+        right[:, :old], down[:k] = border.right[:, columns], border.down[rows]
+        corner[:k, :old] = border.corner[rows[:, None], columns]
         if len(new):
-            every = np.arange(elements.n)
-            columns, rows = compute(every, new), compute(new, every)
-            places, numbers = self.base.elements.unknowns(np.flatnonzero(at >= 0)), elements.unknowns(at[at >= 0])
+            stays, every = at >= 0, np.arange(elements.n)
+            places, numbers = (_spread(x, 2 * elements.per) for x in (np.flatnonzero(stays), at[stays]))
             here = elements.unknowns(added)
-            right[:, old:] = down[old:] = 0.0
-            right[places, old:], down[old:, places] = columns[numbers], rows[:, numbers]
-            corner[:, old:], corner[old:, :old] = columns[here], rows[:, here[:old]]
+            values = compute(every, added[survives.sum() :])
+            right[:, old:] = 0.0
+            right[places, old:], corner[:, old:] = values[numbers], values[here]
+            if len(fresh):
+                values = compute(fresh, every)
+                down[k:] = 0.0
+                down[k:, places], corner[k:, :old] = values[:, numbers], values[:, here[:old]]
         out = Bordered(elements, self.base, Border(at, added, right, down, corner))
         if self._known is not None:
-            out._known = self._known.taken(stays)
+            out._known = self._known.taken(rows, columns)
         return out
 
     @cached_property
@@ -196,65 +209,69 @@ class Bordered:
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """X and D X so far: ``x`` (n_base, k) for the first of the added unknowns and ``dx`` (k, k) from them to themselves;
-    ``gone`` (g,) unknowns of the base, their ``lost`` (n_base, g) columns of X and ``dlost`` (k, g)."""
+    """Z and Z R so far: ``z`` (k, n_base) for the first of the added rows and ``zr`` (k, l) from the first of the added
+    unknowns; ``gone`` (g,) unknowns of the base, their ``lost`` (g, n_base) rows of S_BB⁻¹ and ``lost_r`` (g, l)."""
 
-    x: np.ndarray
-    dx: np.ndarray
+    z: np.ndarray
+    zr: np.ndarray
     gone: np.ndarray
     lost: np.ndarray
-    dlost: np.ndarray
+    lost_r: np.ndarray
 
     @classmethod
     def nothing(cls, base: Base) -> Eliminated:
         n = base.elements.n_unknowns
-        return cls(np.empty((n, 0)), np.empty((0, 0)), np.empty(0, int), np.empty((n, 0)), np.empty((0, 0)))
+        return cls(np.empty((0, n)), np.empty((0, 0)), np.empty(0, int), np.empty((0, n)), np.empty((0, 0)))
 
-    def taken(self, stays: np.ndarray) -> Eliminated:
-        """Of the added unknowns those that stay (ascending); nothing may have been solved since the last of them came."""
-        at = stays[stays < len(self.dx)]
-        return Eliminated(self.x[:, at], self.dx[np.ix_(at, at)], self.gone, self.lost, self.dlost[at])
+    def taken(self, rows: np.ndarray, columns: np.ndarray) -> Eliminated:
+        """Of the added ``rows`` and ``columns`` those that are known, up to the first that is not: nothing may have been solved
+        since they came."""
+        k, n = self.zr.shape
+        rows = rows[: int(np.argmax(rows >= k))] if (rows >= k).any() else rows
+        columns = columns[columns < n]
+        z, zr = self.z[rows], self.zr[rows[:, None], columns]
+        return Eliminated(z, zr, self.gone, self.lost, self.lost_r[:, columns])
 
     def extended(self, base: Base, border: Border) -> Eliminated:
         """All that ``border`` has."""
-        factor, down, k = base.factor, border.down, len(self.dx)
-        x, dx = self.x, self.dx
-        if k < len(down):
-            x = np.empty(border.right.shape, order="F")
-            x[:, :k], x[:, k:] = self.x, factor.solve(border.right[:, k:])
-            dx = np.empty((len(down), len(down)), order="F")
-            dx[:k, :k], dx[:k, k:], dx[k:] = self.dx, down[:k] @ x[:, k:], down[k:] @ x
-        now = base.elements.unknowns(np.flatnonzero(border.at < 0))
-        gone, lost = self.gone, self.lost
-        dlost = np.concatenate([self.dlost, down[k:] @ lost])
-        new = np.setdiff1d(now, gone)
-        if len(new):
-            unit = np.zeros((base.elements.n_unknowns, len(new)), order="F")
-            # Tractions of the size of the equations that are given up, so that λ is of the size of jumps.
-            length = np.repeat(base.elements.length, 2 * base.elements.per)[new]
-            unit[new, np.arange(len(new))] = np.ldexp(1.0, -np.frexp(length)[1])
-            columns = factor.solve(unit)
-            gone, lost = np.concatenate([gone, new]), np.concatenate([lost, columns], axis=1)
-            dlost = np.concatenate([dlost, down @ columns], axis=1)
-        return Eliminated(x, dx, gone, lost, dlost)
+        factor, (k, n), size = base.factor, self.zr.shape, len(border.down)
+        new = np.setdiff1d(base.elements.unknowns(np.flatnonzero(border.at < 0)), self.gone)
+        # Rows of Z and of the inverse in one go: with a transposed factor.
+        right = np.zeros((base.elements.n_unknowns, size - k + len(new)), order="F")
+        right[:, : size - k] = border.down[k:].T
+        right[new, size - k + np.arange(len(new))] = 1.0
+        rows = factor.solve(right, transposed=True).T if right.size else right.T
+        z, gone = np.concatenate([self.z, rows[: size - k]]), np.concatenate([self.gone, new])
+        lost = np.concatenate([self.lost, rows[size - k :]])
+        zr, lost_r = np.empty((size, size), order="F"), np.empty((len(gone), size), order="F")
+        zr[:k, :n], lost_r[: len(self.gone), :n] = self.zr, self.lost_r
+        zr[:k, n:], zr[k:] = z[:k] @ border.right[:, n:], z[k:] @ border.right
+        lost_r[: len(self.gone), n:] = self.lost @ border.right[:, n:]
+        lost_r[len(self.gone) :] = rows[size - k :] @ border.right
+        return Eliminated(z, zr, gone, lost, lost_r)
 
 
 class BorderedFactor:
     """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worst one of T and those of
-    the base, ``loss`` that of accuracy, as the module has it."""
+    the base, ``growth`` the loss of accuracy, as the module has it."""
 
     def __init__(self, of: Bordered, done: Eliminated):
-        border, self._base = of.border, of.base.factor
+        border, elements, self._base = of.border, of.base.elements, of.base.factor
         self.n, (self._inner, self._places, self._outer) = of.n, of._places
-        self._down, self._done = border.down, done
-        m, n = len(done.dx), len(done.dx) + len(done.gone)
+        self._right, self._done = border.right, done
+        length = np.repeat(elements.length, 2 * elements.per)
+        # Tractions of the size of the equations that are given up, so that λ is of the size of jumps.
+        self._given_up = np.ldexp(1.0, -np.frexp(length[done.gone])[1])
+        m, n = len(done.z), len(done.z) + len(done.gone)
         t = np.empty((n, n), order="F")
-        t[:m, :m], t[:m, m:] = border.corner - done.dx, -done.dlost
-        t[m:, :m], t[m:, m:] = -done.x[done.gone], -done.lost[done.gone]
+        t[:m, :m], t[m:, :m] = border.corner - done.zr, -done.lost_r
+        t[:m, m:], t[m:, m:] = -done.z[:, done.gone] * self._given_up, -done.lost[:, done.gone] * self._given_up
         self._t = Factor(t, SINGULAR)
         self.rcond = min(self._base.rcond, self._t.rcond)
-        size = np.abs(border.down).sum(axis=1) / np.abs(t[:m]).sum(axis=1)
-        across = np.abs(done.x).sum(axis=1) + np.abs(done.lost).sum(axis=1)
+        # Tractions go with one over an element's length; without that all are of one size.
+        own = np.repeat(of.elements.length[border.added], 2 * elements.per)
+        size = (length @ np.abs(border.right)) / (own @ np.abs(t[:m, :m]))
+        across = (own @ np.abs(done.z) + np.abs(done.lost).sum(axis=0)) / length
         self.growth = float(size.max(initial=1.0) * across.max(initial=1.0)) * getattr(self._base, "growth", 1.0)
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
@@ -263,21 +280,26 @@ class BorderedFactor:
         # Transposed, gathering goes along memory.
         on_base = np.zeros((*shape, self._base.n)).T
         on_base.T[..., self._places] = right.T[..., self._inner]
-        out, rest = np.empty((*shape, self.n)).T, np.zeros((*shape, self._t.n)).T
+        out, rest = np.empty((*shape, self.n)).T, np.empty((*shape, self._t.n)).T
         rest.T[..., :n_added] = right.T[..., self._outer]
-        done = self._done
+        done, given_up = self._done, self._given_up.reshape(-1, *[1] * len(shape))
         if transposed:
-            rest[:n_added] -= done.x.T @ on_base
-            rest[n_added:] -= done.lost.T @ on_base
-            w = self._t.solve(rest, transposed=True)
-            on_base -= self._down.T @ w[:n_added]
-            on_base[done.gone] -= w[n_added:]
             first = self._base.solve(on_base, transposed=True)
+            rest[:n_added] -= self._right.T @ first
+            rest[n_added:] = -given_up * first[done.gone]
+            w = self._t.solve(rest, transposed=True)
+            first -= done.z.T @ w[:n_added] + done.lost.T @ w[n_added:]
         else:
-            first = self._base.solve(on_base)
-            rest[:n_added] -= self._down @ first
-            rest[n_added:] = -first[done.gone]
+            rest[:n_added] -= done.z @ on_base
+            rest[n_added:] = -(done.lost @ on_base)
             w = self._t.solve(rest)
-            first -= done.x @ w[:n_added] + done.lost @ w[n_added:]
+            on_base -= self._right @ w[:n_added]
+            on_base[done.gone] -= given_up * w[n_added:]
+            first = self._base.solve(on_base)
         out.T[..., self._inner], out.T[..., self._outer] = first.T[..., self._places], w.T[..., :n_added]
         return out
+
+
+def _spread(elements: np.ndarray, width: int) -> np.ndarray:
+    """Indices of the unknowns of ``elements``."""
+    return (elements[:, None] * width + np.arange(width)).ravel()

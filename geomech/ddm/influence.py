@@ -91,12 +91,16 @@ class ElementSet:
     @cached_property
     def keys(self) -> list[bytes]:
         """What an element is, to the bit."""
-        rows = np.column_stack([self.start, self.end, self.kind.astype(float)])
-        return [row.tobytes() for row in np.ascontiguousarray(rows)]
+        rows = np.column_stack([self.start, self.end, self.kind])
+        return rows.view(np.dtype((np.void, 8 * rows.shape[1]))).ravel().tolist()
 
     @cached_property
     def index_of(self) -> dict[bytes, int]:
         return {key: k for k, key in enumerate(self.keys)}
+
+    @cached_property
+    def _at_place(self) -> dict[bytes, int]:
+        return {key[:-8]: k for k, key in enumerate(self.keys)}
 
     def found_in(self, other: ElementSet | None) -> np.ndarray:
         """(n,) the same element's number in ``other``, −1 where it is new."""
@@ -105,6 +109,15 @@ class ElementSet:
         if other is self:
             return np.arange(self.n)
         return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
+
+    def seen_in(self, other: ElementSet | None, found: np.ndarray) -> np.ndarray:
+        """``found`` (n,), what `found_in` says, with the numbers of elements besides that stand in the same place in ``other``
+        and are only of another kind: tractions on them are collocated at the same points."""
+        out = found.copy()
+        if other is not None and (other.order, other.family) == (self.order, self.family):
+            for k in np.flatnonzero(found < 0).tolist():
+                out[k] = other._at_place.get(self.keys[k][:-8], -1)
+        return out
 
     @cached_property
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
