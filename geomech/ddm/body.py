@@ -88,8 +88,8 @@ class Body:
             previous = None
         self._given_loops = [np.array(loop, dtype=float) for loop in given]
         self.loops = previous.loops if same else check_outline(loops, holes)
-        self.outlined = outlined(self.loops)
-        edges, _ = outline_edges(self.loops)
+        self.outlined = previous.outlined if same else outlined(self.loops)
+        edges = previous.mesh.edges if same else outline_edges(self.loops)[0]
         check_cracks(cracks, edges, self.loops, _fresh(cracks, previous if same else None))
         points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
         self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
@@ -183,7 +183,9 @@ class Body:
         self.work.elements_assembled += self.counts["elements_new"]
         self.work.bodies += 1
 
-        self._cg = reuse(old._cg if old else None, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k))
+        self._cg = reuse(
+            old._cg if old else None, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C"
+        )
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
         self._loads = UnitLoads(

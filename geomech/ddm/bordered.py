@@ -235,7 +235,8 @@ class Eliminated:
     def extended(self, base: Base, border: Border) -> Eliminated:
         """All that ``border`` has."""
         factor, (k, n), size = base.factor, self.zr.shape, len(border.down)
-        new = np.setdiff1d(base.elements.unknowns(np.flatnonzero(border.at < 0)), self.gone)
+        new = base.elements.unknowns(np.flatnonzero(border.at < 0))
+        new = new[~np.isin(new, self.gone)] if len(new) > len(self.gone) else new[:0]
         # Rows of Z and of the inverse in one go: with a transposed factor.
         right = np.zeros((base.elements.n_unknowns, size - k + len(new)), order="F")
         right[:, : size - k] = border.down[k:].T

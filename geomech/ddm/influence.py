@@ -304,9 +304,12 @@ def add_fields(points, start, end, kind, density, nu, tol, side, force, stress, 
     shift += out[3:].T
 
 
-def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set, column_set, compute) -> np.ndarray:
+def reuse(
+    old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set, column_set, compute, order: str = "F"
+) -> np.ndarray:
     """A matrix of which some is known: ``rows`` and ``columns`` (per element of ``row_set`` and ``column_set``) are the
-    old element numbers or −1, ``compute(row_elements, column_elements)`` makes blocks of it."""
+    old element numbers or −1, ``compute(row_elements, column_elements)`` makes blocks of it. ``order``: row- ("C") or
+    column-major, the way in which most of it is copied."""
     if old is None or (rows < 0).all() or (columns < 0).all():
         return compute(np.arange(row_set.n), np.arange(column_set.n))
     unchanged = np.array_equal(rows, np.arange(row_set.n)) and np.array_equal(columns, np.arange(column_set.n))
@@ -314,7 +317,7 @@ def reuse(old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set
         return old
     kept_r, new_r = np.flatnonzero(rows >= 0), np.flatnonzero(rows < 0)
     new_c = np.flatnonzero(columns < 0)
-    out = np.empty((row_set.n_unknowns, column_set.n_unknowns), order="F")
+    out = np.empty((row_set.n_unknowns, column_set.n_unknowns), order=order)
     copy_blocks(old, out, rows, columns, 2 * row_set.per, 2 * column_set.per)
     if len(new_r):
         out[row_set.unknowns(new_r)] = compute(new_r, np.arange(column_set.n))

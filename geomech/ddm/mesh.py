@@ -38,14 +38,14 @@ SLIVER = 0.08
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """``boundary`` elements (source: edge) and ``cracks`` elements (source: segment); ``edges`` (m, 2, 2) the outline
-    and ``edge_loop`` (m,) the loop of each. ``sides`` are the boundary's elements before any are halved, and what of the
-    cracks they depend on."""
+    and ``edge_loop`` (m,) the loop of each. ``sides`` are what of the cracks the boundary's elements depend on, these before
+    any are halved, and which edges go straight on."""
 
     boundary: ElementSet
     cracks: ElementSet
     edges: np.ndarray
     edge_loop: np.ndarray
-    sides: tuple[tuple, tuple[np.ndarray, ...]]
+    sides: tuple[tuple, tuple[np.ndarray, ...], np.ndarray | None]
 
 
 def outline_edges(loops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -74,26 +74,29 @@ def mesh(
         (cracks.nodes[k], _layers_at(cracks, k, edges, grading))
         for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))
     ]
-    key = float(extent), tuple((*point, deep) for point, deep in mouths)
+    key: tuple = float(extent), tuple((*point, deep) for point, deep in mouths)
     if known is not None and known.sides[0] == key:
         sides = known.sides
     else:
-        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, marks)
+        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, marks), _straight_on(loops)
     boundary = sides[1]
     crack = _cracks(cracks, settings, grading, extent, edges)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
     start, end, kind, source = keep_apart(
-        start, end, kind, source, pieces, _touching(loops, edges, cracks, extent), len(edges), settings.grading_ratio, extent,
+        start, end, kind, source, pieces, _touching(sides[2], edges, cracks, extent), len(edges), settings.grading_ratio, extent,
         2 * (settings.order + 1),
     )  # fmt: skip
     on_crack = source >= len(edges)
     rest = ~on_crack
     # A rigid rotation of a boundary must be in its elements' span, or it is not without stress.
     order = max(settings.order, 1)
+    sides_now = ElementSet(start[rest], end[rest], kind[rest], source[rest], order, settings.nodes)
+    if known is not None and _alike(known.boundary, sides_now):
+        sides_now = known.boundary
     return Mesh(
-        ElementSet(start[rest], end[rest], kind[rest], source[rest], order, settings.nodes),
+        sides_now,
         ElementSet(
             start[on_crack], end[on_crack], kind[on_crack], source[on_crack] - len(edges), settings.order, settings.nodes
         ),
@@ -346,8 +349,24 @@ def _forgotten(cracks: Cracks, ends, here) -> bool:
     return True
 
 
-def _touching(loops: list[np.ndarray], edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
-    """(m, m) which edges and segments meet in a node; sides that go straight on count as one."""
+def _alike(one: ElementSet, other: ElementSet) -> bool:
+    return one.n == other.n and all(
+        np.array_equal(getattr(one, name), getattr(other, name)) for name in ("start", "end", "kind", "source")
+    )
+
+
+def _straight_on(loops: list[np.ndarray]) -> np.ndarray | None:
+    """(m,) numbers of sides from bend to bend, that of each edge; None where every vertex is a bend."""
+    bends = [np.abs(interior_angles(loop) - np.pi) >= STRAIGHT for loop in loops]
+    if all(bend.all() for bend in bends):
+        return None
+    # A loop's last edges belong to its first ones when it begins on a straight.
+    n_edges = sum(len(bend) for bend in bends)
+    return np.concatenate([np.cumsum(bend) % max(bend.sum(), 1) + n_edges * k for k, bend in enumerate(bends)])
+
+
+def _touching(side: np.ndarray | None, edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
+    """(m, m) which edges and segments meet in a node; edges of one ``side`` (`_straight_on`) count as one."""
     n_edges, n = len(edges), len(edges) + cracks.n_segments
     out = np.eye(n, dtype=bool)
     ends = np.concatenate([edges, cracks.nodes[cracks.segments]]) if n else np.empty((0, 2, 2))
@@ -359,10 +378,7 @@ def _touching(loops: list[np.ndarray], edges: np.ndarray, cracks: Cracks, extent
         one, other = at_node[:-step], at_node[step:]
         meet = number[one] == number[other]
         out[one[meet] // 2, other[meet] // 2] = out[other[meet] // 2, one[meet] // 2] = True
-    bends = [np.abs(interior_angles(loop) - np.pi) >= STRAIGHT for loop in loops]
-    if any(not bend.all() for bend in bends):
-        # From bend to bend; a loop's last sides belong to its first ones when it begins on a straight.
-        side = np.concatenate([np.cumsum(bend) % max(bend.sum(), 1) + n_edges * k for k, bend in enumerate(bends)])
+    if side is not None:
         out[:n_edges, :n_edges] |= side[:, None] == side
     if n_edges and cracks.n_segments:
         a, d = edges[:, 0], edges[:, 1] - edges[:, 0]

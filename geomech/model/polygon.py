@@ -9,8 +9,8 @@ def signed_area(loop: np.ndarray) -> float:
     """Area of ``loop`` (n, 2), m², positive counter-clockwise."""
     # About its own first vertex: digits far from the origin.
     own = loop - loop[0]
-    following = np.roll(own, -1, axis=0)
-    return 0.5 * float(np.sum(own[:, 0] * following[:, 1] - own[:, 1] * following[:, 0]))
+    here, following = own[:-1], own[1:]
+    return 0.5 * float(np.sum(here[:, 0] * following[:, 1] - here[:, 1] * following[:, 0]))
 
 
 def polygon_moments(loops: list[np.ndarray], origin: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
