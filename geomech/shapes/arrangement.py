@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,23 +14,63 @@ class Arrangement:
     nodes      (n_nodes, 2)   m
     edges      (n_edges, 2)   node indices; edges meet at nodes only
     left, right (n_edges,)    the face on either side of each edge, −1 outside all; the same on both sides of a dead end
-    loops      per face: the node indices of its outline (counter-clockwise), then of its holes (clockwise)
-    loop_edges per face and loop: the edge that leaves each node along the loop
-    faces      (n_faces,)      Shapely polygons
+    loop_node  (n,)           the nodes of all loops, loop after loop, face after face: of each face the outline
+                              (counter-clockwise), then its holes (clockwise)
+    loop_edge  (n,)           the edge that leaves each of them along the loop
+    loop_start (n_loops + 1,) where each loop begins
+    face_loop  (n_faces + 1,) the first loop of each face
     """
 
     nodes: np.ndarray
     edges: np.ndarray
     left: np.ndarray
     right: np.ndarray
-    loops: list[list[np.ndarray]]
-    loop_edges: list[list[np.ndarray]]
-    faces: np.ndarray
+    loop_node: np.ndarray
+    loop_edge: np.ndarray
+    loop_start: np.ndarray
+    face_loop: np.ndarray
+
+    @property
+    def n_faces(self) -> int:
+        return len(self.face_loop) - 1
 
     @property
     def dead(self) -> np.ndarray:
         """(n_edges,) True for edges with one face on both sides: dead ends, lone traces, bridges between loops."""
         return self.left == self.right
+
+    def areas_and_rims(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n_faces,) m²; (n_faces,) m, the length of all loops of each face."""
+        if not self.n_faces:
+            return np.empty(0), np.empty(0)
+        first = self.loop_start[self.face_loop[:-1]]
+        step = self.nodes[self.loop_node[following_in(self.loop_start)]] - self.nodes[self.loop_node]
+        rim = np.add.reduceat(np.hypot(step[:, 0], step[:, 1]), first)
+        return np.add.reduceat(_areas(self.nodes, self.loop_node, self.loop_start), self.face_loop[:-1]), rim
+
+    def polygons(self, faces: np.ndarray | None = None) -> np.ndarray:
+        """(n_faces,) Shapely polygons; of ``faces`` alone where given."""
+        if faces is None:
+            return _polygons(self.nodes, self.loop_node, self.loop_start, self.face_loop)
+        loop_start, loops = gathered(self.face_loop, faces)
+        start, flat = gathered(self.loop_start, loops)
+        return _polygons(self.nodes, self.loop_node[flat], start, loop_start)
+
+    def only(self, keep: np.ndarray) -> Arrangement:
+        """Without the edges that are not to ``keep`` (a mask) and nodes that no edge is left at. Those edges must be dead
+        ends, or bound faces that are not looked at any more: the other faces stay what they are."""
+        used, flat = np.unique(self.edges[keep].ravel(), return_inverse=True)
+        node, edge = np.full(len(self.nodes), -1), np.cumsum(keep) - 1
+        node[used] = np.arange(len(used))
+        return replace(
+            self,
+            nodes=self.nodes[used],
+            edges=flat.reshape(-1, 2),
+            left=self.left[keep],
+            right=self.right[keep],
+            loop_node=node[self.loop_node],
+            loop_edge=edge[self.loop_edge],
+        )
 
 
 def dead_ends(edges: np.ndarray, n_nodes: int) -> np.ndarray:
@@ -49,40 +89,70 @@ def arrange(nodes: np.ndarray, edges: np.ndarray) -> Arrangement:
     """Faces of the graph with ``edges`` (n, 2) between ``nodes`` (n, 2), which must cross nowhere else and lie on one
     another nowhere."""
     ring = ~dead_ends(edges, len(nodes))
-    ring[ring] = _in_rings(nodes, edges[ring])
-    cycles, cycle_edges, of_half = _cycles(nodes, edges[ring])
-    pinched = _pinched(cycles)
+    origin, following, first = _traced(nodes, edges[ring])
+    # An edge with the same cycle on both sides is a bridge between rings.
+    bridge = first[0::2] == first[1::2]
+    if bridge.any():
+        ring[ring] = ~bridge
+        origin, following, first = _traced(nodes, edges[ring])
     numbers = np.flatnonzero(ring)
-    area = _areas(nodes, cycles)
-    outer = np.flatnonzero(area > 0)
-    face_of_cycle = np.full(len(cycles), -1)
+    halves, start, cycle = _cycles(following, first)
+    node, edge = origin[halves], numbers[halves >> 1]
+    area = _areas(nodes, node, start)
+    outer, inner = np.flatnonzero(area > 0), np.flatnonzero(area < 0)
+    face_of_cycle = np.full(len(area), -1)
     face_of_cycle[outer] = np.arange(len(outer))
-    loops = [[cycles[c]] for c in outer]
-    loop_edges = [[numbers[cycle_edges[c]]] for c in outer]
-    inner = np.flatnonzero(area < 0)
     if len(inner):
         # A rim larger than every face is the outer one of a cluster that lies in no face.
         small = inner[-area[inner] < area[outer].max()]
-        around = np.full(len(inner), -1)
         if len(small):
-            around[np.isin(inner, small)] = _faces_around(
-                nodes, [loop[0] for loop in loops], area[outer], [cycles[c] for c in small]
-            )
-        face_of_cycle[inner] = around
-        for c, face in zip(inner, around):
-            if face >= 0:
-                loops[face].append(cycles[c])
-                loop_edges[face].append(numbers[cycle_edges[c]])
-    for c in pinched:
-        _unpinch(nodes, loops, loop_edges, face_of_cycle[c], cycles[c])
+            face_of_cycle[small] = _faces_around(nodes, node, start, area, outer, small)
+    loop_node, loop_edge, loop_start, face_loop = _loops(nodes, node, edge, start, face_of_cycle, outer, inner)
     left, right = np.full(len(edges), -1), np.full(len(edges), -1)
-    half = face_of_cycle[of_half] if len(of_half) else np.empty(0, int)
+    half = face_of_cycle[cycle]
     left[numbers], right[numbers] = half[0::2], half[1::2]
-    faces = polygons(nodes, loops) if loops else np.empty(0, object)
     rest = np.flatnonzero(~ring)
-    if len(rest):
+    if len(rest) and len(outer):
+        faces = _polygons(nodes, loop_node, loop_start, face_loop)
         left[rest] = right[rest] = _faces_at(faces, nodes[edges[rest]].mean(axis=1))
-    return Arrangement(nodes, edges, left, right, loops, loop_edges, faces)
+    return Arrangement(nodes, edges, left, right, loop_node, loop_edge, loop_start, face_loop)
+
+
+def _loops(nodes, node, edge, start, face_of_cycle, outer, inner):
+    """The cycles of each face put together: (loop_node, loop_edge, loop_start, face_loop) of an `Arrangement`."""
+    holes = inner[face_of_cycle[inner] >= 0]
+    crooked = _pinched(node, start)
+    crooked = crooked[face_of_cycle[crooked] >= 0]
+    order = np.concatenate([outer, holes])
+    order = order[np.argsort(face_of_cycle[order], kind="stable")]
+    if len(crooked):
+        # Faces with a loop that touches itself, of which there are few, are put together one by one.
+        special = np.unique(face_of_cycle[crooked])
+        mine = np.isin(face_of_cycle[order], special)
+        loops: dict[int, list[np.ndarray]] = {int(face): [] for face in special}
+        for c in order[mine].tolist():
+            loops[int(face_of_cycle[c])].append(_pairs(node, edge, start, c))
+        for c in crooked.tolist():
+            _unpinch(nodes, loops[int(face_of_cycle[c])], _pairs(node, edge, start, c))
+        order = order[~mine]
+        begin, flat = gathered(start, order)
+        extra = [(face, loop) for face, own in loops.items() for loop in own]
+        pairs = np.concatenate([np.stack([node[flat], edge[flat]], axis=1), *(loop for _, loop in extra)])
+        begin = np.concatenate([begin, begin[-1] + np.cumsum([len(loop) for _, loop in extra])])
+        face = np.concatenate([face_of_cycle[order], [face for face, _ in extra]]).astype(int)
+        node, edge, start = pairs[:, 0], pairs[:, 1], begin
+        order = np.argsort(face, kind="stable")
+        face = face[order]
+    else:
+        face = face_of_cycle[order]
+    loop_start, flat = gathered(start, order)
+    face_loop = np.searchsorted(face, np.arange(len(outer) + 1))
+    return node[flat], edge[flat], loop_start, face_loop
+
+
+def _pairs(node: np.ndarray, edge: np.ndarray, start: np.ndarray, cycle: int) -> np.ndarray:
+    own = slice(start[cycle], start[cycle + 1])
+    return np.stack([node[own], edge[own]], axis=1)
 
 
 def _faces_at(faces: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -90,35 +160,44 @@ def _faces_at(faces: np.ndarray, points: np.ndarray) -> np.ndarray:
     import shapely
 
     out = np.full(len(points), -1)
-    if len(faces):
-        hit, face = shapely.STRtree(faces).query(shapely.points(points), predicate="within")
-        out[hit] = face
+    hit, face = shapely.STRtree(faces).query(shapely.points(points), predicate="within")
+    out[hit] = face
     return out
 
 
-def polygons(nodes: np.ndarray, loops: list[list[np.ndarray]]) -> np.ndarray:
+def gathered(start: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of runs that begin at ``start`` (n + 1,), the ``chosen`` ones (m,): where they begin in a row of their own (m + 1,),
+    and the place that each of its members had."""
+    count = np.diff(start)[chosen]
+    begin = np.concatenate([[0], np.cumsum(count)])
+    return begin, np.arange(begin[-1]) + np.repeat(start[chosen] - begin[:-1], count)
+
+
+def following_in(start: np.ndarray) -> np.ndarray:
+    """The place after each place of the closed runs that begin at ``start`` (n + 1,)."""
+    following = np.arange(1, start[-1] + 1)
+    following[start[1:] - 1] = start[:-1]
+    return following
+
+
+def _polygons(nodes: np.ndarray, node: np.ndarray, start: np.ndarray, face_loop: np.ndarray) -> np.ndarray:
     """(n_faces,) Shapely polygons."""
     import shapely
 
-    flat = [loop for face in loops for loop in face]
-    closed = np.concatenate([np.append(loop, loop[0]) for loop in flat])
-    rings = shapely.linearrings(
-        nodes[closed], indices=np.repeat(np.arange(len(flat)), [len(loop) + 1 for loop in flat])
-    )
-    return shapely.polygons(rings, indices=np.repeat(np.arange(len(loops)), [len(face) for face in loops]))
+    if len(face_loop) < 2:
+        return np.empty(0, object)
+    rings = shapely.linearrings(nodes[node], indices=np.repeat(np.arange(len(start) - 1), np.diff(start)))
+    return shapely.polygons(rings, indices=np.repeat(np.arange(len(face_loop) - 1), np.diff(face_loop)))
 
 
-def _areas(nodes: np.ndarray, cycles: list[np.ndarray]) -> np.ndarray:
-    """Signed area of every cycle, m², about its own first node."""
-    if not cycles:
+def _areas(nodes: np.ndarray, node: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Signed area of every closed run of nodes, m², about its own first one."""
+    if len(start) < 2:
         return np.empty(0)
-    count = np.array([len(c) for c in cycles])
-    start = np.concatenate([[0], np.cumsum(count)[:-1]])
-    points = nodes[np.concatenate(cycles)]
-    own = points - np.repeat(points[start], count, axis=0)
-    following = np.arange(1, len(own) + 1)
-    following[start + count - 1] = start
-    return 0.5 * np.add.reduceat(own[:, 0] * own[following, 1] - own[following, 0] * own[:, 1], start)
+    points = nodes[node]
+    own = points - np.repeat(points[start[:-1]], np.diff(start), axis=0)
+    to = own[following_in(start)]
+    return 0.5 * np.add.reduceat(own[:, 0] * to[:, 1] - to[:, 0] * own[:, 1], start[:-1])
 
 
 def _half_edges(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -139,96 +218,89 @@ def _half_edges(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.nd
     return origin, order[before]
 
 
-def _labels(following: np.ndarray) -> np.ndarray:
-    """The cycle that each half-edge belongs to."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
+def _first_of_cycle(following: np.ndarray) -> np.ndarray:
+    """(n,) the smallest member of the cycle that each half-edge belongs to, by leaps twice as long every time."""
+    least, leap = np.arange(len(following)), following
+    while True:
+        lower = np.minimum(least, least[leap])
+        # A leap that shows nothing smaller to anybody has been all the way round.
+        if (lower == least).all():
+            return least
+        least, leap = lower, leap[leap]
 
-    n = len(following)
-    graph = csr_array((np.ones(n, np.int8), (np.arange(n), following)), shape=(n, n))
-    return connected_components(graph, directed=False)[1]
 
-
-def _in_rings(nodes: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """(n,) False for edges that have the same cycle on both sides: bridges between rings."""
+def _traced(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each half-edge: its origin, the one that follows it, the smallest one of its cycle."""
     if not len(edges):
-        return np.zeros(0, bool)
-    label = _labels(_half_edges(nodes, edges)[1])
-    return label[0::2] != label[1::2]
-
-
-def _cycles(nodes: np.ndarray, edges: np.ndarray):
-    """Node indices and edges of every cycle of half-edges, and the cycle of each half-edge."""
-    if not len(edges):
-        return [], [], np.empty(0, int)
+        return np.empty(0, int), np.empty(0, int), np.empty(0, int)
     origin, following = _half_edges(nodes, edges)
-    step = following.tolist()
-    label = [-1] * len(step)
-    halves: list[list[int]] = []
-    for first in range(len(step)):
-        if label[first] >= 0:
-            continue
-        half, chain = first, []
-        while label[half] < 0:
-            label[half] = len(halves)
-            chain.append(half)
-            half = step[half]
-        halves.append(chain)
-    flat = np.concatenate(halves)
-    ends = np.cumsum([len(chain) for chain in halves])[:-1]
-    return np.split(origin[flat], ends), np.split(flat >> 1, ends), np.array(label)
+    return origin, following, _first_of_cycle(following)
 
 
-def _pinched(cycles: list[np.ndarray]) -> np.ndarray:
+def _cycles(following: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All cycles of half-edges in the order of their ``first`` ones, at which they begin: the half-edges, cycle after cycle;
+    where each cycle begins; the cycle of each half-edge."""
+    n = len(following)
+    # How many half-edges come after each one until its cycle closes, again by leaps (Wyllie 1979).
+    last = following == first
+    leap, after = np.where(last, np.arange(n), following), (~last).astype(int)
+    while True:
+        ahead = after[leap]
+        if not ahead.any():
+            break
+        after, leap = after + ahead, leap[leap]
+    halves = np.lexsort((-after, first))
+    start = np.flatnonzero(np.append(np.diff(first[halves], prepend=-1) > 0, True))
+    cycle = np.empty(n, int)
+    cycle[halves] = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    return halves, start, cycle
+
+
+def _pinched(node: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Which cycles pass through a node twice."""
-    if not cycles:
-        return np.empty(0, int)
-    owner = np.repeat(np.arange(len(cycles)), [len(c) for c in cycles])
-    node = np.concatenate(cycles)
+    owner = np.repeat(np.arange(len(start) - 1), np.diff(start))
     order = np.lexsort((node, owner))
     owner, node = owner[order], node[order]
     return np.unique(owner[1:][(owner[1:] == owner[:-1]) & (node[1:] == node[:-1])])
 
 
-def _unpinch(nodes, loops, loop_edges, face: int, cycle: np.ndarray) -> None:
-    """Take the loop ``cycle`` of ``face``, which passes through a node twice, apart there: a hole may touch its outline or
-    another hole at a corner, but is a loop of its own."""
-    if face < 0:
-        return
-    at = next(k for k, loop in enumerate(loops[face]) if loop is cycle)
-    own = loop_edges[face].pop(at)
-    loops[face].pop(at)
-    chain: list[tuple[int, int]] = []
-    parts: list[list[tuple[int, int]]] = []
+def _unpinch(nodes: np.ndarray, loops: list[np.ndarray], cycle: np.ndarray) -> None:
+    """Take the one of ``loops`` that is ``cycle`` (n, 2), nodes and edges, which passes through a node twice, apart there: a
+    hole may touch its outline or another hole at a corner, but is a loop of its own."""
+    loops.pop(next(k for k, loop in enumerate(loops) if np.array_equal(loop, cycle)))
+    chain: list[list[int]] = []
+    parts: list[list[list[int]]] = []
     where: dict[int, int] = {}
-    for node, edge in zip(cycle.tolist(), own.tolist()):
+    for node, edge in cycle.tolist():
         if node in where:
             parts.append(chain[where[node] :])
             for gone, _ in parts[-1]:
                 where.pop(gone, None)
             del chain[len(chain) - len(parts[-1]) :]
         where[node] = len(chain)
-        chain.append((node, edge))
+        chain.append([node, edge])
     parts.append(chain)
     pieces = [np.array(part) for part in parts]
-    area = _areas(nodes, [piece[:, 0] for piece in pieces])
+    start = np.concatenate([[0], np.cumsum([len(piece) for piece in pieces])])
+    area = _areas(nodes, np.concatenate(pieces)[:, 0], start)
     # The outline first: of all loops of a face it alone turns counter-clockwise.
     for k in np.argsort(-area):
-        place = 0 if area[k] > 0 else len(loops[face])
-        loops[face].insert(place, pieces[k][:, 0])
-        loop_edges[face].insert(place, pieces[k][:, 1])
+        loops.insert(0 if area[k] > 0 else len(loops), pieces[k])
 
 
-def _faces_around(nodes, outlines, areas, inner) -> np.ndarray:
-    """(n_inner,) the smallest face whose outline holds each inner cycle (which is the outer rim of a cluster of faces), −1
-    for none."""
+def _faces_around(nodes, node, start, area, outer, inner) -> np.ndarray:
+    """(n_inner,) which of the ``outer`` cycles is the smallest that holds each of the ``inner`` ones (the outer rims of
+    clusters of faces), −1 for none."""
     import shapely
 
-    rings = polygons(nodes, [[outline] for outline in outlines])
+    def rings(cycles: np.ndarray) -> np.ndarray:
+        begin, flat = gathered(start, cycles)
+        return _polygons(nodes, node[flat], begin, np.arange(len(cycles) + 1))
+
     out = np.full(len(inner), -1)
     # The rim and the faces within it touch: another face holds the rim when it covers the rim's hull but not its faces.
-    rims = polygons(nodes, [[cycle] for cycle in inner])
-    hit, face = shapely.STRtree(rings).query(rims, predicate="within")
+    rims, areas = rings(inner), area[outer]
+    hit, face = shapely.STRtree(rings(outer)).query(rims, predicate="within")
     rim_area = shapely.area(rims)
     for k, f in zip(hit, face):
         if areas[f] > rim_area[k] * (1 + 1e-9) and (out[k] < 0 or areas[f] < areas[out[k]]):

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..model import Blocks, Cracks
-from .arrangement import Arrangement, arrange
+from .arrangement import Arrangement, arrange, following_in, gathered
 from .assembly import TOLERANCE, block_names
 from .noding import FREE, Drawn, Graph, Mend, noded
 from .parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
@@ -67,14 +67,18 @@ def cut(
     graph = noded(drawn, tolerance, decimals, mends)
     while True:
         arrangement = arrange(graph.nodes, graph.edges)
-        zone = _zones_of(arrangement.faces, zones, origin)
+        zone = _zones_of(arrangement, graph.source >= drawn.n_outlines, zones, origin)
         keep = _kept(arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, mends)
-        if keep.all():
+        # Faces stay what they are, but for those between which an edge goes.
+        bounds = (arrangement.left != arrangement.right) & ~_outside(arrangement, zone)
+        if keep[bounds].all():
             break
         graph = graph.only(keep)
+    if not keep.all():
+        arrangement, graph = arrangement.only(keep), graph.only(keep)
     inside = np.flatnonzero(zone >= 0)
     cracks = _cracks(arrangement, graph, drawn, inside)
-    blocks = _blocks(arrangement, drawn.names[graph.source], inside, [zones[z].name for z in zone[inside]], grid)
+    blocks = _blocks(arrangement, drawn, graph.source, inside, [zones[z].name for z in zone[inside]], grid)
     if origin.any():
         blocks = blocks.with_vertices(blocks.vertices + origin)
         cracks = replace(cracks, nodes=cracks.nodes + origin)
@@ -105,31 +109,51 @@ def _refuse_bad(zones: Sequence[Zone], joints: Sequence[Joint]) -> None:
         elif any(len(loop) < 3 for loop in zone.loops):
             flaws.append(Flaw("zones", k, f"zone {zone.name!r} has a loop of fewer than three corners", "add corners"))
     for k, joint in enumerate(joints):
-        for line in joint.lines:
-            if not np.isfinite(line).all():
-                flaws.append(
-                    Flaw("joints", k, f"joint {joint.name!r} has a coordinate that is not a finite number", "mend it")
-                )
-            elif len(line) < 2 or not np.hypot(*np.ptp(line, axis=0)) > 0:
-                flaws.append(
-                    Flaw("joints", k, f"joint {joint.name!r} has a trace without length", "give two different points")
-                )
+        if not joint.lines:
+            continue
+        points, count = np.concatenate(joint.lines), np.array([len(line) for line in joint.lines])
+        first = np.cumsum(count) - count
+        finite = np.logical_and.reduceat(np.isfinite(points).all(axis=1), first)
+        still = (np.maximum.reduceat(points, first, axis=0) == np.minimum.reduceat(points, first, axis=0)).all(axis=1)
+        flaws += [
+            Flaw("joints", k, f"joint {joint.name!r} has a coordinate that is not a finite number", "mend it")
+        ] * int((~finite).sum())
+        flaws += [
+            Flaw("joints", k, f"joint {joint.name!r} has a trace without length", "give two different points")
+        ] * int((finite & ((count < 2) | still)).sum())
     if flaws:
         raise ShapeError(flaws)
 
 
-def _zones_of(faces: np.ndarray, zones: Sequence[Zone], origin: np.ndarray) -> np.ndarray:
-    """(n_faces,) the zone each face lies in, −1 for none."""
+def _zones_of(arrangement: Arrangement, joint: np.ndarray, zones: Sequence[Zone], origin: np.ndarray) -> np.ndarray:
+    """(n_faces,) the zone each face lies in, −1 for none. Faces on either side of a ``joint`` edge (a mask) are in one
+    zone: the largest face of each such cluster is looked at."""
     import shapely
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
-    out = np.full(len(faces), -1)
-    if len(out):
-        inside = shapely.point_on_surface(faces)
-        drawn = [[np.asarray(loop) - origin for loop in zone.loops] for zone in zones]
-        shapes = [shapely.Polygon(loops[0], loops[1:]) for loops in drawn]
-        face, zone = shapely.STRtree(shapes).query(inside, predicate="within")
-        out[face] = zone
-    return out
+    n = arrangement.n_faces
+    if not n:
+        return np.full(0, -1)
+    left, right = arrangement.left, arrangement.right
+    link = joint & (left >= 0) & (right >= 0) & (left != right)
+    links = coo_array((np.ones(int(link.sum()), np.int8), (left[link], right[link])), shape=(n, n))
+    n_clusters, cluster = connected_components(links, directed=False)
+    order = np.lexsort((arrangement.areas_and_rims()[0], cluster))
+    largest = order[np.searchsorted(cluster[order], np.arange(n_clusters), side="right") - 1]
+    drawn = [[np.asarray(loop) - origin for loop in zone.loops] for zone in zones]
+    shapes = [shapely.Polygon(loops[0], loops[1:]) for loops in drawn]
+    out = np.full(n_clusters, -1)
+    inside = shapely.point_on_surface(arrangement.polygons(largest))
+    hit, zone = shapely.STRtree(shapes).query(inside, predicate="within")
+    out[hit] = zone
+    return out[cluster]
+
+
+def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
+    """(n_edges,) True for edges with no rock on either side."""
+    side = np.append(zone, -1)  # face −1 is outside
+    return (side[arrangement.left] < 0) & (side[arrangement.right] < 0)
 
 
 def _kept(
@@ -138,31 +162,49 @@ def _kept(
     """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, the longest joint of
     blocks too small."""
     joint = graph.source >= drawn.n_outlines
-    side = np.append(zone, -1)  # face −1 is outside
-    left, right = side[arrangement.left], side[arrangement.right]
-    keep = ~(joint & (left < 0) & (right < 0))
+    keep = ~(joint & _outside(arrangement, zone))
     dead = arrangement.dead & keep & joint
     if dead.any():
         shortest, told = (np.inf, []) if dead_ends == "trim" else (max(shortest, tolerance), mends)
         keep[_short_dead_ends(arrangement, dead, shortest, told)] = False
+    area, rim = arrangement.areas_and_rims()
+    small = np.flatnonzero((zone >= 0) & ((area < smallest) | (2 * area < tolerance * rim)))
+    if len(small):
+        _join_small(arrangement, graph, zone, keep, joint, small, mends)
+    return keep
+
+
+def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, joint, small, mends) -> None:
+    """Take the edges between each of the ``small`` faces and one neighbour out of ``keep``."""
     import shapely
 
-    area, rim = shapely.area(arrangement.faces), shapely.length(arrangement.faces)
-    small = (zone >= 0) & ((area < smallest) | (2 * area < tolerance * rim))
-    if small.any():
-        span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
-        inner = keep & joint & (left == right) & (arrangement.left != arrangement.right)
-        for face in np.flatnonzero(small)[np.argsort(area[small])]:
-            own = np.flatnonzero(inner & ((arrangement.left == face) | (arrangement.right == face)))
-            if not len(own):
-                continue
-            other = arrangement.left[own] + arrangement.right[own] - face
-            neighbours, which = np.unique(other, return_inverse=True)
-            best = neighbours[np.argmax(np.bincount(which, weights=span[own]))]
-            keep[own[other == best]] = inner[own[other == best]] = False
-            at = shapely.point_on_surface(arrangement.faces[face])
-            mends.append(Mend("sliver", at.x, at.y, float(area[face])))
-    return keep
+    side = np.append(zone, -1)
+    left, right = arrangement.left, arrangement.right
+    span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
+    inner = keep & joint & (side[left] == side[right]) & (left != right)
+    # The edges of each small face, in order.
+    number = np.full(arrangement.n_faces + 1, -1)
+    number[small] = np.arange(len(small))
+    edge = np.flatnonzero(inner & ((number[left] >= 0) | (number[right] >= 0)))
+    owner = np.concatenate([number[left[edge]], number[right[edge]]])
+    edge = np.concatenate([edge, edge])[owner >= 0]
+    owner = owner[owner >= 0]
+    order = np.lexsort((edge, owner))
+    begin = np.searchsorted(owner[order], np.arange(len(small) + 1))
+    edge = edge[order]
+    shapes = arrangement.polygons(small)
+    area = shapely.area(shapes)
+    for k in np.argsort(area).tolist():
+        own = edge[begin[k] : begin[k + 1]]
+        own = own[inner[own]]
+        if not len(own):
+            continue
+        other = left[own] + right[own] - small[k]
+        neighbours, which = np.unique(other, return_inverse=True)
+        best = neighbours[np.argmax(np.bincount(which, weights=span[own]))]
+        keep[own[other == best]] = inner[own[other == best]] = False
+        at = shapely.point_on_surface(shapes[k])
+        mends.append(Mend("sliver", at.x, at.y, float(area[k])))
 
 
 def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float, mends: list[Mend]) -> np.ndarray:
@@ -190,14 +232,15 @@ def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float
 
 def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.ndarray) -> Cracks:
     """Dead ends as cracks: one a run of edges of one joint between ends, junctions and mouths."""
-    block_of = np.full(len(arrangement.loops) + 1, -1)
+    block_of = np.full(arrangement.n_faces + 1, -1)
     block_of[inside] = np.arange(len(inside))
     dead = np.flatnonzero(arrangement.dead & (block_of[arrangement.left] >= 0))
     ring = np.zeros(len(graph.nodes), bool)
     ring[graph.edges[~arrangement.dead].ravel()] = True
     chains: list[tuple[int, list[int], int]] = []
-    for source in np.unique(graph.source[dead]):
-        own = dead[graph.source[dead] == source]
+    dead = dead[np.argsort(graph.source[dead], kind="stable")]
+    for own in np.split(dead, np.flatnonzero(np.diff(graph.source[dead])) + 1) if len(dead) else ():
+        source = graph.source[own[0]]
         at: dict[int, list[int]] = {}
         for e in own.tolist():
             for node in graph.edges[e].tolist():
@@ -242,15 +285,16 @@ def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.nda
 
 
 def _blocks(
-    arrangement: Arrangement, names: np.ndarray, inside: np.ndarray, zone_names: list[str], grid: float
+    arrangement: Arrangement, drawn: Drawn, source: np.ndarray, inside: np.ndarray, zone_names: list[str], grid: float
 ) -> Blocks:
-    loops = [loop for face in inside for loop in arrangement.loops[face]]
-    edges = np.concatenate([own for face in inside for own in arrangement.loop_edges[face]])
-    count = np.array([len(loop) for loop in loops])
-    start = np.concatenate([[0], np.cumsum(count)])
-    points, label = arrangement.nodes[np.concatenate(loops)], names[edges]
-    following = np.arange(1, len(points) + 1)
-    following[start[1:] - 1] = start[:-1]
+    block_loop, loops = gathered(arrangement.face_loop, inside)
+    start, flat = gathered(arrangement.loop_start, loops)
+    count = np.diff(start)
+    known = sorted(set(drawn.names) | {""})
+    number = {name: k for k, name in enumerate(known)}
+    label = np.array([number[name] for name in drawn.names], dtype=int)[source[arrangement.loop_edge[flat]]]
+    points = arrangement.nodes[arrangement.loop_node[flat]]
+    following = following_in(start)
     before = np.empty(len(points), int)
     before[following] = np.arange(len(points))
     a, b = points - points[before], points[following] - points
@@ -267,16 +311,16 @@ def _blocks(
     lowest = np.lexsort((points[kept, 0], points[kept, 1], owner))[start[:-1]]
     place = np.arange(len(kept)) - start[owner] + (lowest - start[:-1])[owner]
     kept = kept[start[owner] + place % count[owner]]
-    edge_names, edge_name = np.unique(np.append("", label[kept].astype(str)), return_inverse=True)
+    used, edge_name = np.unique(np.append(0, label[kept]), return_inverse=True)
     n_blocks = len(inside)
     return Blocks(
         vertices=points[kept],
         loop_start=start,
-        block_loop=np.concatenate([[0], np.cumsum([len(arrangement.loops[face]) for face in inside], dtype=int)]),
+        block_loop=block_loop,
         material=np.zeros(n_blocks, int),
         fixed=np.zeros(n_blocks, bool),
         edge_name=edge_name[1:],
-        edge_names=tuple(edge_names.tolist()),
+        edge_names=tuple(known[k] for k in used),
         names=tuple(block_names(zone_names)),
     )
 

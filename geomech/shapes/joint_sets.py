@@ -88,7 +88,7 @@ def parallel_set(
     across = _unit(angle.mean + 0.5 * math.pi)
     offsets = _renewal(spacing, 2 * radius, rng) - radius
     angles = angle.sample(rng, len(offsets))
-    lines = []
+    lines: list[np.ndarray] = []
     for offset, turn in zip(offsets, angles):
         along, centre = _unit(turn), middle + offset * across
         for a, b in _intervals(length, gap, 2 * radius, rng):
@@ -169,7 +169,7 @@ def discs(
     foot = centre[:, :2] + (centre[:, 2] * pole[:, 2] / flat)[:, None] * normal
     half = np.sqrt(radii**2 - (centre[:, 2] / flat) ** 2)
     along = np.column_stack([-normal[:, 1], normal[:, 0]])
-    lines = list(np.stack([foot - half[:, None] * along, foot + half[:, None] * along], axis=1) + middle)
+    lines = np.stack([foot - half[:, None] * along, foot + half[:, None] * along], axis=1) + middle
     return Joint(name, tuple(_touching(lines, region)))
 
 
@@ -188,16 +188,16 @@ def poisson_lines(
 
 def voronoi(name: str, region: np.ndarray, cell_area: float, rng: np.random.Generator) -> Joint:
     """Edges of the Voronoi cells of points that fall anywhere, one on every ``cell_area`` m²."""
-    import shapely
+    from scipy.spatial import Voronoi
 
     middle, radius = _circle(region)
     reach = radius + 4 * math.sqrt(cell_area)
     n = rng.poisson((2 * reach) ** 2 / cell_area)
-    points = shapely.multipoints(middle + rng.uniform(-reach, reach, (n, 2)))
-    edges = shapely.get_parts(shapely.voronoi_polygons(points, only_edges=True))
-    pieces = shapely.get_parts(edges)
-    lines = [piece for part in pieces for piece in _pairs(shapely.get_coordinates(part))]
-    return Joint(name, tuple(_touching(lines, region)))
+    cells = Voronoi(rng.uniform(-reach, reach, (n, 2)))
+    ridges = np.array(cells.ridge_vertices)
+    # Ridges without end belong to points at the rim of all, far from the region.
+    ridges = ridges[(ridges >= 0).all(axis=1)]
+    return Joint(name, tuple(_touching(middle + cells.vertices[ridges], region)))
 
 
 def terminated(joint: Joint, on: Sequence[Joint], share: float, rng: np.random.Generator) -> Joint:
@@ -235,31 +235,33 @@ def _unit(angle: float) -> np.ndarray:
     return np.array([math.cos(angle), math.sin(angle)])
 
 
-def _centred(centre: np.ndarray, angle: np.ndarray, length: np.ndarray) -> list[np.ndarray]:
+def _centred(centre: np.ndarray, angle: np.ndarray, length: np.ndarray) -> np.ndarray:
     half = 0.5 * length[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    return list(np.stack([centre - half, centre + half], axis=1))
+    return np.stack([centre - half, centre + half], axis=1)
 
 
 def _pairs(line: np.ndarray) -> list[np.ndarray]:
     return list(np.stack([line[:-1], line[1:]], axis=1))
 
 
-def _touching(lines: list[np.ndarray], region: np.ndarray) -> list[np.ndarray]:
-    """The parts of ``lines`` inside ``region``."""
+def _touching(lines: Sequence[np.ndarray] | np.ndarray, region: np.ndarray) -> list[np.ndarray]:
+    """The parts of straight ``lines``, (n, 2, 2), inside ``region``."""
     import shapely
 
-    if not lines:
+    if not len(lines):
         return []
+    lines = np.asarray(lines)
+    beyond = (lines.max(axis=1) < region.min(axis=0)) | (lines.min(axis=1) > region.max(axis=0))
+    lines = lines[~beyond.any(axis=1)]
     area = shapely.Polygon(region)
     shapely.prepare(area)
-    shapes = shapely.linestrings(np.array(lines))
+    shapes = shapely.linestrings(lines)
     inside = shapely.covers(area, shapes)
-    out = [line for line, whole in zip(lines, inside) if whole]
-    for part in shapely.get_parts(shapely.intersection(shapes[~inside], area)):
-        for piece in shapely.get_parts(part):
-            if piece.geom_type == "LineString" and piece.length > 0:
-                out.append(shapely.get_coordinates(piece))
-    return out
+    out = list(lines[inside])
+    parts = shapely.get_parts(shapely.intersection(shapes[~inside], area))
+    parts = parts[(shapely.get_type_id(parts) == shapely.GeometryType.LINESTRING) & (shapely.length(parts) > 0)]
+    points, owner = shapely.get_coordinates(parts, return_index=True)
+    return out + np.split(points, np.flatnonzero(np.diff(owner)) + 1) if len(parts) else out
 
 
 def _pole(dip: float, dip_direction: float, section: float) -> np.ndarray:

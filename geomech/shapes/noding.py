@@ -15,6 +15,8 @@ _ROUNDS = 20
 #: What moves by less than this part of the tolerance moves by round-off, which is nobody's mistake.
 _TOLD = 1e-4
 FREE, CORNER = -1, -2
+#: Cells along a side of the coarse grid that tells what is near to what has changed.
+_CELLS = 256
 
 
 class Mend(NamedTuple):
@@ -53,12 +55,16 @@ class Drawn:
                 names += own
         n_outlines = len(names)
         for joint in joints:
-            for line in joint.lines:
-                line = np.round(np.asarray(line, dtype=float) - origin, decimals) + 0.0
-                starts.append(line[:-1])
-                ends.append(line[1:])
-                source.append(np.full(len(line) - 1, len(names)))
-                names.append(joint.name)
+            count = np.array([len(line) for line in joint.lines], dtype=int)
+            if not len(count):
+                continue
+            points = np.round(np.concatenate(joint.lines) - origin, decimals) + 0.0
+            line = np.repeat(np.arange(len(count)), count)
+            inside = line[1:] == line[:-1]
+            starts.append(points[:-1][inside])
+            ends.append(points[1:][inside])
+            source.append(len(names) + line[:-1][inside])
+            names += [joint.name] * len(count)
         start, end, source = np.concatenate(starts), np.concatenate(ends), np.concatenate(source)
         joint = source >= n_outlines
         start[joint], end[joint] = _clipped(start[joint], end[joint], start[~joint], decimals)
@@ -102,12 +108,16 @@ class Graph:
 
 
 def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> Graph:
+    """The graph of ``drawn`` in which whatever is within ``tolerance`` m meets; what was moved goes to ``mends``."""
     start, end, source = drawn.start, drawn.end, drawn.source
+    # What has not changed since the round before need not be looked at again.
+    fresh = np.ones(len(start), bool)
     for _ in range(_ROUNDS):
-        graph = _crossed(start, end, source, drawn.n_outlines, decimals, mends)
-        moved, start, end, source = _met(graph, drawn.n_outlines, tolerance, 10.0 ** (3 - decimals), mends)
-        if not moved:
+        graph, fresh = _crossed(start, end, source, fresh, drawn.n_outlines, decimals, mends)
+        moved = _met(graph, fresh, drawn.n_outlines, tolerance, 10.0 ** (3 - decimals), mends)
+        if moved is None:
             return graph
+        start, end, source, fresh = moved
     raise ShapeError(
         [
             Flaw(
@@ -120,34 +130,39 @@ def noded(drawn: Drawn, tolerance: float, decimals: int, mends: list[Mend]) -> G
     )
 
 
-def _crossed(start, end, source, n_outlines, decimals, mends) -> Graph:
-    """All crossings made nodes. What merely touches meets in `_met`."""
-    one, other, t, u = _crossings(start, end, source < n_outlines, 10.0 ** (3 - decimals))
+def _crossed(start, end, source, fresh, n_outlines, decimals, mends) -> tuple[Graph, np.ndarray]:
+    """All crossings made nodes, and which edges are of ``fresh`` segments. What merely touches meets in `_met`."""
+    one, other, t, u = _crossings(start, end, source < n_outlines, fresh, 10.0 ** (3 - decimals))
     at = np.round(start[one] + t[:, None] * (end[one] - start[one]), decimals) + 0.0
     n = len(start)
+    fresh = fresh.copy()
+    fresh[one] = fresh[other] = True
     segment = np.concatenate([np.arange(n), one, other, np.arange(n)])
     order = np.lexsort((np.concatenate([np.full(n, -1.0), t, u, np.full(n, 2.0)]), segment))
-    points = np.concatenate([start, at, at, end])[order]
-    nodes, node = _distinct(points)
-    same = (segment[order][1:] == segment[order][:-1]) & (node[1:] != node[:-1])
+    nodes, node = _distinct(np.concatenate([start, at, at, end])[order])
+    segment = segment[order]
+    same = (segment[1:] == segment[:-1]) & (node[1:] != node[:-1])
     edges = np.sort(np.stack([node[:-1], node[1:]], axis=1)[same], axis=1)
-    of = source[segment[order][:-1][same]]
+    segment = segment[:-1][same]
+    of, new = source[segment], fresh[segment]
     # The first source stands for an edge that several share: outlines before joints, joints as they are listed.
-    rank = np.lexsort((of, edges[:, 1], edges[:, 0]))
-    edges, of = edges[rank], of[rank]
+    key = edges[:, 0] * len(nodes) + edges[:, 1]
+    rank = np.lexsort((of, key))
+    key, edges, of, new = key[rank], edges[rank], of[rank], new[rank]
     first = np.ones(len(edges), bool)
-    first[1:] = (edges[1:] != edges[:-1]).any(axis=1)
+    first[1:] = key[1:] != key[:-1]
     # Two joints on one another, or one on an outline; zones share outlines by right.
     again = np.unique(edges[~first & (of >= n_outlines)], axis=0)
     for p, q in nodes[again]:
         mends.append(Mend("duplicate", *(0.5 * (p + q)).tolist(), float(np.hypot(*(q - p)))))
+    new = np.logical_or.reduceat(new, np.flatnonzero(first))
     edges, of = edges[first], of[first]
     rim = np.flatnonzero(of < n_outlines)
     least, most = np.full(len(nodes), n_outlines), np.full(len(nodes), FREE)
     for side in (0, 1):
         np.minimum.at(least, edges[rim, side], of[rim])
         np.maximum.at(most, edges[rim, side], of[rim])
-    return Graph(nodes, edges, of, np.where((most != FREE) & (least != most), CORNER, most))
+    return Graph(nodes, edges, of, np.where((most != FREE) & (least != most), CORNER, most)), new
 
 
 def _distinct(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -161,10 +176,10 @@ def _distinct(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return ranked[new], number
 
 
-def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, roundoff: float):
-    """Pairs of segments that cross inside both, and where along each (0 to 1): (one, other, t, u). Outlines that lie on one
-    another but for ``roundoff`` m do not cross."""
-    one, other = _near_pairs(start, end)
+def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, fresh: np.ndarray, roundoff: float):
+    """Pairs of segments, one of them ``fresh`` at least, that cross inside both, and where along each (0 to 1): (one, other,
+    t, u). Outlines that lie on one another but for ``roundoff`` m do not cross."""
+    one, other = _near_pairs(start, end, fresh)
     p, r = start[one], end[one] - start[one]
     q, s = start[other], end[other] - start[other]
     turn = r[:, 0] * s[:, 1] - r[:, 1] * s[:, 0]
@@ -184,8 +199,9 @@ def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, roundoff
     return one[cross], other[cross], t[cross], u[cross]
 
 
-def _near_pairs(start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of segments whose boxes meet, piece by piece: the box of a long slanting joint would hold half the rock."""
+def _near_pairs(start: np.ndarray, end: np.ndarray, fresh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of segments, one of them ``fresh``, whose boxes meet, piece by piece: the box of a long slanting joint would hold
+    half the rock."""
     import shapely
 
     along = end - start
@@ -199,15 +215,41 @@ def _near_pairs(start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, np.ndar
     a = start[owner] + (k / count[owner])[:, None] * along[owner]
     b = start[owner] + ((k + 1) / count[owner])[:, None] * along[owner]
     low, high = np.minimum(a, b), np.maximum(a, b)
+    near = _vicinity(low, high, fresh[owner], 0.0)
+    low, high, owner = low[near], high[near], owner[near]
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-    i, j = shapely.STRtree(boxes).query(boxes)
-    i, j = owner[i], owner[j]
-    pairs = np.unique(i[i < j] * len(start) + j[i < j])
+    new = np.flatnonzero(fresh[owner])
+    i, j = shapely.STRtree(boxes[new]).query(boxes)
+    i, j = owner[i], owner[new[j]]
+    pairs = np.sort((np.minimum(i, j) * len(start) + np.maximum(i, j))[i != j])
+    pairs = pairs[np.diff(pairs, prepend=-1) > 0]
     return pairs // len(start), pairs % len(start)
 
 
-def _met(graph: Graph, n_outlines: int, tolerance: float, roundoff: float, mends: list[Mend]):
-    """Whether anything within ``tolerance`` of something else was made to meet it, and the segments after that."""
+def _vicinity(low: np.ndarray, high: np.ndarray, fresh: np.ndarray, margin: float) -> np.ndarray:
+    """Indices of the boxes from ``low`` to ``high`` (n, 2) that may be within ``margin`` of a ``fresh`` one: those that share
+    a cell of a coarse grid with one."""
+    if fresh.all() or not fresh.any():
+        return np.flatnonzero(fresh)
+    corner = low.min(axis=0)
+    cell = max(float((high - corner).max()) / _CELLS, 1e-300)
+    first, last = ((low - margin - corner) / cell).astype(int), ((high + margin - corner) / cell).astype(int)
+    first, last = first.clip(0, _CELLS), last.clip(0, _CELLS)
+    # Every box adds one to its cells: at its corners now, everywhere after summing along both axes.
+    marks = np.zeros((_CELLS + 2, _CELLS + 2), int)
+    (a, b), (c, d) = first[fresh].T, last[fresh].T + 1
+    for rows, columns, sign in ((a, b, 1), (c, d, 1), (a, d, -1), (c, b, -1)):
+        np.add.at(marks, (rows, columns), sign)
+    marked = np.cumsum(np.cumsum(marks, axis=0), axis=1) > 0
+    total = np.zeros((_CELLS + 3, _CELLS + 3), int)
+    total[1:, 1:] = np.cumsum(np.cumsum(marked, axis=0), axis=1)
+    (a, b), (c, d) = first.T, last.T + 1
+    return np.flatnonzero(total[c, d] - total[a, d] - total[c, b] + total[a, b])
+
+
+def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, roundoff: float, mends: list[Mend]):
+    """The segments (start, end, source, fresh) after everything within ``tolerance`` of something else was made to meet it;
+    None when nothing was. Edges that are not ``fresh`` have been looked at before."""
     import shapely
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -241,17 +283,17 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, roundoff: float, mends
             nodes[k] = graph.nodes[chief[k]]
             settled[k] = settled[chief[k]] = True
         alive = (nodes[edges[:, 0]] != nodes[edges[:, 1]]).any(axis=1)
-        edges, source = edges[alive], source[alive]
+        edges, source, fresh = edges[alive], source[alive], fresh[alive]
     firm = home != FREE
     merged = settled.any()
-    tree = shapely.STRtree(shapely.linestrings(nodes[edges]))
-    node, edge = tree.query(shapely.points(nodes), predicate="dwithin", distance=tolerance)
+    fresh = fresh | settled[edges].any(axis=1)
+    node, edge = _near_edges(nodes, edges, np.flatnonzero(~settled), fresh, tolerance)
     near = ~(nodes[edges[edge]] == nodes[node][:, None]).all(axis=2).any(axis=1)
-    outline = source[edge] < n_outlines
     # A node on an outline divides it wherever round-off has put it; other outlines are led through it only where it lies on
     # them, as a brick's corner does on the course below.
-    apart = shapely.distance(shapely.points(nodes[node]), tree.geometries[edge]) > roundoff
-    near &= ~(outline & firm[node] & (home[node] != source[edge]) & apart) & ~settled[node]
+    foreign = np.flatnonzero((source[edge] < n_outlines) & firm[node] & (home[node] != source[edge]))
+    lines = shapely.linestrings(nodes[edges[edge[foreign]]])
+    near[foreign] &= shapely.distance(shapely.points(nodes[node[foreign]]), lines) <= roundoff
     degree = np.bincount(edges.ravel(), minlength=n)
     through: dict[int, list[int]] = {}
     for k, e in zip(node[near].tolist(), edge[near].tolist()):
@@ -271,7 +313,7 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, roundoff: float, mends
         if away > _TOLD * tolerance:
             mends.append(Mend("near miss", *nodes[k].tolist(), away))
     if not merged and not through:
-        return False, None, None, None
+        return None
     starts, ends, sources = [], [], []
     whole = np.ones(len(edges), bool)
     whole[list(through)] = False
@@ -285,5 +327,27 @@ def _met(graph: Graph, n_outlines: int, tolerance: float, roundoff: float, mends
     start = np.concatenate([nodes[edges[whole, 0]], np.reshape(starts, (-1, 2))])
     end = np.concatenate([nodes[edges[whole, 1]], np.reshape(ends, (-1, 2))])
     source = np.concatenate([source[whole], np.array(sources, dtype=int)])
+    fresh = np.concatenate([settled[edges[whole]].any(axis=1), np.ones(len(sources), bool)])
     long = (start != end).any(axis=1)
-    return True, start[long], end[long], source[long]
+    return start[long], end[long], source[long], fresh[long]
+
+
+def _near_edges(
+    nodes: np.ndarray, edges: np.ndarray, wanted: np.ndarray, fresh: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """``wanted`` nodes and edges within ``tolerance`` that do not end there: (node, edge); one of them belongs to what
+    is ``fresh``, a mask of edges, at least."""
+    import shapely
+
+    ends = nodes[edges]
+    # A node near a fresh edge may have another edge near it.
+    local = _vicinity(ends.min(axis=1), ends.max(axis=1), fresh, 2 * tolerance)
+    around = np.zeros(len(nodes), bool)
+    around[edges[local].ravel()] = True
+    wanted = wanted[around[wanted]]
+    node, edge = shapely.STRtree(shapely.linestrings(ends[local])).query(
+        shapely.points(nodes[wanted]), predicate="dwithin", distance=tolerance
+    )
+    node, edge = wanted[node], local[edge]
+    other = (edges[edge] != node[:, None]).all(axis=1)
+    return node[other], edge[other]

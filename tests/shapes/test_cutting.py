@@ -210,12 +210,12 @@ def test_euler_holds_on_random_networks():
     for seed in range(20):
         joints = [Joint("joint:a", tuple(network(seed)))]
         graph = noded(Drawn.of([rock()], joints, np.zeros(2), 11), 1e-5, 13, [])
-        faces = arrange(graph.nodes, graph.edges).loops
+        n_faces = arrange(graph.nodes, graph.edges).n_faces
         used, ends = np.unique(graph.edges, return_inverse=True)
         pairs = ends.reshape(-1, 2).T
         links = coo_array((np.ones(len(graph.edges)), pairs), shape=(len(used), len(used)))
         components = connected_components(links, directed=False)[0]
-        assert len(used) - len(graph.edges) + len(faces) == components
+        assert len(used) - len(graph.edges) + n_faces == components
 
 
 def test_courses_of_bricks_keep_their_bricks():
