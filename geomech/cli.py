@@ -135,10 +135,16 @@ def _parser() -> argparse.ArgumentParser:
 
     bench = verb(
         "bench", _bench, "measure what things cost and how right they are (run it in the project's folder)",
-        "geomech bench startup\ngeomech bench --quick",
+        "geomech bench startup\ngeomech bench --quick --out before.json\ngeomech bench --quick --against before.json",
     )  # fmt: skip
     bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(TOPICS)} (default: all)")
     bench.add_argument("--quick", action="store_true", help="fewer repetitions, nothing compiled anew")
+    bench.add_argument(
+        "--out", type=Path, metavar="FILE", help="where the figures go, JSON (default outputs/bench/figures.json)"
+    )
+    bench.add_argument(
+        "--against", type=Path, metavar="FILE", help="figures of an earlier run: say what got slower or less accurate"
+    )
 
     verb("doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
          "geomech doctor")  # fmt: skip
@@ -356,9 +362,23 @@ def _bench(options: argparse.Namespace) -> int:
     unknown = [name for name in options.topics if name not in TOPICS]
     if unknown:
         raise BadInput(f"no benchmark {', '.join(unknown)}; there are {', '.join(TOPICS)}")
+    from .bench import figures
+
+    try:
+        before = figures.read(options.against) if options.against else None
+    except (OSError, ValueError) as error:
+        raise BadInput(f"--against: {error}") from error
+    unit, found = figures.yardstick(), {}
+    print(figures.said(figures.machine()), end="\n\n")
     for name in options.topics or TOPICS:
-        print(topic(name)(options.quick), end="\n\n", flush=True)
-    return DONE
+        found[name] = topic(name)(options.quick)
+        print(found[name].text, end="\n\n", flush=True)
+    print(figures.write(options.out or Path("outputs/bench/figures.json"), found, quick=options.quick, unit=unit))
+    if before is None:
+        return DONE
+    changes = figures.changes(before, found, unit)
+    print(figures.compared(changes, before, options.against))
+    return FAILED if figures.less_accurate(changes) else DONE
 
 
 def _doctor(options: argparse.Namespace) -> int:

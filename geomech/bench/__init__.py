@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-#: Topic → module with ``measure(quick: bool) -> str``, the printed table.
+if TYPE_CHECKING:
+    from .figures import Measured
+
+#: Topic → module with ``measure(quick: bool) -> Measured``: the table that is printed, and its figures.
 TOPICS = {
     "accuracy": "geomech.bench.accuracy",
     "boundary": "geomech.bench.boundary_stress",
@@ -14,11 +18,12 @@ TOPICS = {
     "ddm": "geomech.bench.work_precision",
     "kernels": "geomech.bench.kernels",
     "many": "geomech.bench.many_cracks",
+    "schemes": "geomech.bench.block_schemes",
     "stability": "geomech.bench.stability",
     "startup": "geomech.bench.startup",
 }
 
 
-def topic(name: str) -> Callable[[bool], str]:
+def topic(name: str) -> Callable[[bool], Measured]:
     """The measuring function of a topic, imported only now."""
     return import_module(TOPICS[name]).measure

@@ -23,6 +23,7 @@ from ..model import Blocks, JointLaw, State
 from . import block_scenes
 from .block_iteration import Iterated, block_jacobi, two_levels
 from .block_scenes import FRICTION, GRAVITY, JOINT, ROCK, WEIGHT
+from .figures import Measured
 
 #: Where the picture and the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_dda")
@@ -98,7 +99,7 @@ def _watched() -> Iterator[Watch]:
         ContactFinder.find, BlockSolver.solve = find, solve
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The table; leaves ``cost_of_size.png`` and ``cost_of_size.json`` in `FOLDER`. ``quick`` stops at 1 000 blocks."""
     from ..render.cost_of_size import draw
 
@@ -113,15 +114,16 @@ def measure(quick: bool = False) -> str:
                 told = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
                 iterated.append({"scene": name, "blocks": cost.blocks, **told})
     exponents = {name: _exponent([c for c in costs if c.scene == name]) for name in SCENES}
-    errors = _errors()
+    found = errors()
     FOLDER.mkdir(parents=True, exist_ok=True)
     written = {
-        "costs": [asdict(c) for c in costs], "exponents": exponents, "iterated": iterated, "errors": errors,
+        "costs": [asdict(c) for c in costs], "exponents": exponents, "iterated": iterated, "errors": found,
         "shi_s_per_iteration": SHI, "quick": quick,
     }  # fmt: skip
     (FOLDER / "cost_of_size.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
     draw(costs, SHI, FOLDER / "cost_of_size.png")
-    return _table(costs, exponents, iterated, errors)
+    times = {f"{c.scene}, {c.blocks} blocks: {what}": getattr(c, what) for c in costs for what in ("iteration", "step")}
+    return Measured.of(_table(costs, exponents, iterated, found), errors=found, times=times)
 
 
 def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, object]:
@@ -216,7 +218,7 @@ def _exponent(costs: list[Cost]) -> float:
     return float(np.polyfit(n, seconds, 1)[0])
 
 
-def _errors() -> dict[str, float]:
+def errors() -> dict[str, float]:
     """Relative errors against closed forms: the way of a block that slides, the creep of one that sticks, the shortening of
     a column of twenty blocks under its own weight, a wall's reaction at rest."""
     from .. import dda

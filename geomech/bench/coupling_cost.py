@@ -17,6 +17,7 @@ import numpy as np
 
 from ..model import Cracks, DdmSettings, GrowthSettings, Problem, RunSettings
 from . import block_scenes
+from .figures import Measured
 
 #: Where the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_coupling")
@@ -95,7 +96,7 @@ def of_specimen(repeats: int) -> dict:
     return {"cycles": len(seen), "seconds": min(seconds[1:]), "phases": phases, "work": seen[-1].work}
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The table; leaves ``coupling.json`` in `FOLDER`. ``quick``: 200 bricks with 20 cracked, few steps, no specimen."""
     walls = [of_wall(200, 20, 3)] if quick else [of_wall(200, 20, 10), of_wall(1000, 100, 10), of_wall(1000, 10, 10)]
     specimen = None if quick or not SPECIMEN.exists() else of_specimen(2)
@@ -116,4 +117,9 @@ def measure(quick: bool = False) -> str:
             f"Two-crack specimen to its end, warm: {specimen['seconds']:.2f} s in {specimen['cycles']} cycles "
             f"(goal {SECONDS:g} s)"
         )
-    return "\n".join(lines)
+    times = {
+        f"{w['blocks']} blocks, {w['cracked']} cracked: {part} a pass": w[f"{part}_s"]
+        for w in walls
+        for part in ("blocks", "coupling")
+    }
+    return Measured.of("\n".join(lines), times=times | ({"specimen": specimen["seconds"]} if specimen else {}))

@@ -12,9 +12,10 @@ import numpy as np
 from ..ddm import influence as matrices
 from ..ddm import shapes
 from ..ddm.influence import ElementSet, add_fields, influence
+from .figures import Measured
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The table: ns a pair, CPU time of the fastest of some repeats."""
     threads, matrices.THREADS = matrices.THREADS, 1
     try:
@@ -23,7 +24,8 @@ def measure(quick: bool = False) -> str:
         matrices.THREADS = threads
     width = max(len(label) for label, _ in rows)
     lines = ["element–point pairs, nodal matrices and fields, one thread, ns of CPU a pair"]
-    return "\n".join(lines + [f"  {label:<{width}}  {ns:6.1f}" for label, ns in rows])
+    text = "\n".join(lines + [f"  {label:<{width}}  {ns:6.1f}" for label, ns in rows])
+    return Measured.of(text, times={label: 1e-9 * ns for label, ns in rows})
 
 
 def _matrices(repeats: int) -> Iterator[tuple[str, float]]:

@@ -10,11 +10,13 @@ import time
 
 import numpy as np
 
+from .figures import Measured
+
 #: Cracks are the squares of these; networks beyond ``FACTORED`` cracks a side are not factored (minutes, many gigabytes).
 SIDES, FACTORED = (5, 7, 11, 16, 23, 36), 16
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The table; ``quick`` leaves out what takes more than some seconds."""
     from ..ddm import Body, BodyLoad
     from ..model import Cracks, DdmSettings, Material
@@ -29,6 +31,7 @@ def measure(quick: bool = False) -> str:
         tips = solution.tips
         return solution, np.stack([tips["k_i"], tips["k_ii"]]), time.process_time() - start
 
+    errors, times = {}, {}
     lines = [
         "many cracks in the infinite plane: processor time of matrices and solution",
         "  cracks  unknowns   iterated   products   factored   largest difference of K",
@@ -37,9 +40,14 @@ def measure(quick: bool = False) -> str:
         cracks = Cracks.from_polylines(cracks_in_cells(side), aperture=np.inf)
         solution, k, seconds = solved(cracks, "compressed")
         body = solution.body
+        times[f"{cracks.n_cracks} cracks, iterated"] = seconds
         row = f"  {cracks.n_cracks:6d}  {body.faces.n_unknowns:8d} {seconds:8.2f} s {body.crack_system.products:10d}"
         if side <= (11 if quick else FACTORED):
             _, exact, longer = solved(cracks, "dense")
-            row += f" {longer:8.2f} s   {np.abs(k - exact).max() / np.abs(exact).max():.1e}"
+            error = errors[f"{cracks.n_cracks} cracks, iterated against factored"] = (
+                np.abs(k - exact).max() / np.abs(exact).max()
+            )
+            times[f"{cracks.n_cracks} cracks, factored"] = longer
+            row += f" {longer:8.2f} s   {error:.1e}"
         lines.append(row)
-    return "\n".join(lines)
+    return Measured.of("\n".join(lines), errors=errors, times=times)

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from .. import dda
 from . import stability_scenes as scenes
+from .figures import Measured
 from .stability_scenes import Outcome
 
 RIGHT, REPORTED, REFUSED, WRONG = "right", "reported", "refused", "wrong"
@@ -80,7 +81,7 @@ class _Warnings(logging.Handler):
         self.first = self.first or record.getMessage()
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The maps as text; JSON and a picture go to outputs/stability. ``quick`` takes every other value."""
     from ..render.stability_map import draw
 
@@ -97,7 +98,12 @@ def measure(quick: bool = False) -> str:
     (folder / "stability.json").write_text(json.dumps([asdict(cell) for cell in every], indent=1), encoding="utf-8")
     draw(maps, every, folder / "stability.png")
     lines.append(f"{folder}/stability.json, {folder}/stability.png")
-    return "\n".join(lines)
+    # Not each cell's own: many are round-off. A cell that was right and is not, shows in the share.
+    wrong = {f"{grid.title}: share of cells not right": 0.0 for grid in maps}
+    for grid in maps:
+        verdicts = [cell.verdict for cell in every if cell.map == grid.title]
+        wrong[f"{grid.title}: share of cells not right"] = 1 - verdicts.count(RIGHT) / len(verdicts)
+    return Measured.of("\n".join(lines), errors=wrong)
 
 
 def _table(grid: Map, cells: Sequence[Cell]) -> Iterator[str]:

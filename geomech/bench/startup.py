@@ -14,10 +14,12 @@ import tempfile
 import time
 from pathlib import Path
 
+from .figures import Measured
+
 PIPELINE = Path("pipelines/two_cracks")
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The table. Runs in the project's folder (it needs ``pipelines/two_cracks``); FileNotFoundError elsewhere."""
     if not PIPELINE.is_dir():
         raise FileNotFoundError(f"{PIPELINE} is not here: run this benchmark from the project's folder")
@@ -49,7 +51,8 @@ def measure(quick: bool = False) -> str:
             rows.append((f"specimen φ = {phi}° to coalescence, everything written", statistics.median(times)))
     width = max(len(label) for label, _ in rows)
     lines = [f"whole processes, wall time, median of {repeats} (the first run once)"]
-    return "\n".join(lines + [f"  {label:<{width}}  {seconds:7.2f} s" for label, seconds in rows])
+    text = "\n".join(lines + [f"  {label:<{width}}  {seconds:7.2f} s" for label, seconds in rows])
+    return Measured.of(text, times=dict(rows))
 
 
 def _seconds(command: list[str], environment: dict[str, str] | None = None) -> float:

@@ -8,19 +8,17 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import platform
 import statistics
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
-from importlib import metadata
 from pathlib import Path
 
 from ..model import DdmSettings
 from . import constant_elements, crack_problems, finite_elements, growth_run
 from .crack_problems import CrackProblem, factors, with_reference
+from .figures import Measured, machine
 
 #: Where the picture and the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_ddm")
@@ -56,7 +54,7 @@ class Point:
     seconds: float
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` stops each method after
     about a second; else constant elements are given `RATIO` times this solver's time to `ERROR` at least."""
     from ..render.work_precision import draw
@@ -66,11 +64,16 @@ def measure(quick: bool = False) -> str:
     goals = _goals(points)
     FOLDER.mkdir(parents=True, exist_ok=True)
     written = {
-        "machine": _machine(), "points": [asdict(p) for p in points], "growth": growth, "goals": goals, "quick": quick
+        "machine": machine(), "points": [asdict(p) for p in points], "growth": growth, "goals": goals, "quick": quick
     }  # fmt: skip
     (FOLDER / "work_precision.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
     draw(points, METHODS, FOLDER / "work_precision.png")
-    return _table(points, growth, goals)
+    own = [(f"{p.problem}, {p.method}: {p.size}", p) for p in points if p.method in (OURS, ASKED)]
+    return Measured.of(
+        _table(points, growth, goals),
+        errors={name: p.error for name, p in own} | {"growth: K by increments": growth["difference"]},
+        times={name: p.seconds for name, p in own} | {"growth: an increment": growth["incremental_s"]},
+    )
 
 
 def _seconds(work: Callable[[], object]) -> float:
@@ -308,26 +311,3 @@ def _table(points: list[Point], growth: dict, goals: dict) -> str:
 
 def _said(seconds: float | None) -> str:
     return "not reached" if seconds is None else f"{1e3 * seconds:.3g} ms"
-
-
-def _machine() -> dict:
-    processor = platform.processor() or platform.machine()
-    information = Path("/proc/cpuinfo")
-    if information.is_file():
-        names = [line.split(":", 1)[1].strip() for line in information.read_text().splitlines() if "model name" in line]
-        processor = names[0] if names else processor
-    packages = ("geomech", "numpy", "scipy", "numba", "scikit-fem")
-    versions = {}
-    for package in packages:
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
-    return {
-        "processor": processor,
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "system": platform.platform(),
-        "python": platform.python_version(),
-        "threads of BLAS": os.environ.get("OPENBLAS_NUM_THREADS", "all"),
-        "versions": versions,
-    }

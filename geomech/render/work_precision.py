@@ -1,8 +1,8 @@
-"""The picture of `geomech bench ddm`: run time against error, a panel a problem."""
+"""Run time against error, a panel a problem: the pictures of `geomech bench ddm` and `schemes`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -20,14 +20,27 @@ class Measured(Protocol):
     seconds: float
 
 
-def draw(points: Sequence[Measured], methods: Sequence[str], path: Path) -> Path:
-    """``points`` as one curve a method (at most seven, in the legend's order), logarithmic axes shared by all panels."""
+def draw(
+    points: Sequence[Measured],
+    methods: Sequence[str],
+    path: Path,
+    panels: tuple[int, int] = (2, 3),
+    size_of: Callable[[Measured], str] = lambda p: f"p = {p.size}",
+    labels: tuple[str, str] = (
+        "largest error of a stress intensity factor, better to the right",
+        "assembly and solution, ms",
+    ),
+    goal: float | None = 1e-4,
+) -> Path:
+    """``points`` as one curve a method (at most seven, in the legend's order), logarithmic axes shared by all ``panels`` (rows,
+    columns). The first method's ends are labelled by ``size_of``; ``labels`` are those of the axes, ``goal`` an error to mark."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
 
     problems = list(dict.fromkeys(p.problem for p in points))
-    figure = Figure(figsize=(12.4, 7.6), dpi=130, layout="constrained")
-    axes = figure.subplots(2, 3, sharex=True, sharey=True)
+    rows, columns = panels
+    figure = Figure(figsize=(0.4 + 4 * columns, 7.6), dpi=130, layout="constrained")
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True)
     handles = {}
     for panel, problem in zip(axes.flat, problems):
         for method, (colour, marker, line) in zip(methods, _STYLES):
@@ -42,22 +55,23 @@ def draw(points: Sequence[Measured], methods: Sequence[str], path: Path) -> Path
             if ours:
                 for p, shift in ((curve[0], (0, -14)), (curve[-1], (6, 7))):
                     panel.annotate(
-                        f"p = {p.size}", (p.error, 1e3 * p.seconds), textcoords="offset points", xytext=shift,
+                        size_of(p), (p.error, 1e3 * p.seconds), textcoords="offset points", xytext=shift,
                         ha="center", fontsize=8, color=colour,
                     )  # fmt: skip
         panel.set_title(problem, fontsize=11, loc="left")
         panel.grid(which="major", color="#e4e4e4", lw=0.7)
         panel.set_axisbelow(True)
         panel.tick_params(which="minor", length=0)
-        panel.axvline(1e-4, color="#999999", lw=0.8, ls=":")
+        if goal is not None:
+            panel.axvline(goal, color="#999999", lw=0.8, ls=":")
         panel.xaxis.set_major_locator(LogLocator(numticks=9))
         for side in ("top", "right"):
             panel.spines[side].set_visible(False)
     for panel in axes.flat[len(problems) :]:
         panel.set_axis_off()
     axes.flat[0].invert_xaxis()
-    figure.supxlabel("largest error of a stress intensity factor, better to the right", fontsize=10)
-    figure.supylabel("assembly and solution, ms", fontsize=10)
+    figure.supxlabel(labels[0], fontsize=10)
+    figure.supylabel(labels[1], fontsize=10)
     last = axes.flat[-1] if len(problems) < axes.size else figure
     order = [m for m in methods if m in handles]
     last.legend([handles[m] for m in order], order, loc="center", frameon=False, fontsize=10)

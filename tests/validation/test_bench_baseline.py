@@ -1,0 +1,60 @@
+"""The figures of benchmarks: errors that got worse than the stored ones are a failure, times are not looked at.
+
+`geomech bench accuracy dda schemes --quick --out tests/validation/bench_baseline.json` renews what is stored: only with a
+reason, and with the errors' change in view.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from geomech.bench import accuracy, block_cost, block_schemes
+from geomech.bench.figures import ERROR, TIME, Measured, changes, compared, less_accurate, read, write
+
+BASELINE = Path(__file__).parent / "bench_baseline.json"
+
+
+@pytest.mark.parametrize(
+    ("topic", "measured"),
+    [
+        ("accuracy", lambda: accuracy.measure(quick=True)),
+        ("dda", lambda: Measured.of("", errors=block_cost.errors())),
+        ("schemes", lambda: Measured.of("", errors=block_schemes.errors())),
+    ],
+)
+def test_nothing_is_less_accurate_than_it_was(topic, measured, monkeypatch):
+    # Some rows need a pipeline below the working folder.
+    monkeypatch.chdir(Path(__file__).parents[2])
+    before = read(BASELINE)
+    found = measured()
+    named = {figure.name for figure in found.figures if figure.kind == ERROR}
+    assert named <= set(before["topics"][topic][ERROR]), "figures that nothing is stored of: renew the baseline"
+    rows = changes(before, {topic: found}, before["yardstick_s"])
+    assert len(rows) == len(named)
+    assert not less_accurate(rows), compared(rows, before, BASELINE)
+
+
+def test_comparison_sees_what_got_worse_and_allows_for_the_machine(tmp_path):
+    then = Measured.of("", errors={"a": 1e-4, "b": 1e-15, "c": 1e-3}, times={"t": 1.0, "u": 1.0})
+    before = read(write(tmp_path / "figures.json", {"topic": then}, quick=True, unit=0.01))
+    now = Measured.of("", errors={"a": 1.2e-4, "b": 1e-12, "c": 5e-4}, times={"t": 2.2, "u": 4.0})
+    # The machine is half as fast as it was: t takes as long as it did, u twice as long.
+    rows = changes(before, {"topic": now, "other": now}, unit=0.02)
+    assert [(r.name, r.kind) for r in rows if r.worse] == [("a", ERROR), ("u", TIME)]
+    assert [r.name for r in rows if r.better] == ["c"]
+    assert [r.name for r in less_accurate(rows)] == ["a"]
+    said = compared(rows, before, tmp_path / "figures.json")
+    assert "less accurate: 1" in said
+    assert "0.0001 → 0.00012 (1.20 times)" in said
+
+
+def test_a_file_of_something_else_is_refused(tmp_path):
+    (tmp_path / "other.json").write_text(json.dumps({"points": []}))
+    with pytest.raises(ValueError, match="holds no figures of a benchmark"):
+        read(tmp_path / "other.json")
+    (tmp_path / "torn.json").write_text('{"topics": ')
+    with pytest.raises(ValueError, match="is no JSON"):
+        read(tmp_path / "torn.json")
