@@ -17,6 +17,7 @@ import numpy as np
 
 from ..model import Cycle, Problem
 from ..reference.two_cracks import PHI_DEG
+from .figures import Measured
 
 #: Where the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_boundary")
@@ -98,7 +99,7 @@ def paper_elements(phi_deg: int) -> list[float]:
     return (np.abs(exact(coarse, 1.0) - reference).max(axis=1) / np.abs(reference).max(axis=1)).tolist()
 
 
-def measure(quick: bool = False) -> str:
+def measure(quick: bool = False) -> Measured:
     """The table; leaves ``boundary.json`` in `FOLDER`. ``quick``: φ = 0 at the small stress only."""
     angles, stresses = (PHI_DEG[:1], STRESSES[:1]) if quick else (PHI_DEG, STRESSES)
     rows = [
@@ -123,4 +124,9 @@ def measure(quick: bool = False) -> str:
     lines += [
         f"{'':>10}{row['phi_deg']:5d}  {'':<22}{row['error_k_i']:10.1e}{row['error_k_ii']:10.1e}" for row in elements
     ]
-    return "\n".join(lines)
+    named = {
+        f"{row['route']}, φ = {row['phi_deg']}, {row['stress_pa'] / 1e6:g} MPa: {mode}": row[f"error_{mode}"]
+        for row in rows
+        for mode in ("k_i", "k_ii")
+    }
+    return Measured.of("\n".join(lines), errors=named)
