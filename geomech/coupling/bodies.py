@@ -72,7 +72,7 @@ def boundary_loads(
     """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on that
     geometry the forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
-    acting = result.contacts[(result.contacts["normal_force"] != 0) | (result.contacts["shear_force"] != 0)]
+    acting = beside_acting(result.contacts, blocks.n_blocks)
     touching = zip(_rows_of(acting["block"], numbers), _rows_of(acting["other"], numbers))
     contacts, edges, points = (
         dict(zip(bodies, rows))
@@ -102,6 +102,15 @@ def boundary_loads(
         )
         for b in bodies
     }
+
+
+def beside_acting(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
+    """CONTACT rows of all pairs of blocks between which some contact carries force: where it may end, others tell."""
+    pair = np.minimum(contacts["block"], contacts["other"]) * n_blocks + np.maximum(
+        contacts["block"], contacts["other"]
+    )
+    acts = (contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)
+    return contacts[np.isin(pair, pair[acts])]
 
 
 def solve_bodies(

@@ -1,11 +1,11 @@
 """Contact forces of a block made into one boundary load of its elastic body, with the same force and moment.
 
-The contacts of one joint face (two edges that lie against each other) are one distribution: the linear pressure with
-the resultant and moment of its contact forces; where that would pull although the resultant pushes, the triangle on
-the shorter, fully compressed length. Shear follows the pressure, so that it breaks Coulomb's law nowhere unless it
-breaks it as a whole. A lone vertex pressed into an edge spreads over a short piece of that edge; a lone force on a
-block's own corner is resolved along the corner's two edges and enters there as shear, which keeps both force and
-moment exactly.
+The contacts of one joint face (two edges that lie against each other) are one distribution with the resultant and moment of
+its contact forces: linear, or a triangle where that would pull although the resultant pushes (`face_pressure`). It ends where
+the faces do: a contact that opens takes the pressure back from its place the further the wider it gapes. Shear follows the
+pressure, so that it breaks Coulomb's law nowhere unless it breaks it as a whole. A lone vertex pressed into an edge spreads
+over a short piece of that edge; a lone force on a block's own corner is resolved along the corner's two edges and enters there
+as shear, which keeps both force and moment exactly. Tractions change without a jump as contacts come and go.
 
 Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force on
 the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al. (2023,
@@ -27,12 +27,16 @@ import numpy as np
 
 from ..ddm.loads import resultants
 from ..model import Blocks, Motion
+from .face_pressure import no_pull
 
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = np.radians(10.0)
 
 #: A face that ends within this part of its edge's length of the edge's end ends there.
 SNAP = 1e-9
+
+#: Contacts nearer to each other than this part of a face's length are at one place.
+SAME = 1e-6
 
 #: A point load nearer to an edge than this part of its length stands on it.
 ON_EDGE = 1e-6
@@ -60,25 +64,6 @@ class BoundaryLoad:
     points: np.ndarray | None = None
     forces: np.ndarray | None = None
     kelvin: bool = False
-
-
-def linear_pressure(length: float, force: float, moment: float) -> tuple[float, float, float, float]:
-    """(start, end, p_start, p_end) of the distribution on [0, length] with resultant ``force`` and ``moment`` about 0.
-
-    Linear over the whole length; where a pushing resultant (force > 0) would need a pull at one end, the triangle with
-    the same resultant on the shorter length. A resultant outside [0, length] cannot be carried without pull: it stays
-    linear, pull and all, since force and moment come first.
-    """
-    p_start = (4 * force * length - 6 * moment) / length**2
-    p_end = (6 * moment - 2 * force * length) / length**2
-    if force > 0 and min(p_start, p_end) < 0:
-        arm = moment / force
-        if 0 < arm < length / 3:
-            return 0.0, 3 * arm, 2 * force / (3 * arm), 0.0
-        if 0 < length - arm < length / 3:
-            reach = 3 * (length - arm)
-            return length - reach, length, 0.0, 2 * force / reach
-    return 0.0, length, p_start, p_end
 
 
 def boundary_load(
@@ -114,10 +99,7 @@ def boundary_load(
     for (edge, _), touches in faces.items():
         _add_face(pieces, blocks, blocks.sides[edge], touches)
     for touch in lone:
-        if touch.own:
-            _add_corner_force(pieces, blocks, touch.vertex, np.array(touch.force))
-        else:
-            _add_edge_force(pieces, blocks, touch.edge, np.array(touch.point), np.array(touch.force))
+        _add_lone(pieces, blocks, touch, touch.force)
     turn_back = np.array([[c, s], [-s, c]])
     for row in edge_forces:
         _add_edge_piece(pieces, blocks, vertices, row, turn_back)
@@ -153,10 +135,10 @@ class _Pieces:
 
 
 class _Touch(NamedTuple):
-    """A contact that carries force, as one of its blocks feels it. There are few, so they are plain numbers.
+    """A contact as one of its blocks feels it. There are few, so they are plain numbers.
 
     ``own``: the block owns the vertex, not the edge; ``normal`` of the edge, current axes; ``point`` and the ``force`` on
-    the block in its reference frame.
+    the block in its reference frame; ``acts``: it carries force; ``gap`` m.
     """
 
     own: bool
@@ -165,16 +147,17 @@ class _Touch(NamedTuple):
     normal: list[float]
     point: list[float]
     force: tuple[float, float]
+    acts: bool
+    gap: float
 
 
 def _touches(block: int, motion: Motion, contacts: np.ndarray, c: float, s: float) -> list[_Touch]:
     """What touches ``block``, which has turned by the angle of cosine ``c`` and sine ``s``."""
-    owner = contacts["block"]
-    acting = (contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)
-    rows = contacts[acting & ((owner == block) | (contacts["other"] == block))]
-    columns = (rows[name].tolist() for name in ("block", "vertex", "edge", "normal", "normal_force", "shear_force"))
+    rows = contacts[(contacts["block"] == block) | (contacts["other"] == block)]
+    names = ("block", "vertex", "edge", "normal", "normal_force", "shear_force", "gap")
+    columns = (rows[name].tolist() for name in names)
     touches = []
-    for owner, vertex, edge, normal, push, shear, point in zip(
+    for owner, vertex, edge, normal, push, shear, gap, point in zip(
         *columns, motion.reference(block, rows["point"]).tolist(), strict=True
     ):
         own = owner == block
@@ -182,7 +165,8 @@ def _touches(block: int, motion: Motion, contacts: np.ndarray, c: float, s: floa
             push, shear = -push, -shear
         # Shear acts along the edge's direction: its outward normal turned by +90°.
         x, y = push * normal[0] - shear * normal[1], push * normal[1] + shear * normal[0]
-        touches.append(_Touch(own, vertex, edge, normal, point, (c * x + s * y, c * y - s * x)))
+        acts = push != 0 or shear != 0
+        touches.append(_Touch(own, vertex, edge, normal, point, (c * x + s * y, c * y - s * x), acts, gap))
     return touches
 
 
@@ -219,20 +203,21 @@ def _faces_and_lone(
     lone = []
     for touch in touches:
         touching, angle = _touching_edge(blocks, vertices, touch.vertex, touch.normal)
-        if angle > FACE_ANGLE:
-            lone.append(touch)
-        else:
+        if angle <= FACE_ANGLE:
             own, facing = (touching, touch.edge) if touch.own else (touch.edge, touching)
             found.setdefault((blocks.side_start[own], blocks.side_start[facing]), []).append(touch)
+        elif touch.acts:
+            lone.append(touch)
     faces = {}
     for face, members in found.items():
         start, _, along, length = _line(blocks, blocks.sides[face[0]])
-        places = [_along(touch.point, start, along) for touch in members]
+        acting = [touch for touch in members if touch.acts]
+        places = [_along(touch.point, start, along) for touch in acting]
         # Points apart by no more than round-off are one.
-        if max(places) - min(places) > 1e-6 * length:
+        if acting and max(places) - min(places) > SAME * length:
             faces[face] = members
         else:
-            lone += members
+            lone += acting
     return faces, lone
 
 
@@ -249,30 +234,60 @@ def _along(point: Sequence[float], start: Sequence[float], direction: tuple[floa
 
 
 def _add_face(pieces: _Pieces, blocks: Blocks, side: list[int], touches: list[_Touch]) -> None:
-    start, end, (ax, ay), length = _line(blocks, side)
+    line = start, _, (ax, ay), length = _line(blocks, side)
     places = [_along(touch.point, start, (ax, ay)) for touch in touches]
-    first, last = max(min(places), 0.0), min(max(places), length)
-    # Round-off of the mapping must not make a new load segment every step: the body keeps what it knows of a segment.
-    # The pressure below has the force and moment of the contacts on whatever length it is given.
-    first = 0.0 if first < SNAP * length else first
-    last = length if last > (1 - SNAP) * length else last
+    acting = [(place, touch) for place, touch in zip(places, touches) if touch.acts]
     total = moment = shear = size = 0.0
-    for place, (x, y) in zip(places, (touch.force for touch in touches)):
+    for place, (x, y) in ((place, touch.force) for place, touch in acting):
         push = ax * y - ay * x  # inward: the direction turned by +90°
         total += push
-        moment += push * (place - first)
+        moment += push * place
         shear += ax * x + ay * y
         size += abs(x) + abs(y)
-    a, b, p_a, p_b = linear_pressure(last - first, total, moment)
-    # Shear in proportion to the pressure, or evenly where there is none to go by.
-    if abs(total) > 1e-9 * size:
-        q_a, q_b = shear / total * p_a, shear / total * p_b
-    else:
-        q_a = q_b = shear / (b - a)
-    t_a = (q_a * ax - p_a * ay, q_a * ay + p_a * ax)
-    t_b = (q_b * ax - p_b * ay, q_b * ay + p_b * ax)
-    # One piece an edge of the side: a load segment lies on one edge.
-    a, b = first + a, first + b
+    # The force that goes with a unit of pressure: shear in proportion to it, evenly spread where faces are held together
+    # besides and there is none to go by.
+    reach = [place for place, _ in acting]
+    even = abs(total) <= 1e-9 * size or not min(reach) <= moment / total <= max(reach)
+    slope = 0.0 if even else shear / total
+    per_push = (slope * ax - ay, slope * ay + ax)
+    gapes = [(place, touch) for place, touch in zip(places, touches) if not touch.acts]
+    for low, low_share in _ends(acting, gapes, length, -1):
+        for high, high_share in _ends(acting, gapes, length, 1):
+            share = low_share * high_share
+            # Round-off of the mapping must not make a new load segment every step: the body keeps what it knows of a
+            # segment. The pressure has the force and moment of the contacts on whatever length it is given.
+            first, last = max(low[0], 0.0), min(high[0], length)
+            first = 0.0 if first < SNAP * length else first
+            last = length if last > (1 - SNAP) * length else last
+            found, at_first, at_last = no_pull(last - first, share * total, share * (moment - first * total))
+            for a, b, p_a, p_b in found:
+                t_a, t_b = ((p * per_push[0], p * per_push[1]) for p in (p_a, p_b))
+                _add_on_side(pieces, blocks, side, line, (first + a, first + b), t_a, t_b)
+            for force, (_, touch) in ((at_first, low), (at_last, high)):
+                if force:
+                    _add_lone(pieces, blocks, touch, (force * per_push[0], force * per_push[1]))
+            if even:
+                q = share * shear / (last - first)
+                _add_on_side(pieces, blocks, side, line, (first, last), (q * ax, q * ay), (q * ax, q * ay))
+
+
+def _ends(acting: list, gapes: list, length: float, way: int) -> list[tuple[tuple[float, _Touch], float]]:
+    """Where a face's pressure may end on one side (``way`` −1 or 1), as pairs of place and touch, and the share of each:
+    the last contact that acts, and the next one that gapes, the less the wider it does beside how much the other one gives."""
+    closed = max(acting, key=lambda of: (way * of[0], abs(of[1].force[0]) + abs(of[1].force[1])))
+    beyond = [of for of in gapes if way * (of[0] - closed[0]) > SAME * length]
+    if not beyond:
+        return [(closed, 1.0)]
+    nearest = min(beyond, key=lambda of: way * of[0])
+    give, gap = max(-closed[1].gap, 0.0), max(nearest[1].gap, 0.0)
+    share = give / (give + gap) if give > 0 else 0.0
+    return [(of, part) for of, part in ((closed, 1.0 - share), (nearest, share)) if part > 0]
+
+
+def _add_on_side(pieces: _Pieces, blocks: Blocks, side: list[int], line: tuple, span: tuple, t_a, t_b) -> None:
+    """A traction from ``t_a`` to ``t_b`` over a ``span`` of a straight side: one piece an edge, for a load segment lies on
+    one edge."""
+    (start, end, (ax, ay), length), (a, b) = line, span
     corners = [start, *(blocks.vertices[k].tolist() for k in side[1:-1]), end]
     marks = [0.0, *(_along(corner, start, (ax, ay)) for corner in corners[1:-1]), length]
 
@@ -287,6 +302,13 @@ def _add_face(pieces: _Pieces, blocks: Blocks, side: list[int], touches: list[_T
         low, high = max(a, marks[k]), min(b, marks[k + 1])
         if high - low > SNAP * length:
             pieces.add(at(low, k), at(high, k + 1), traction(low), traction(high))
+
+
+def _add_lone(pieces: _Pieces, blocks: Blocks, touch: _Touch, force: tuple[float, float]) -> None:
+    if touch.own:
+        _add_corner_force(pieces, blocks, touch.vertex, np.array(force))
+    else:
+        _add_edge_force(pieces, blocks, touch.edge, np.array(touch.point), np.array(force))
 
 
 def _add_corner_force(pieces, blocks, vertex: int, force: np.ndarray) -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from geomech.coupling.tractions import boundary_load, linear_pressure
+from geomech.coupling.face_pressure import no_pull
+from geomech.coupling.tractions import boundary_load
 from geomech.dda import EDGE_FORCE, POINT_FORCE
 from geomech.ddm.loads import resultants
 from geomech.model import CONTACT, SLIP, Blocks, Motion
@@ -53,23 +54,71 @@ def edge_between(blocks, block, start, end):
     return edge
 
 
-@pytest.mark.parametrize("moment", [0.05, 0.2, 0.3, 0.5, 0.66, 0.8, 0.97])
+@pytest.mark.parametrize("moment", [0.0, 0.01, 0.05, 0.2, 0.3, 0.5, 0.66, 0.8, 0.97, 1.0])
 def test_pressure_keeps_force_and_moment_and_does_not_pull(moment):
     """∫p = F and ∫p s = M to round-off; a push whose resultant lies inside the face needs no pull anywhere."""
-    start, end, p_start, p_end = linear_pressure(1.0, 1.0, moment)
-    length = end - start
-    assert p_start >= 0 and p_end >= 0
-    assert length * (p_start + p_end) / 2 == pytest.approx(1.0, abs=1e-14)
-    about_start = length**2 * (p_start + 2 * p_end) / 6
-    assert about_start + start * 1.0 == pytest.approx(moment, abs=1e-14)
+    pieces, at_start, at_end = no_pull(1.0, 1.0, moment)
+    force, about_start = at_start + at_end, at_end
+    assert at_start >= 0 and at_end >= 0
+    for start, end, p_start, p_end in pieces:
+        assert p_start >= 0 and p_end >= 0
+        length = end - start
+        force += length * (p_start + p_end) / 2
+        about_start += length**2 * (p_start + 2 * p_end) / 6 + start * length * (p_start + p_end) / 2
+    assert force == pytest.approx(1.0, abs=1e-14)
+    assert about_start == pytest.approx(moment, abs=1e-14)
 
 
 def test_end_forces_become_the_linear_pressure_of_their_resultant():
     """Two end forces F0, F1 on a length ℓ: p0 = (4F0 − 2F1)/ℓ, p1 = (4F1 − 2F0)/ℓ (statics of a linear pressure)."""
     f0, f1, length = 3.0, 2.0, 0.5
-    _, _, p_start, p_end = linear_pressure(length, f0 + f1, f1 * length)
+    [(_, _, p_start, p_end)], at_start, at_end = no_pull(length, f0 + f1, f1 * length)
+    assert at_start == at_end == 0.0
     assert p_start == pytest.approx((4 * f0 - 2 * f1) / length, rel=1e-14)
     assert p_end == pytest.approx((4 * f1 - 2 * f0) / length, rel=1e-14)
+
+
+def moments_of(load):
+    """Moments of the tractions up to the second, by their exact integrals: two loads apart in them differ in the block."""
+    out = np.zeros((2, 6))
+    for (a, b), (t_a, t_b) in zip(load.segments, load.tractions):
+        for s, weight in zip((0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)):
+            x, y = a + s * (b - a)
+            t = (t_a + s * (t_b - t_a)) * weight * np.hypot(*(b - a))
+            out += np.outer(t, [1, x, y, x * x, x * y, y * y])
+    return out
+
+
+@pytest.mark.parametrize("places", [(0.0, 1.0), (0.0, 0.4, 1.0), (0.3, 0.6, 1.0)])
+@pytest.mark.parametrize("block", [0, 1])
+def test_tractions_do_not_jump_as_a_contact_comes_or_goes(places, block):
+    """The contact at the right end with a force of 1e-9 of the others, and open by 1e-9 of how much they give: what is on
+    the block differs by no more than some 1e-9. With a gap a thousand times what they give it is as if the contact were not."""
+    lower = np.array([[0.0, 0.0], [1.0, 0.0], *([x, 1.0] for x in places[::-1]), *([[0.0, 1.0]] if places[0] else [])])
+    blocks = Blocks.from_polygons([lower, SQUARE + [0.0, 1.0]])
+    bottom = edge_between(blocks, 1, [0.0, 1.0], [1.0, 1.0])
+
+    def load(push, gap):
+        rows = []
+        for x, (force, apart) in zip(places, [(1.0, -1e-6)] * (len(places) - 1) + [(push, gap)]):
+            vertex = vertex_at(blocks, 0, [x, 1.0])
+            rows.append(contact(vertex, bottom, 0, 1, [x, 1.0], [0, -1], force, 0.3 * force))
+            rows[-1]["gap"] = apart
+        return load_of(block, blocks, rows)
+
+    closed, opened, far = load(1e-9, -1e-15), load(0.0, 1e-15), load(0.0, 1e-3)
+    size = np.abs(moments_of(closed)).max()
+    assert np.abs(moments_of(closed) - moments_of(opened)).max() < 2e-8 * size
+    rows = [row for row in range(len(places) - 1)]
+    without = load_of(
+        block,
+        blocks,
+        [
+            contact(vertex_at(blocks, 0, [places[k], 1.0]), bottom, 0, 1, [places[k], 1.0], [0, -1], 1.0, 0.3)
+            for k in rows
+        ],
+    )
+    assert np.abs(moments_of(far) - moments_of(without)).max() < 2e-3 * size
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.3, -0.7])
