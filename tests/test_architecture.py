@@ -31,6 +31,7 @@ EDGE = {"__init__", "__main__", "bench", "cli", "doctor", "pipeline", "report", 
 #: Distributions that only these parts import.
 ONLY_IN = {
     "gmsh": {"shapes"},
+    "ezdxf": {"shapes"},
     "vtk": {"output", "render"},
     "vtkmodules": {"output", "render"},
     "pyvista": {"output", "render"},
@@ -42,7 +43,7 @@ ONLY_IN = {
     "shapely": {"shapes", "scene", "coupling", "output", "render"},
 }
 #: Heavy ones are imported where they are used, never when a module is.
-LAZY = {"gmsh", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", "imageio", "meshio"}
+LAZY = {"gmsh", "ezdxf", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", "imageio", "meshio"}
 
 SOURCES = sorted(HOUSE.rglob("*.py"))
 

@@ -132,6 +132,7 @@ class Problem:
     load_edge: str = ""
     gauge: tuple[tuple[int, tuple[float, float]], tuple[int, tuple[float, float]]] | None = None
     monitors: dict[str, tuple[int, tuple[float, float]]] = field(default_factory=dict)
+    origin: tuple[float, float] = (0.0, 0.0)  # world coordinates of (0, 0), m
 
     @property
     def inventory(self) -> str:

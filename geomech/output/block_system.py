@@ -15,7 +15,7 @@ from geomech.shapes.rock_bridges import rock_bridges
 
 from .summary import write_json
 from .triangulate import Triangles
-from .vtu import LINE, TRIANGLE, Grid, GridFiles
+from .vtu import LINE, TRIANGLE, Grid, GridFiles, world_origin
 
 #: Parts of the rock, by area, that the block-size curve is given at.
 _PASSING = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
@@ -31,6 +31,7 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
     names = list(dict.fromkeys(zones))
     zone = np.array([names.index(name) for name in zones])
     bridges = rock_bridges(blocks, cracks)
+    origin = world_origin(problem)
     cells, owner = Triangles().of(blocks)
     area = blocks.areas()
     GridFiles("block_system").write(
@@ -48,7 +49,7 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
                 "area": area[owner],
             },
         ),
-        {},
+        origin,
     )
     edges = np.stack([blocks.vertices, blocks.vertices[blocks.next_vertex]], axis=1)
     lines = np.concatenate([edges, cracks.nodes[cracks.segments], bridges])
@@ -65,7 +66,7 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
                 "kind": np.repeat([0, 1, 2], [len(edges), cracks.n_segments, len(bridges)]),
             },
         ),
-        {},
+        origin,
     )
     _write_msh(folder / "block_system.msh", blocks, cracks, cells, owner, names, zone)
     told = _statistics(scene, problem, area, bridges, names, zone)
@@ -151,6 +152,7 @@ def _statistics(
         "title": problem.title,
         "summary": f"{problem.inventory}, {counted(len(bridges), 'rock bridge')}",
         "box_m": [low.tolist(), high.tolist()],
+        "world_origin_m": list(problem.origin),
         "area_m2": float(area.sum()),
         "blocks": {
             "number": blocks.n_blocks,
@@ -191,6 +193,9 @@ def _lines(told: dict[str, Any], jointed: Any) -> list[str]:
     ]
     if told["sets"]:
         rows[0] += f"; nodes I {told['nodes']['I']}, Y {told['nodes']['Y']}, X {told['nodes']['X']}"
+    x, y = told["world_origin_m"]
+    if x or y:
+        rows.insert(0, f"  origin    ({x:.10g}, {y:.10g}) m: add it to every coordinate that is written")
     for entry in told["sets"]:
         text = f"{entry['name']}: {counted(entry['traces'], 'trace')} at {entry['mean_angle_deg']:.3g}°, "
         text += f"P10 {entry['p10_per_m']:.3g}/m, P20 {entry['p20_per_m2']:.3g}/m², P21 {entry['p21_per_m']:.3g} m/m²"

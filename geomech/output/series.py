@@ -14,7 +14,7 @@ from .beside import Beside
 from .fields import SERIES
 from .interior import InteriorMeshes
 from .triangulate import Triangles
-from .vtu import Collection, Grid, GridFiles
+from .vtu import Collection, Grid, GridFiles, world_origin
 
 #: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
 PASS_OFFSET = 1e-6
@@ -42,7 +42,7 @@ class Series:
         self.seconds = 0.0
 
     def on_start(self, problem: Problem, folder: Path) -> None:
-        self._materials = problem.materials
+        self._materials, self._world = problem.materials, world_origin(problem)
         self._folder = Path(folder)
         self._vtk = self._folder / "vtk"
         self._vtk.mkdir(parents=True, exist_ok=True)
@@ -131,6 +131,7 @@ class Series:
             "TIME": float(cycle.state.time),
             "LOAD": float(cycle.load),
             "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are the reference ones
+            **self._world,
         }
         self._files[name].write(f"{self._vtk}/{file}", grid, numbers)
         self._old.discard(file)

@@ -84,6 +84,8 @@ class Summary:
             half_length, toughness = self._scale
             summary["normalisation"] = {"half_length_m": half_length, "k_ic_pa_sqrt_m": toughness}
         summary["cracks"] = list(self._problem.cracks.names)
+        if any(self._problem.origin):
+            summary["world_origin_m"] = list(self._problem.origin)
         summary["versions"] = versions()
         write_json(self._path, summary)
 

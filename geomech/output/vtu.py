@@ -51,6 +51,12 @@ class Grid:
     cell_data: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
+def world_origin(problem: Any) -> dict[str, float]:
+    """Field data that place a grid in the world: what is to be added to x and y, m. Empty where that is nothing."""
+    x, y = problem.origin
+    return {"WORLD_X": float(x), "WORLD_Y": float(y)} if x or y else {}
+
+
 class GridFiles:
     """Writes the grids of one ``series`` as .vtu files.
 

@@ -89,11 +89,12 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
                 Line2D([], [], color=BRIDGE, lw=1.6, ls=(0, (1.2, 1.6)), label=f"rock bridges ({len(bridges)})")
             )
 
-    keys += _conditions(axes, problem, edges, size)
+    keys += _conditions(axes, scene, problem, edges, size)
     margin = 0.05 * size
     axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), aspect="equal")
     axes.tick_params(labelsize=8, colors=INK, length=3)
-    axes.set_xlabel("m", fontsize=8, color=INK)
+    x, y = scene.origin
+    axes.set_xlabel(f"m from ({x:.10g}, {y:.10g})" if x or y else "m", fontsize=8, color=INK)
     for side in axes.spines.values():
         side.set_visible(False)
     left = (0.55 + across + 0.15) / (across + 4.1)
@@ -109,7 +110,7 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
     return path
 
 
-def _conditions(axes: Any, problem: Problem, edges: np.ndarray, size: float) -> list[Any]:
+def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size: float) -> list[Any]:
     """Loads and supports on the drawing; what they are called."""
     from matplotlib.lines import Line2D
 
@@ -139,10 +140,12 @@ def _conditions(axes: Any, problem: Problem, edges: np.ndarray, size: float) -> 
         for edge in edges[blocks.edges_named(name)]:
             axes.plot(*edge.T, color=mark, lw=7, alpha=0.35, solid_capstyle="butt", zorder=0.5)
         keys.append(Line2D([], [], color=mark, lw=7, alpha=0.35, label=f'edges "{name}"'))
-    if loads.bolts:
-        for bolt in loads.bolts:
-            axes.plot(*np.array([bolt.start, bolt.end]).T, color="#1b1d21", lw=1.6, zorder=6)
-        keys.append(Line2D([], [], color="#1b1d21", lw=1.6, label=f"bolts ({len(loads.bolts)})"))
+    # A grouted bar works at the joints alone, and is as long as it is.
+    bolts = scene.tables.loads.bolts
+    for bolt in bolts:
+        axes.plot(*np.array([bolt.start, bolt.end]).T, color="#1b1d21", lw=1.6, zorder=6)
+    if bolts:
+        keys.append(Line2D([], [], color="#1b1d21", lw=1.6, label=f"bolts ({len(bolts)})"))
     if loads.water is not None:
         points = np.asarray(loads.water.points)
         x = [blocks.vertices[:, 0].min(), *points[:, 0], blocks.vertices[:, 0].max()]

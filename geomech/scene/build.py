@@ -50,6 +50,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
     carriers = gauge_carriers(check)
     return Problem(
         title=tables.title,
+        origin=drawing.origin,
         blocks=blocks,
         cracks=cracks,
         materials=tuple(

@@ -196,27 +196,30 @@ def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: lis
         c.refuse(path[:-1] + ("zone",), f"the geometry has no zone {zone!r}", nearest(zone, known))
         return -1
     at = blocks_at(c.drawing.blocks, point)
+    origin = np.array(c.drawing.origin)
+    x, y = np.add(point, origin)
+    here = f"({x:.10g}, {y:.10g})" if origin.any() else f"({x:g}, {y:g})"
     if zone is not None:
         inside, at = at, [b for b in at if c.drawing.zones[b] == zone]
         if inside and not at:
-            c.refuse(
-                path, f"{what} ({point[0]:g}, {point[1]:g}) is not in zone {zone!r}", "move it, or name its own zone"
-            )
+            c.refuse(path, f"{what} {here} is not in zone {zone!r}", "move it, or name its own zone")
             return -1
     if among is not None and len(at) > 1:
         at = [b for b in at if b in among] or at
     if not at:
-        low, high = c.drawing.blocks.vertices.min(axis=0), c.drawing.blocks.vertices.max(axis=0)
+        low, high = (end(c.drawing.blocks.vertices, axis=0) + origin for end in (np.min, np.max))
+        digits = ".10g" if origin.any() else "g"
         c.refuse(
             path,
-            f"{what} ({point[0]:g}, {point[1]:g}) is outside all blocks",
-            f"the blocks span x from {low[0]:g} to {high[0]:g} m and y from {low[1]:g} to {high[1]:g} m",
+            f"{what} {here} is outside all blocks",
+            f"the blocks span x from {low[0]:{digits}} to {high[0]:{digits}} m and y from {low[1]:{digits}} to "
+            f"{high[1]:{digits}} m",
         )
         return -1
     if len(at) > 1:
         names = [c.drawing.blocks.names[b] for b in at]
         way = 'add zone = "…"' if len({c.drawing.zones[b] for b in at}) > 1 else "move it into one of them"
-        c.refuse(path, f"{what} ({point[0]:g}, {point[1]:g}) lies where blocks {', '.join(names)} touch", way)
+        c.refuse(path, f"{what} {here} lies where blocks {', '.join(names)} touch", way)
         return -1
     return at[0]
 

@@ -1,21 +1,24 @@
-"""The geometry of a scene as blocks and cracks, from a Gmsh model or from the file itself."""
+"""The geometry of a scene as blocks and cracks, from a Gmsh model, from files of traces, or from the scene itself."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import Blocks, Cracks
-from ..shapes import EdgeLine, Joint, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
+from ..shapes import EdgeLine, Flaw, Joint, Mark, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
 from ..shapes.parts import JOINT
 from .errors import Fault
+from .field_files import read_traces
 from .locator import Path
 from .tables.geometry import CrackShape, Geometry
+from .validation import nearest
+from .world import local_origin, moved_section
 
 if TYPE_CHECKING:
     from .jointing import Jointed
@@ -27,7 +30,8 @@ class Drawing:
     name of the zone each block belongs to, ``cracks_drawn`` the names of the cracks, ``parameters`` those of a Gmsh
     model, as used, ``choices`` the names of their values where they have such, ``model`` its file, ``joints`` what edges along
     joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock. ``blocks`` is None
-    where the drawing cannot be assembled."""
+    where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing, ``mark_places`` (path in the scene,
+    where in the file) of each by name; ``origin`` m, world coordinates of what is (0, 0) in all these."""
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
@@ -38,6 +42,9 @@ class Drawing:
     model: FilePath | None = None
     joints: tuple[str, ...] = ()
     jointed: Jointed | None = None
+    marks: tuple[Mark, ...] = ()
+    mark_places: dict[str, tuple[Path, str]] = field(default_factory=dict)
+    origin: tuple[float, float] = (0.0, 0.0)
 
     def choices_with_edge(self, name: str) -> str:
         """The choices of one parameter with which the model has edges called ``name``, as a scene says them; empty
@@ -61,6 +68,56 @@ class Drawing:
         return ""
 
 
+@dataclass(eq=False)
+class _Parts:
+    """What is drawn so far, in world coordinates. ``sources`` says, for (part, index) or (part, name) of joints and marks,
+    where each stands: its path in the scene and, for other files, where there."""
+
+    zones: list[Zone] = field(default_factory=list)
+    traces: list[Trace] = field(default_factory=list)
+    joints: list[Joint] = field(default_factory=list)
+    edges: list[EdgeLine] = field(default_factory=list)
+    marks: list[Mark] = field(default_factory=list)
+    sources: dict[tuple[str, int | str], tuple[Path, str]] = field(default_factory=dict)
+    only_in: dict[int, Sequence[str]] = field(default_factory=dict)  # names of zones that a joint cuts
+
+    def add(self, read, source: Callable[[str, int], tuple[Path, str]], zones: Sequence[str] = ()) -> None:
+        """What a file holds: zones, traces, joints (that cut the named ``zones`` alone), marks, and edges where it has such."""
+        if zones:
+            self.only_in.update((len(self.joints) + k, zones) for k in range(len(read.joints)))
+        for part, mine, own in (
+            ("zones", self.zones, read.zones),
+            ("cracks", self.traces, read.traces),
+            ("edges", self.edges, getattr(read, "edges", ())),
+        ):
+            for k, item in enumerate(own):
+                self.sources[part, len(mine)] = source(part, k)
+                mine.append(item)
+        for part, mine, own in (("joints", self.joints, read.joints), ("marks", self.marks, read.marks)):
+            for k, item in enumerate(own):
+                self.sources.setdefault((part, item.name), source(part, k))
+                mine.append(item)
+
+    def arrays(self) -> list[np.ndarray]:
+        """All points of the rock and what cuts it."""
+        return [loop for zone in self.zones for loop in zone.loops] + [
+            line for item in (*self.traces, *self.joints) for line in item.lines
+        ]
+
+    def move(self, origin: np.ndarray) -> None:
+        """Count from ``origin`` (2,), m."""
+
+        def lines(items):
+            return [replace(item, lines=tuple(line - origin for line in item.lines)) for item in items]
+
+        self.zones = [replace(zone, loops=tuple(loop - origin for loop in zone.loops)) for zone in self.zones]
+        self.traces, self.joints, self.marks = lines(self.traces), lines(self.joints), lines(self.marks)
+        x, y = origin.tolist()
+        self.edges = [
+            replace(e, start=(e.start[0] - x, e.start[1] - y), end=(e.end[0] - x, e.end[1] - y)) for e in self.edges
+        ]
+
+
 def draw(
     geometry: Geometry,
     folder: FilePath,
@@ -69,83 +126,174 @@ def draw(
     warnings: list[Fault],
 ) -> Drawing | None:
     """Read or make the drawing; what is wrong goes to ``faults``. None where not even its names are known."""
-    parameters: dict[str, float | str] = {}
-    choices: dict[str, Mapping[str, float]] = {}
-    model = None
-    drawn_joints: tuple[Joint, ...] = ()
-    places: Mapping[tuple[str, int], str] = {}
-    if geometry.model is not None:
-        # Imported here: a scene drawn in TOML needs no Gmsh.
-        from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
-
-        source = ("geometry", "model")
-        wanted, read = dict(geometry.parameters), None
-        while read is None:
-            try:
-                read = read_gmsh_model(folder / geometry.model, wanted, geometry.chord_tolerance_m)
-            except GmshModelError as error:
-                at = ("geometry", "parameters", error.parameter) if error.parameter is not None else source
-                faults.append(Fault(place(at), error.message, error.way_out))
-                if error.parameter not in wanted:
-                    return None
-                # Without the faulty parameter the names of zones, edges and cracks can still be checked.
-                del wanted[error.parameter]
-            except GmshUnavailable as error:
-                faults.append(Fault(place(source), str(error), "or draw the geometry in the scene, [[geometry.zones]]"))
-                return None
-        warnings += [Fault(place(source), message, way_out) for message, way_out in read.warnings]
+    parts, parameters, choices = _Parts(), {}, {}
+    model = None if geometry.model is None else folder / geometry.model
+    if model is not None:
+        read = _read_model(geometry, model, place, faults)
+        if read is None:
+            return None
+        warnings += [Fault(place(("geometry", "model")), message, way_out) for message, way_out in read.warnings]
         parameters = {name: entry.value for name, entry in read.parameters.items()}
         choices = {name: entry.choices for name, entry in read.parameters.items() if entry.choices}
-        model = folder / geometry.model
-        zones, traces, edges, drawn_joints = read.zones, read.traces, (), read.joints
-        places = read.places
-    else:
-        zones = [Zone(z.name, _loops(z)) for z in geometry.zones]
-        traces = [Trace(c.name, (_line(c),)) for c in geometry.cracks]
-        edges = [EdgeLine(e.name, *e.line, e.zone) for e in geometry.edges]
-        seen: dict[str, int] = {}
-        for k, trace in enumerate(traces):
-            if seen.setdefault(trace.name, k) != k:
-                faults.append(
-                    Fault(
-                        place(("geometry", "cracks", k, "name")),
-                        f"there are two cracks called {trace.name!r}",
-                        "give each crack a name of its own",
-                    )
-                )
-    names = tuple(zone.name for zone in zones)
-    drawn = tuple(trace.name for trace in traces)
-    joints: tuple[str, ...] = ()
-    cut: Jointed | None = None
-    own_joints = len({joint.name for joint in geometry.joints})
-    try:
-        if geometry.joints or geometry.joint_sets or drawn_joints:
-            from .jointing import jointed
 
-            blocks, _ = assemble(zones, (), edges, geometry.tolerance_m)
-            cut = jointed(geometry, list(zones), blocks, list(traces), drawn_joints)
-            warnings += [Fault(place(("geometry",)), f"mended while cutting: {text}", "") for text in cut.told()]
-            names = tuple(names[zone] for zone in cut.cutting.zone)
-            joints = tuple(joint.name for joint in cut.joints)
-            own = [name.removeprefix(JOINT) for name in joints]
-            blocks, cracks, drawn = cut.cutting.blocks, cut.cracks, (*drawn, *own)
-        else:
-            blocks, cracks = assemble(zones, traces, edges, geometry.tolerance_m)
+        def in_model(part: str, index: int) -> tuple[Path, str]:
+            entity = read.places.get((part, index))
+            return ("geometry", "model"), f"{model.name}: {entity}" if entity else model.name
+
+        parts.add(read, in_model)
+    else:
+        _draw_here(geometry, parts)
+    if geometry.traces and not read_traces(geometry, folder, parts.add, place, faults, warnings):
+        return None
+    if not parts.zones:
+        layers = ", ".join(repr(joint.name.removeprefix(JOINT)) for joint in parts.joints[:8])
+        faults.append(
+            Fault(
+                place(("geometry", "traces")),
+                f"no rock: none of the layers is a zone, they are sets of joints ({layers})",
+                'say which layer holds the outline: layers = { "NAME" = "zone:rock", "*" = "" }, or add [[geometry.zones]]',
+            )
+        )
+        return None
+    _refuse_two_of_a_name(parts, place, faults)
+    known = list(dict.fromkeys(zone.name for zone in parts.zones))
+    for k, entry in enumerate(geometry.traces):
+        for n, name in enumerate(entry.zones):
+            if name not in known:
+                at = ("geometry", "traces", k, "zones", n)
+                faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))
+    origin = local_origin(geometry.origin, parts.arrays(), bool(geometry.traces))
+    if origin.any():
+        parts.move(origin)
+        geometry = moved_section(geometry, "geometry", origin)
+    return _assembled(
+        geometry, parts, Drawing((), (), None, None, parameters, choices, model), origin, place, faults, warnings
+    )
+
+
+def _draw_here(geometry: Geometry, parts: _Parts) -> None:
+    """What the scene draws itself."""
+    parts.zones += [Zone(z.name, _loops(z)) for z in geometry.zones]
+    parts.traces += [Trace(c.name, (_line(c),)) for c in geometry.cracks]
+    parts.edges += [EdgeLine(e.name, *e.line, e.zone) for e in geometry.edges]
+
+
+def _refuse_two_of_a_name(parts: _Parts, place: Callable[[Path], str], faults: list[Fault]) -> None:
+    seen: set[str] = set()
+    for k, trace in enumerate(parts.traces):
+        if trace.name in seen:
+            path, at = parts.sources.get(("cracks", k), (("geometry", "cracks", k, "name"), ""))
+            faults.append(
+                Fault(
+                    place(path),
+                    f"{at}: there are two cracks called {trace.name!r}".removeprefix(": "),
+                    "give each crack a name of its own",
+                )
+            )
+        seen.add(trace.name)
+
+
+def _read_model(geometry: Geometry, model: FilePath, place: Callable[[Path], str], faults: list[Fault]):
+    """The `GmshDrawing` of the model, without parameters that are faulty; None where it cannot be read."""
+    # Imported here: a scene drawn in TOML needs no Gmsh.
+    from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
+
+    source = ("geometry", "model")
+    wanted = dict(geometry.parameters)
+    while True:
+        try:
+            return read_gmsh_model(model, wanted, geometry.chord_tolerance_m, geometry.unit)
+        except GmshModelError as error:
+            at = ("geometry", "parameters", error.parameter) if error.parameter is not None else source
+            faults.append(Fault(place(at), error.message, error.way_out))
+            if error.parameter not in wanted:
+                return None
+            # Without the faulty parameter the names of zones, edges and cracks can still be checked.
+            del wanted[error.parameter]
+        except GmshUnavailable as error:
+            faults.append(Fault(place(source), str(error), "or draw the geometry in the scene, [[geometry.zones]]"))
+            return None
+
+
+def _assembled(
+    geometry: Geometry,
+    parts: _Parts,
+    drawing: Drawing,
+    origin: np.ndarray,
+    place: Callable[[Path], str],
+    faults: list[Fault],
+    warnings: list[Fault],
+) -> Drawing:
+    """``drawing`` with the blocks and cracks that ``parts`` make, or without them where they make none."""
+    names = tuple(zone.name for zone in parts.zones)
+    drawing = replace(
+        drawing,
+        zones=names,
+        cracks_drawn=tuple(trace.name for trace in parts.traces),
+        marks=tuple(parts.marks),
+        mark_places={name: source for (part, name), source in parts.sources.items() if part == "marks"},
+        origin=tuple(origin.tolist()),
+    )
+    drawn = drawing.cracks_drawn
+    try:
+        if not (geometry.joints or geometry.joint_sets or parts.joints):
+            blocks, cracks = assemble(parts.zones, parts.traces, parts.edges, geometry.tolerance_m)
+            return replace(drawing, blocks=blocks, cracks=cracks)
+        from .jointing import jointed, within
+
+        blocks, _ = assemble(parts.zones, (), parts.edges, geometry.tolerance_m)
+        for k, only in parts.only_in.items():
+            parts.joints[k] = within(parts.joints[k], [zone for zone in parts.zones if zone.name in only])
+        _tell_outside(parts, place, warnings)
+        cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints)
     except ShapeError as error:
+        counted_from = f"; coordinates count from ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
+        # Joints are counted by name: the scene's own, then those of files.
+        own = [JOINT + joint.name for joint in geometry.joints]
+        ordered = list(dict.fromkeys([*own, *(joint.name for joint in parts.joints)]))
         for flaw in error.flaws:
-            at: Path = ("geometry", flaw.part, flaw.index)
-            message = flaw.message
-            if (
-                geometry.model is not None
-                and flaw.part != "joint_sets"
-                and flaw.index >= own_joints * (flaw.part == "joints")
-            ):
-                entity = places.get((flaw.part, flaw.index - own_joints * (flaw.part == "joints")))
-                at = ("geometry", "model")
-                message = f"{FilePath(geometry.model).name}: {f'{entity}: ' if entity else ''}{message}"
-            faults.append(Fault(place(at), message, flaw.way_out))
-        return Drawing(names, drawn, None, None, parameters, choices, model)
-    return Drawing(names, drawn, blocks, cracks, parameters, choices, model, joints, cut)
+            path, at = _source(flaw, parts, ordered, own)
+            message = f"{at}: {flaw.message}" if at else flaw.message
+            faults.append(Fault(place(path), message, flaw.way_out + counted_from))
+        return drawing
+    warnings += [Fault(place(("geometry",)), f"mended while cutting: {text}", "") for text in cut.told()]
+    joints = tuple(joint.name for joint in cut.joints)
+    return replace(
+        drawing,
+        zones=tuple(names[zone] for zone in cut.cutting.zone),
+        cracks_drawn=(*drawn, *(name.removeprefix(JOINT) for name in joints)),
+        blocks=cut.cutting.blocks,
+        cracks=cut.cracks,
+        joints=joints,
+        jointed=cut,
+    )
+
+
+def _source(flaw: Flaw, parts: _Parts, joints: Sequence[str], own: Sequence[str]) -> tuple[Path, str]:
+    """Path in the scene, and place in another file, of what a flaw is about."""
+    key: int | str = flaw.index
+    index = flaw.index
+    if flaw.part == "joints" and flaw.index < len(joints):
+        key = joints[flaw.index]
+        index = own.index(key) if key in own else index
+    return parts.sources.get((flaw.part, key), (("geometry", flaw.part, index), ""))
+
+
+def _tell_outside(parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
+    """Warn of joints from files of which nothing lies in the rock: units or origins that differ."""
+    import shapely
+
+    found = [(joint, *parts.sources["joints", joint.name]) for joint in parts.joints]
+    found = [(joint, path, at) for joint, path, at in found if path != ("geometry", "model")]
+    if not found:
+        return
+    rock = [shapely.Polygon(zone.loops[0], zone.loops[1:]) for zone in parts.zones]
+    shapely.prepare(rock)
+    for joint, path, at in found:
+        lines = np.array([shapely.LineString(line) for line in joint.lines], dtype=object)
+        if not any(shapely.intersects(polygon, lines).any() for polygon in rock):
+            message = f"{at}: {joint.name!r} cuts nothing: none of its traces lies in the rock"
+            warnings.append(Fault(place(path), message, "is its unit or place wrong?"))
 
 
 def _loops(zone) -> tuple[np.ndarray, ...]:

@@ -100,7 +100,7 @@ def make_joints(geometry: Geometry, zones: Sequence[Zone], drawn: Sequence[Joint
             flaws.append(Flaw("joint_sets", k, f"there is no zone {strangers[0]!r}", f"there are {known}"))
             continue
         if shape.zones:
-            joint = _within(joint, [zone for zone in zones if zone.name in shape.zones])
+            joint = within(joint, [zone for zone in zones if zone.name in shape.zones])
         walls = [other for other in joints if other.name.removeprefix(JOINT) in shape.ends_on]
         joints.append(terminated(joint, walls, shape.ends_share, rng) if walls else joint)
     if flaws:
@@ -108,7 +108,7 @@ def make_joints(geometry: Geometry, zones: Sequence[Zone], drawn: Sequence[Joint
     return joints
 
 
-def _within(joint: Joint, zones: Sequence[Zone]) -> Joint:
+def within(joint: Joint, zones: Sequence[Zone]) -> Joint:
     """What of ``joint`` lies in ``zones``."""
     import shapely
 

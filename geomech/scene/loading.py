@@ -15,6 +15,7 @@ from .action_checks import check_actions
 from .build import build_problem
 from .checks import check
 from .drawing import Drawing, draw
+from .drawn_marks import with_marks
 from .equilibrium import check_loads
 from .errors import Check, Fault, SceneError
 from .keys import describe_keys
@@ -25,6 +26,7 @@ from .plausibility import check_plausible
 from .tables import SceneTables
 from .tables.output import OutputTable, RenderTable
 from .validation import DECIMAL_COMMA, nearest, validate
+from .world import moved
 
 #: The file that a pipeline folder holds.
 SCENE_FILE = "scene.toml"
@@ -32,7 +34,8 @@ SCENE_FILE = "scene.toml"
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene that has passed every check. ``warnings`` are faults that do not keep it from running."""
+    """A scene that has passed every check. ``warnings`` are faults that do not keep it from running. ``tables`` count from
+    ``origin`` and hold what the drawing says of bolts, water and monitors; the file's own are in world coordinates."""
 
     path: FilePath
     variant: str | None
@@ -41,6 +44,7 @@ class Scene:
     variants: tuple[str, ...]
     warnings: tuple[Fault, ...] = ()
     _check: Check | None = field(default=None, repr=False)
+    _written: SceneTables | None = field(default=None, repr=False)
 
     @property
     def title(self) -> str:
@@ -69,6 +73,11 @@ class Scene:
         """The cracks as drawn, without apertures."""
         return self.drawing.cracks
 
+    @property
+    def origin(self) -> tuple[float, float]:
+        """World coordinates of the origin that blocks, cracks and results count from, m."""
+        return self.drawing.origin
+
     def problem(self) -> Problem:
         """The scene as the solvers take it; its title names the variant."""
         return replace(build_problem(self.tables, self.drawing, self._check), title=self._full_title)
@@ -80,8 +89,12 @@ class Scene:
     def resolved(self) -> dict[str, Any]:
         """The scene with its variant and changes applied and all defaults written out, ready for ``tomli_w``: paths are
         absolute, all parameters of a Gmsh model are given, variants are gone. Loading it gives the same problem."""
-        data = self.tables.model_dump(by_alias=True, exclude_none=True, exclude={"variants"})
+        data = self._written.model_dump(by_alias=True, exclude_none=True, exclude={"variants"})
         data["title"] = self._full_title
+        if any(self.origin):
+            data["geometry"]["origin"] = list(self.origin)
+        for entry in data["geometry"]["traces"]:
+            entry["file"] = str((self.path.parent / entry["file"]).resolve())
         if self.tables.geometry.model is not None:
             data["geometry"]["model"] = str((self.path.parent / self.tables.geometry.model).resolve())
             data["geometry"]["parameters"] = dict(self.drawing.parameters)
@@ -162,7 +175,10 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
     drawing = None
     if tables.geometry is not None:
         drawing = draw(tables.geometry, path.parent, places, faults, warnings)
-    sections = Check(tables, data, drawing, places, faults, warnings)
+    written, place = tables, places
+    if drawing is not None:
+        tables, place = with_marks(moved(tables, drawing.origin), drawing, places, faults, warnings)
+    sections = Check(tables, data, drawing, place, faults, warnings)
     check(sections)
     check_actions(sections)
     check_loads(sections)
@@ -170,8 +186,8 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
         raise SceneError(places.sorted(faults))
     check_plausible(sections)
     # Building asks the same questions as the checks did; whatever it would find has been found.
-    quiet = Check(tables, data, drawing, places, [], [])
-    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(warnings)), quiet)
+    quiet = Check(tables, data, drawing, place, [], [])
+    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(warnings)), quiet, written)
 
 
 def _file(path: FilePath) -> FilePath:

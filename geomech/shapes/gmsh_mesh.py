@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .parts import JOINT, Joint, Trace, Zone
+from .parts import JOINT, Joint, Mark, Trace, Zone, is_mark
 
 #: A node on a straight run is no corner: nodes leave the run by less than this part of its shorter neighbour edge.
 _STRAIGHT = 1e-9
@@ -47,7 +47,7 @@ def drawing_of_mesh(gmsh, path: Path):
                 lines.setdefault(name, []).append((a, b))
             where.setdefault(name, []).append(int(entity))
     for name, pairs in lines.items():
-        for pair in pairs:
+        for pair in pairs if not is_mark(name) else ():
             edge = (min(pair), max(pair))
             if edge_name.setdefault(edge, name) != name:
                 raise GmshModelError(
@@ -75,8 +75,19 @@ def drawing_of_mesh(gmsh, path: Path):
             f"{path.name} has no physical surface",
             'name surfaces before meshing: Physical Surface("rock") = {1}; and save all physical groups',
         )
-    traces, joints = [], []
+    traces, joints, marks = [], [], []
+    for dim, group in gmsh.model.getPhysicalGroups(0):
+        name = gmsh.model.getPhysicalName(dim, group)
+        points = gmsh.model.mesh.getNodesForPhysicalGroup(dim, group)[0] if name else ()
+        if len(points):
+            places["marks", len(marks)] = f"node {', '.join(map(str, points))}"
+            marks.append(Mark(name, tuple(nodes[[at[int(tag)]], :2] for tag in points)))
     for name, pairs in lines.items():
+        if is_mark(name):
+            places["marks", len(marks)] = f"curves {', '.join(map(str, where[name]))}"
+            runs = tuple(nodes[_corners_of(run, nodes, {}, closed=False), :2] for run in chains(pairs))
+            marks.append(Mark(name, runs))
+            continue
         inner = [pair for pair in pairs if (min(pair), max(pair)) not in rim]
         if not inner:
             continue
@@ -91,7 +102,7 @@ def drawing_of_mesh(gmsh, path: Path):
             warnings.append(
                 (f"{path.name}: physical curve {name!r} bounds no named surface", f'a crack is called "{CRACK}{name}"')
             )
-    return GmshDrawing(tuple(zones), tuple(traces), {}, tuple(warnings), tuple(joints), places)
+    return GmshDrawing(tuple(zones), tuple(traces), {}, tuple(warnings), tuple(joints), places, tuple(marks))
 
 
 def _corners(gmsh, dim: int, entity: int, at: dict[int, int]) -> np.ndarray:

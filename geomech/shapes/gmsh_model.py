@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from .field_lines import METRES
 from .gmsh_session import gmsh_session
-from .parts import JOINT, Joint, Trace, Zone
+from .parts import JOINT, Joint, Mark, Trace, Zone, is_mark
 
 #: Curved edges become chords that leave the curve by at most this, in units of the model's largest side.
 CHORD = 1e-4
 
 #: Physical curves whose name starts so are cracks; every other name belongs to edges of blocks.
 CRACK = "crack:"
+
+#: Files of shapes that say their unit.
+STEP = (".step", ".stp")
+_SI_LENGTH = re.compile(r"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
+_PREFIXES = {"": 1.0, "MILLI": 1e-3, "CENTI": 1e-2, "DECI": 0.1, "KILO": 1e3, "MICRO": 1e-6}
+_OLD_LENGTHS = {"INCH": 0.0254, "FOOT": 0.3048}
 
 
 class GmshModelError(ValueError):
@@ -43,7 +51,8 @@ class Parameter:
 class GmshDrawing:
     """What a model holds: ``zones`` (with named edges), ``traces`` of cracks, its ``parameters`` by short name as used,
     ``warnings`` as (message, way out): whatever is drawn and left out; ``joints``; and where they stand in the model:
-    ``places`` says, for ("zones" | "cracks" | "joints", index), which entities they are."""
+    ``places`` says, for ("zones" | "cracks" | "joints" | "marks", index), which entities they are; ``marks`` are bolts, water
+    tables and measuring points."""
 
     zones: tuple[Zone, ...]
     traces: tuple[Trace, ...]
@@ -51,18 +60,25 @@ class GmshDrawing:
     warnings: tuple[tuple[str, str], ...] = ()
     joints: tuple[Joint, ...] = ()
     places: Mapping[tuple[str, int], str] = field(default_factory=dict)
+    marks: tuple[Mark, ...] = ()
 
 
 def read_gmsh_model(
-    path: str | Path, parameters: Mapping[str, float | str] | None = None, chord_tolerance: float | None = None
+    path: str | Path,
+    parameters: Mapping[str, float | str] | None = None,
+    chord_tolerance: float | None = None,
+    unit: str | None = None,
 ) -> GmshDrawing:
     """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep, .step.
 
     A parameter is known by the last part of its name in the side panel ("Parameters/Cracks/phi_deg" is ``phi_deg``)
     or by the whole; where the model offers named choices the name may be given. Physical surfaces are zones, one
     block a surface; physical curves called "crack:NAME" are cracks; those called "joint:NAME" that bound no surface are
-    joints; all other physical curves name the block edges on them. A .brep or .step without physical surfaces gives a
-    zone a surface, and what its shapes are called there names surfaces and curves. Curved edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side).
+    joints; "bolt:NAME", "water" and "water:NAME" are lines that cut nothing, and physical points called "monitor:NAME" or
+    "probe:NAME" measuring points; all other physical curves name the block edges on them. A .brep or .step without physical
+    surfaces gives a zone a surface, and what its shapes are called there names surfaces and curves. Curved edges become
+    chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side). ``unit`` (a key of
+    `geomech.shapes.field_lines.METRES`) is what the model is drawn in, default m; for a .step, what the file says.
 
     Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
     named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
@@ -75,6 +91,10 @@ def read_gmsh_model(
             f"there is no file {path}",
             f"did you mean {close[0]}?" if close else "paths are relative to the scene file",
         )
+    metres = METRES[unit or "m"]
+    if path.suffix.lower() in STEP:
+        # Every length of a STEP file arrives in millimetres, whatever its unit.
+        metres = 1e-3 if unit is None else 1e-3 * metres / _metres_in_step(path)
     with gmsh_session() as gmsh:
         known = _open(gmsh, path)
         if parameters:
@@ -82,8 +102,35 @@ def read_gmsh_model(
         if path.suffix == ".msh":
             from .gmsh_mesh import drawing_of_mesh
 
-            return drawing_of_mesh(gmsh, path)
-        return _drawing(gmsh, path, known, chord_tolerance)
+            found = drawing_of_mesh(gmsh, path)
+        else:
+            found = _drawing(gmsh, path, known, None if chord_tolerance is None else chord_tolerance / metres)
+    return found if metres == 1.0 else _scaled(found, metres)
+
+
+def _metres_in_step(path: Path) -> float:
+    """The unit of length of a STEP file, m (ISO 10303-41: SI units with a prefix, or conversion-based ones)."""
+    text = path.read_text(encoding="latin-1")
+    for name, metres in _OLD_LENGTHS.items():
+        if f"CONVERSION_BASED_UNIT('{name}'" in text.replace(" ", "").upper():
+            return metres
+    found = _SI_LENGTH.search(text)
+    if found is None or (found[1] or "") not in _PREFIXES:
+        raise GmshModelError(f"{path.name} says no unit of length", "export it again, in metres or millimetres")
+    return _PREFIXES[found[1] or ""]
+
+
+def _scaled(found: GmshDrawing, factor: float) -> GmshDrawing:
+    def lines(item):
+        return replace(item, lines=tuple(factor * line for line in item.lines))
+
+    return replace(
+        found,
+        zones=tuple(replace(zone, loops=tuple(factor * loop for loop in zone.loops)) for zone in found.zones),
+        traces=tuple(map(lines, found.traces)),
+        joints=tuple(map(lines, found.joints)),
+        marks=tuple(map(lines, found.marks)),
+    )
 
 
 def _open(gmsh, path: Path) -> dict[str, Parameter]:
@@ -93,12 +140,17 @@ def _open(gmsh, path: Path) -> dict[str, Parameter]:
     gmsh.model.add("geomech")
     gmsh.parser.clear()  # DefineConstant keeps what a variable of that name already holds
     gmsh.logger.start()
+    unit = gmsh.option.getString("Geometry.OCCTargetUnit")
+    # OpenCASCADE's own choice, but it keeps what a caller may have chosen before, and would keep another after.
+    gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
     try:
         gmsh.merge(str(path))
         gmsh.model.occ.synchronize()
         error = None
     except Exception as raised:  # noqa: BLE001 (Gmsh raises nothing narrower)
         error = str(raised)
+    finally:
+        gmsh.option.setString("Geometry.OCCTargetUnit", unit)
     errors = [line[len("Error: ") :] for line in gmsh.logger.get() if line.startswith("Error: ")]
     gmsh.logger.stop()
     if error or errors:
@@ -191,9 +243,17 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
     used = {abs(t) for _, _, tags in groups[2] for tag in tags for t in _outline(gmsh, tag)}
     edge_name: dict[int, str] = {}
     traced: set[int] = set()
-    traces, joints, places = [], [], {}
+    traces, joints, marks, places = [], [], [], {}
+    for name, _, tags in groups[0]:
+        places["marks", len(marks)] = _entities("point", tags)
+        marks.append(Mark(name, tuple(np.array([gmsh.model.getValue(0, tag, [])[:2]]) for tag in tags)))
     for name, _, tags in groups[1]:
         inner = [tag for tag in tags if tag not in used]
+        if is_mark(name):
+            places["marks", len(marks)] = _entities("curve", tags)
+            marks.append(Mark(name, tuple(curves.polyline(tag)[0] for tag in tags)))
+            traced.update(tags)
+            continue
         if name.startswith(CRACK):
             places["cracks", len(traces)] = _entities("curve", tags)
             traces.append(Trace(name[len(CRACK) :], tuple(curves.chained(tags))))
@@ -237,16 +297,19 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             )
     warnings += _lost_curves(gmsh, path, curves, zones, used | traced | told)
     warnings += _out_of_plane(gmsh, path, max(box[3] - box[0], box[4] - box[1]))
-    return GmshDrawing(tuple(zones), tuple(traces), parameters, tuple(warnings), tuple(joints), places)
+    return GmshDrawing(tuple(zones), tuple(traces), parameters, tuple(warnings), tuple(joints), places, tuple(marks))
 
 
 def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:
-    """(name, physical tag, entities) of all physical curves (1) and surfaces (2). A file of shapes has no physical groups:
-    there every surface counts, and shapes are called what the file calls them."""
-    groups: dict[int, list[tuple[str, int, list[int]]]] = {1: [], 2: []}
-    for dim in (1, 2):
+    """(name, physical tag, entities) of all physical points (0), curves (1) and surfaces (2). A file of shapes has no physical
+    groups: there every surface counts, and shapes are called what the file calls them. Points without a name only held a
+    size of elements, or a place."""
+    groups: dict[int, list[tuple[str, int, list[int]]]] = {0: [], 1: [], 2: []}
+    for dim in (0, 1, 2):
         for _, group in gmsh.model.getPhysicalGroups(dim):
             name = gmsh.model.getPhysicalName(dim, group)
+            if not name and dim == 0:
+                continue
             if not name and dim == 1:
                 warnings.append(
                     (f"{path.name}: physical curve {group} has no name", 'name it: Physical Curve("NAME") = {…}')
@@ -254,8 +317,8 @@ def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int
                 continue
             tags = [int(tag) for tag in gmsh.model.getEntitiesForPhysicalGroup(dim, group)]
             groups[dim].append((name or f"zone {group}", group, tags))
-    if path.suffix.lower() in (".brep", ".step", ".stp") and not groups[2]:
-        for dim in (1, 2):
+    if path.suffix.lower() in (".brep", *STEP) and not groups[2]:
+        for dim in (0, 1, 2):
             called: dict[str, list[int]] = {}
             for _, tag in gmsh.model.getEntities(dim):
                 name = gmsh.model.getEntityName(dim, tag).rpartition("/")[2]

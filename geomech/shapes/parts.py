@@ -41,6 +41,15 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
+class Mark:
+    """Lines or points of one name that cut nothing: ``name`` is "bolt:NAME", "water", "water:NAME" or "monitor:NAME" (each
+    may be without NAME), ``lines`` (n, 2) arrays, of one row for points."""
+
+    name: str
+    lines: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class EdgeLine:
     """A name for all block edges that lie on the straight piece from ``start`` to ``end`` (of ``zone`` alone, if
     given)."""
@@ -49,6 +58,11 @@ class EdgeLine:
     start: tuple[float, float]
     end: tuple[float, float]
     zone: str | None = None
+
+
+def is_mark(name: str) -> bool:
+    """Whether lines of this ``name`` are bolts or a water table, which cut nothing."""
+    return name.partition(":")[0] in ("bolt", "water")
 
 
 class Flaw(NamedTuple):

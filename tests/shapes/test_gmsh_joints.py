@@ -115,10 +115,43 @@ def test_files_of_shapes_give_a_zone_a_surface(tmp_path, suffix):
         gmsh.model.occ.cut([(2, rock)], [(2, tunnel)])
         gmsh.model.occ.synchronize()
         gmsh.write(str(path))
-    drawing, cutting = cutting_of(path, chord_tolerance=1e-5)
+    # Gmsh says mm in every STEP file; a .brep says nothing.
+    drawing, cutting = cutting_of(path, chord_tolerance=1e-5, unit="m")
     # Chords stand inside the circle: the hole is too small, by less than its rim times the tolerance.
     assert 0 < cutting.blocks.areas()[0] - (12 - math.pi / 4) < math.pi * 1e-5
     assert drawing.zones[0].name
+
+
+@pytest.mark.parametrize(
+    ("suffix", "says", "unit", "metres"),
+    [
+        ("step", "MILLI", None, 1e-3),
+        ("step", "$", None, 1.0),
+        ("step", "CENTI", None, 1e-2),
+        ("step", "MILLI", "m", 1.0),
+        ("step", "$", "mm", 1e-3),
+        ("brep", "", None, 1.0),
+        ("brep", "", "mm", 1e-3),
+        ("geo", "", "ft", 0.3048),
+    ],
+)
+def test_lengths_arrive_in_metres(tmp_path, suffix, says, unit, metres):
+    path = tmp_path / f"shape.{suffix}"
+    if suffix == "geo":
+        path.write_text('SetFactory("OpenCASCADE");Rectangle(1)={0,0,0,60,120};Physical Surface("rock")={1};\n')
+    else:
+        with gmsh_session() as gmsh:
+            gmsh.model.occ.addRectangle(0, 0, 0, 60, 120)
+            gmsh.model.occ.synchronize()
+            gmsh.write(str(path))
+    if says:
+        # What the file says is known: ISO 10303-41 puts it into SI_UNIT.
+        text, said = path.read_text(), says if says == "$" else f".{says}."
+        assert text.count("SI_UNIT(.MILLI.,.METRE.)") == 1
+        path.write_text(text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT({said},.METRE.)"))
+    drawing, cutting = cutting_of(path, unit=unit)
+    assert np.ptp(drawing.zones[0].loops[0], axis=0) == pytest.approx([60 * metres, 120 * metres], rel=1e-12)
+    assert cutting.blocks.areas() == pytest.approx([7200 * metres**2], rel=1e-12)
 
 
 SCENE = """

@@ -117,8 +117,34 @@ class JointSetShape(Table):
         return self
 
 
+Unit = Literal["m", "km", "cm", "mm", "ft", "in"]
+
+
+class TraceFile(Table):
+    file: str = Field(description="traces mapped in the field, .dxf, .csv or .geojson, relative to the scene file")
+    name: str | None = Field(
+        None, description="name of the joints, or cracks, of all its layers (unset: layers' own names)"
+    )
+    kind: Literal["joint", "crack"] = Field(
+        "joint", description='what its traces are; layers called "zone-NAME", "bolt-NAME", "water", … say it themselves'
+    )
+    layers: dict[str, str] = Field(
+        {},
+        description='what its layers (or sets; wildcards) are: { "J1*" = "joint:bedding", "Rock" = "zone:rock" }, also "crack:", '
+        '"hole", "edge:", "load:", "fixed", "bolt:", "water", "monitor:"; "" leaves it to the layer\'s name; layers that it '
+        "does not mean are left out (unset: all are read)",
+    )
+    unit: Unit | None = Field(
+        None, description="unit it is drawn in (unset: geometry.unit, else what a DXF says, else m)"
+    )
+    zones: Names = Field((), description="names of the zones that its joints cut (unset: all)")
+    set_property: str = Field("set", description="property of GeoJSON features that names their set")
+
+
 class Geometry(Table):
-    model: str | None = Field(None, description="Gmsh model (.geo), relative to the scene file")
+    model: str | None = Field(
+        None, description="Gmsh model (.geo, .geo_unrolled, .msh, .step, .brep), relative to the scene file"
+    )
     parameters: dict[str, Finite | str] = Field({}, description="values for the model's parameters, by name")
     zones: Annotated[tuple[ZoneShape, ...], Strict(False)] = Field(
         (), description="zones drawn here instead of a model"
@@ -126,6 +152,17 @@ class Geometry(Table):
     cracks: Annotated[tuple[CrackShape, ...], Strict(False)] = Field((), description="cracks drawn here")
     edges: Annotated[tuple[EdgeShape, ...], Strict(False)] = Field((), description="names for block edges drawn here")
     joints: Annotated[tuple[JointShape, ...], Strict(False)] = Field((), description="joints that cut rock into blocks")
+    traces: Annotated[tuple[TraceFile, ...], Strict(False)] = Field((), description="files with traces of the field")
+    unit: Unit | None = Field(
+        None,
+        description="unit that the model and the traces are drawn in (unset: what DXF and STEP files say, else m; Gmsh says "
+        "mm in every STEP file that it writes)",
+    )
+    origin: Pair | None = Field(
+        None,
+        description="world coordinates of the run's origin, [x, y], m: all coordinates here and in files are the world's "
+        "(unset: [0, 0], or near the rock where traces lie far away)",
+    )
     joint_sets: Annotated[tuple[JointSetShape, ...], Strict(False)] = Field(
         (), description="joints by statistics, in order: later sets may end on those before"
     )
@@ -147,7 +184,7 @@ class Geometry(Table):
 
     @model_validator(mode="after")
     def _one_source(self):
-        if self.model is None and not self.zones:
+        if self.model is None and not self.zones and not self.traces:
             raise ValueError("no rock: give `model` (a Gmsh .geo file) or at least one [[geometry.zones]]")
         if self.model is not None and (self.zones or self.cracks or self.edges):
             raise ValueError(

@@ -172,7 +172,12 @@ class BaseTable(Timed):
 
 
 class WaterTableTable(Table):
-    points: Points = Field(description="the water table, [[x, y], …], m, x ascending, level beyond its ends")
+    points: Points | None = Field(
+        None, description="the water table, [[x, y], …], m, x ascending, level beyond its ends (unset: the drawing's)"
+    )
+    line: str | None = Field(
+        None, description='name of the drawn line that is the water table, as "water:high" (unset: "water")'
+    )
     unit_weight_n_per_m3: Positive = Field(9810.0, description="unit weight of water, N/m³")
     dry_edges: Names = Field((), description="names of edges that no water reaches")
     level_times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
@@ -184,7 +189,9 @@ class WaterTableTable(Table):
 
     @model_validator(mode="after")
     def _line(self):
-        xs = [x for x, _ in self.points]
+        if self.points is not None and self.line is not None:
+            raise ValueError("give either `points`, or the name of a drawn `line`")
+        xs = [x for x, _ in self.points] if self.points is not None else [0.0]
         if not xs or any(b <= a for a, b in itertools.pairwise(xs)):
             raise ValueError("`points` must be at least one, ascending in x")
         if (self.level_times_s is None) != (self.levels_m is None):
@@ -198,9 +205,14 @@ class WaterTableTable(Table):
 
 
 class BoltTable(Table):
-    name: str = Field("bolt", description="name of the bolt in history.csv")
-    start: Pair = Field(description="its one end, a material point of a block, [x, y], m")
-    end: Pair = Field(description="its other end, [x, y], m")
+    name: str = Field("bolt", description="name of the bolt in history.csv (of drawn ones: their own)")
+    start: Pair | None = Field(None, description="its one end, a material point of a block, [x, y], m")
+    end: Pair | None = Field(None, description="its other end, [x, y], m")
+    lines: Names = Field(
+        (),
+        description='names of drawn lines that are such bolts, with wildcards, as ["bolt:roof", "bolt:wall*"], '
+        "in place of `start` and `end`",
+    )
     zone: str | None = Field(None, description="zone of its one end, where two zones touch")
     end_zone: str | None = Field(None, description="zone of its other end, where two zones touch")
     end_in_ground: bool = Field(
@@ -227,6 +239,8 @@ class BoltTable(Table):
 
     @model_validator(mode="after")
     def _one_kind(self):
+        if bool(self.lines) == (self.start is not None) or (self.start is None) != (self.end is None):
+            raise ValueError("give `start` and `end`, or the names of drawn `lines`")
         grouted = self.axial_stiffness_n is not None
         if grouted == (self.stiffness_n_per_m is not None):
             raise ValueError("give `stiffness_n_per_m`, or `axial_stiffness_n` of a grouted bar")
@@ -234,7 +248,7 @@ class BoltTable(Table):
             raise ValueError("`axial_stiffness_n` and `active_length_m` go together")
         if grouted and (self.end_in_ground or self.zone is not None or self.end_zone is not None):
             raise ValueError("a grouted bar finds its blocks itself: leave out `zone`, `end_zone` and `end_in_ground`")
-        if self.start == self.end:
+        if self.start is not None and self.start == self.end:
             raise ValueError("both ends of the bolt are the same point")
         if self.yield_force_n_per_m is not None and self.pretension_n_per_m > self.yield_force_n_per_m:
             raise ValueError("the pretension is beyond the yield force")

@@ -17,7 +17,10 @@ class GaugeTable(Table):
 
 class MonitorTable(Table):
     name: str = Field(description="name of the monitor point in history.csv")
-    at: Pair = Field(description="material point whose displacement is recorded, [x, y], m")
+    at: Pair | None = Field(
+        None,
+        description='material point whose displacement is recorded, [x, y], m (unset: the drawn point "monitor:NAME")',
+    )
     zone: str | None = Field(None, description="zone of that point, where two zones touch")
 
 

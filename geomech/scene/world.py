@@ -1,0 +1,81 @@
+"""World coordinates: where the scene lies, and the scene moved to a local origin and back.
+
+All coordinates of a scene and of the files it names are of one frame, the world's. What is computed and written is local:
+world less origin. At five million metres north a coordinate has nine digits left for the rock instead of sixteen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..shapes.parts import extent_of
+from .tables import SceneTables
+
+#: An axis is moved where coordinates are this many times as large as the drawing.
+FAR = 100.0
+
+#: What of a scene is a place: "xy" a point or any nesting of points, "y" a level.
+PLACES: Mapping[str, Any] = {
+    "geometry": {
+        "zones": {"rectangle": "xy", "polygon": "xy", "holes": "xy"},
+        "cracks": {"points": "xy", "centre": "xy"},
+        "edges": {"line": "xy"},
+        "joints": {"points": "xy"},
+        "joint_sets": {"region": "xy"},
+    },
+    "loads": {
+        "tractions": {"profile": {"start": "xy", "end": "xy"}},
+        "forces": {"at": "xy"},
+        "point_motions": {"at": "xy"},
+        "water": {"points": "xy"},
+        "bolts": {"start": "xy", "end": "xy"},
+        "excavations": {"polygon": "xy"},
+        "in_situ": {"surface_m": "y", "about": "xy"},
+    },
+    "gauge": {"start": "xy", "to": "xy"},
+    "monitors": {"at": "xy"},
+}
+
+
+def local_origin(given: tuple[float, float] | None, drawn: Iterable[np.ndarray], far_is_moved: bool) -> np.ndarray:
+    """(2,) world coordinates of the local origin: as ``given``, or, where that is None and ``far_is_moved``, a round place
+    at the lower left of what is ``drawn`` (arrays (n, 2)), on each axis that lies far from 0."""
+    if given is not None:
+        return np.array(given, dtype=float)
+    drawn = [np.asarray(points) for points in drawn if len(points)]
+    size = extent_of(drawn)
+    if not far_is_moved or size == 0.0 or not math.isfinite(size):
+        return np.zeros(2)
+    step = 10.0 ** math.floor(math.log10(size))
+    low, high = np.min([p.min(axis=0) for p in drawn], axis=0), np.max([p.max(axis=0) for p in drawn], axis=0)
+    far = np.maximum(np.abs(low), np.abs(high)) > FAR * size
+    return np.where(far, step * np.floor(low / step), 0.0)
+
+
+def moved(tables: SceneTables, origin: tuple[float, float]) -> SceneTables:
+    """``tables`` with all places less ``origin``; a section that is faulty (None) stays so."""
+    return _moved(tables, PLACES, origin) if any(origin) else tables
+
+
+def moved_section(section: Any, name: str, origin: np.ndarray) -> Any:
+    """The ``section`` of a scene called ``name``, with its places less ``origin``."""
+    return _moved(section, PLACES[name], tuple(origin.tolist()))
+
+
+def _moved(value: Any, places: Any, origin: tuple[float, float]) -> Any:
+    if value is None:
+        return None
+    if places == "y":
+        return value - origin[1]
+    if places == "xy":
+        if isinstance(value[0], tuple) if value else True:
+            return tuple(_moved(item, places, origin) for item in value)
+        # A pair, or the two corners of a rectangle one after the other.
+        return tuple(part - origin[k % 2] for k, part in enumerate(value))
+    if isinstance(value, tuple):
+        return tuple(_moved(item, places, origin) for item in value)
+    return value.model_copy(update={key: _moved(getattr(value, key), own, origin) for key, own in places.items()})

@@ -1,0 +1,269 @@
+"""DXF drawings as lines by layer: curves become chords, blocks are exploded, hidden layers are left out."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .field_lines import METRES, FieldFile, FieldFileError, FieldLine
+
+#: Chords leave curves by at most this, in units of the drawing's largest side, where no tolerance is given.
+CHORD = 1e-4
+#: What $INSUNITS says (DXF reference, "Drawing units"), m; 0 is "unitless".
+_INSUNITS = {
+    1: 0.0254, 2: 0.3048, 3: 1609.344, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 8: 2.54e-8, 9: 2.54e-5, 10: 0.9144, 13: 1e-6,
+    14: 0.1, 15: 10.0, 16: 100.0, 21: 1200 / 3937,
+}  # fmt: skip
+#: A closed curve is at least a square, an arc of a third of a turn two chords.
+_LEAST_TURN = math.pi / 2
+#: References to references, deeper than this, go in a circle.
+_DEEPEST = 32
+
+
+def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None = None) -> FieldFile:
+    """The lines of the model space of a DXF file, in m: LINE, LWPOLYLINE and POLYLINE with bulges, ARC, CIRCLE, ELLIPSE,
+    SPLINE, POINT and what INSERT puts there of them.
+
+    ``unit`` (a key of `METRES`) overrides the file's $INSUNITS; ``chord_tolerance`` m, default `CHORD` of the largest side.
+    Layers that are off or frozen and other kinds of entities are left out and told. What a block draws on layer 0 is on the
+    layer of its INSERT. Raises FieldFileError for a file that cannot be read, or where ezdxf is not installed.
+    """
+    try:
+        import ezdxf
+        from ezdxf import bbox, recover
+    except ImportError as error:
+        raise FieldFileError(
+            f"{path.name}: DXF files are read by ezdxf, which is not installed ({error})", "`pip install ezdxf`"
+        ) from error
+    try:
+        try:
+            document = ezdxf.readfile(path)
+        except (ezdxf.DXFStructureError, UnicodeDecodeError):
+            # Some programs write what the format does not allow; what can be saved of it is read.
+            document, _ = recover.readfile(path)
+    except (ezdxf.DXFError, OSError, ValueError) as error:
+        raise FieldFileError(
+            f"{path.name} cannot be read as DXF: {error}", "save it as DXF again (R2000 or later)"
+        ) from error
+    warnings: list[tuple[str, str]] = []
+    factor = _factor(document, path, unit, warnings)
+    reader = _Reader(document, path)
+    entities = list(reader.entities())
+    box = bbox.extents((entity for _, entity in entities), fast=True)
+    size = max(box.size.x, box.size.y) if box.has_data else 1.0
+    chord = CHORD * size if chord_tolerance is None else chord_tolerance / factor
+    lines, heights = [], []
+    for layer, entity in entities:
+        points, closed = reader.points(entity, chord)
+        heights.append(float(np.abs(points[:, 2]).max()))
+        if len(points) > 1:
+            points = points[np.append(True, (np.diff(points[:, :2], axis=0) != 0).any(axis=1))]
+        if closed and len(points) > 1 and np.hypot(*(points[0] - points[-1])[:2]) <= 1e-12 * size:
+            points = points[:-1]
+        if len(points) < 2 and entity.dxftype() != "POINT":
+            reader.left[entity.dxftype() + " without length"] += 1
+            continue
+        place = f"{path.name}: layer {layer!r}, {entity.dxftype()}"
+        place += f" #{entity.dxf.handle}" if entity.dxf.handle else " of a block"
+        shape = "closed" if closed and len(points) > 2 else "line"
+        lines.append(FieldLine(layer, factor * points[:, :2], place, shape))
+    if heights and max(heights) > 1e-9 * size:
+        warnings.append(
+            (
+                f"{path.name}: {sum(h > 1e-9 * size for h in heights)} entities have z ≠ 0 (up to {max(heights) * factor:g} m)",
+                "the rock is plane and z is left away: draw the section in x and y",
+            )
+        )
+    return FieldFile(tuple(lines), tuple(warnings + reader.told()))
+
+
+def _factor(document: Any, path: Path, unit: str | None, warnings: list[tuple[str, str]]) -> float:
+    """Metres in a unit of the drawing."""
+    if unit is not None:
+        return METRES[unit]
+    code = int(document.header.get("$INSUNITS", 0))
+    if code in _INSUNITS:
+        return _INSUNITS[code]
+    said = (
+        "names no unit ($INSUNITS is 0)"
+        if code == 0
+        else f"is in a unit that no rock is measured in ($INSUNITS {code})"
+    )
+    warnings.append((f"{path.name} {said}: taken for metres", 'say its unit: unit = "m", "mm", …'))
+    return 1.0
+
+
+class _Reader:
+    """Entities of a document's model space that are seen, and what was left out."""
+
+    def __init__(self, document: Any, path: Path) -> None:
+        self.document, self.path = document, path
+        self.hidden: Counter[str] = Counter()
+        self.left: Counter[str] = Counter()
+
+    def entities(self) -> Iterator[tuple[str, Any]]:
+        """(layer, entity) of all curves and points, INSERTs exploded."""
+        yield from self._of(self.document.modelspace(), "0", 0)
+
+    def _of(self, entities: Any, host: str, depth: int) -> Iterator[tuple[str, Any]]:
+        for entity in entities:
+            layer = entity.dxf.get("layer", "0")
+            # Layer 0 inside a block stands for the layer that the block is put on.
+            layer = host if layer == "0" and depth else layer
+            if self._is_hidden(layer) or entity.dxf.get("invisible", 0):
+                self.hidden[layer] += 1
+            elif entity.dxftype() == "INSERT":
+                if depth >= _DEEPEST:
+                    raise FieldFileError(
+                        f"{self.path.name}: block {entity.dxf.name!r} holds itself", "remove the circle of references"
+                    )
+                parts = [entity] if not entity.mcount > 1 else entity.multi_insert()
+                for part in parts:
+                    inner = part.virtual_entities(skipped_entity_callback=self._skipped)
+                    yield from self._of(inner, layer, depth + 1)
+            elif entity.dxftype() in _POINTS and not (entity.dxftype() == "POLYLINE" and not _is_line(entity)):
+                yield layer, entity
+            else:
+                self.left[entity.dxftype()] += 1
+
+    def _is_hidden(self, name: str) -> bool:
+        if name not in self.document.layers:
+            return False
+        layer = self.document.layers.get(name)
+        return layer.is_off() or layer.is_frozen()
+
+    def _skipped(self, entity: Any, reason: str) -> None:
+        self.left[f"{entity.dxftype()} in a block ({reason})"] += 1
+
+    def points(self, entity: Any, chord: float) -> tuple[np.ndarray, bool]:
+        """(n, 3) points of an entity, in the file's unit, and whether it closes."""
+        points, closed = _POINTS[entity.dxftype()](entity, chord)
+        points = np.array([tuple(point)[:3] for point in points], dtype=float).reshape(-1, 3)
+        if not np.isfinite(points).all():
+            raise FieldFileError(
+                f"{self.path.name}: {entity.dxftype()} #{entity.dxf.handle} has a coordinate that is no finite number",
+                "delete or redraw it",
+            )
+        return points, closed
+
+    def told(self) -> list[tuple[str, str]]:
+        warnings = []
+        if self.hidden:
+            listed = ", ".join(f"{name!r} ({number})" for name, number in sorted(self.hidden.items()))
+            warnings.append(
+                (f"{self.path.name}: hidden layers are left out: {listed}", "turn them on and thaw them in the drawing")
+            )
+        if self.left:
+            listed = ", ".join(f"{number} {kind}" for kind, number in sorted(self.left.items()))
+            warnings.append(
+                (f"{self.path.name}: no traces, left out: {listed}", "explode what should be lines in the drawing")
+            )
+        return warnings
+
+
+def _is_line(polyline: Any) -> bool:
+    return polyline.is_2d_polyline or polyline.is_3d_polyline
+
+
+def _line(entity: Any, chord: float) -> tuple[Any, bool]:
+    return [entity.dxf.start, entity.dxf.end], False
+
+
+def _arc(entity: Any, chord: float) -> tuple[Any, bool]:
+    radius, extrusion = abs(entity.dxf.radius), entity.ocs()
+    first = math.radians(entity.dxf.start_angle)
+    turn = math.radians((entity.dxf.end_angle - entity.dxf.start_angle) % 360.0) or 2 * math.pi
+    centre = entity.dxf.center
+    return extrusion.points_to_wcs(_turned(centre.x, centre.y, centre.z, radius, first, turn, chord)), False
+
+
+def _circle(entity: Any, chord: float) -> tuple[Any, bool]:
+    centre = entity.dxf.center
+    points = _turned(centre.x, centre.y, centre.z, abs(entity.dxf.radius), 0.0, 2 * math.pi, chord)
+    return entity.ocs().points_to_wcs(points[:-1]), True
+
+
+def _turned(
+    x: float, y: float, z: float, radius: float, first: float, turn: float, chord: float
+) -> list[tuple[float, float, float]]:
+    angles = first + np.linspace(0.0, turn, _pieces(radius, turn, chord) + 1)
+    return [(x + radius * math.cos(a), y + radius * math.sin(a), z) for a in angles]
+
+
+def _pieces(radius: float, turn: float, chord: float) -> int:
+    """Chords over an arc: one over the angle a leaves it by r (1 - cos a/2)."""
+    each = 2 * math.acos(1 - chord / radius) if chord < radius else math.pi
+    return max(1, math.ceil(abs(turn) / min(each, _LEAST_TURN) - 1e-9))
+
+
+def _lwpolyline(entity: Any, chord: float) -> tuple[Any, bool]:
+    rows = list(entity.get_points("xyb"))
+    points = _bulged(rows, entity.closed, chord)
+    height = entity.dxf.elevation
+    return entity.ocs().points_to_wcs([(x, y, height) for x, y in points]), entity.closed
+
+
+def _polyline(entity: Any, chord: float) -> tuple[Any, bool]:
+    closed = entity.is_closed
+    if entity.is_3d_polyline:
+        return list(entity.points()), closed
+    # Control points of a fitted curve are no part of it.
+    vertices = [v for v in entity.vertices if not v.dxf.flags & 16]
+    rows = [(v.dxf.location.x, v.dxf.location.y, v.dxf.bulge) for v in vertices]
+    height = vertices[0].dxf.location.z if vertices else 0.0
+    return entity.ocs().points_to_wcs([(x, y, height) for x, y in _bulged(rows, closed, chord)]), closed
+
+
+def _bulged(rows: list[tuple[float, float, float]], closed: bool, chord: float) -> list[tuple[float, float]]:
+    """Vertices with the points of arcs between them; a bulge is the tangent of a quarter of its arc's angle, positive to the
+    left of the way from end to end as the arc turns."""
+    points: list[tuple[float, float]] = []
+    for k, (x, y, bulge) in enumerate(rows):
+        points.append((x, y))
+        if not bulge or (k + 1 == len(rows) and not closed):
+            continue
+        x1, y1, _ = rows[(k + 1) % len(rows)]
+        dx, dy = x1 - x, y1 - y
+        length = math.hypot(dx, dy)
+        if length == 0.0:
+            continue
+        radius, turn = 0.25 * length * (1 / bulge + bulge), 4 * math.atan(bulge)
+        # The centre lies to the left of the chord for an arc of less than half a turn counter-clockwise.
+        off = radius - 0.5 * length * bulge
+        cx, cy = x + 0.5 * dx - off * dy / length, y + 0.5 * dy + off * dx / length
+        first = math.atan2(y - cy, x - cx)
+        n = _pieces(abs(radius), turn, chord)
+        for angle in first + turn * np.arange(1, n) / n:
+            points.append((cx + abs(radius) * math.cos(angle), cy + abs(radius) * math.sin(angle)))
+    return points
+
+
+def _ellipse(entity: Any, chord: float) -> tuple[Any, bool]:
+    points = list(entity.flattening(chord, segments=8))
+    return points, len(points) > 2 and points[0].isclose(points[-1])
+
+
+def _spline(entity: Any, chord: float) -> tuple[Any, bool]:
+    points = list(entity.flattening(chord, segments=4))
+    return points, len(points) > 2 and points[0].isclose(points[-1])
+
+
+def _point(entity: Any, chord: float) -> tuple[Any, bool]:
+    return [entity.dxf.location], False
+
+
+_POINTS = {
+    "LINE": _line,
+    "ARC": _arc,
+    "CIRCLE": _circle,
+    "LWPOLYLINE": _lwpolyline,
+    "POLYLINE": _polyline,
+    "ELLIPSE": _ellipse,
+    "SPLINE": _spline,
+    "POINT": _point,
+}
