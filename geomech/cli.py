@@ -127,11 +127,18 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--gif", action=argparse.BooleanOptionalAction, default=None, help="draw the movie")
 
     report = verb(
-        "report", _report, "tabulate what runs came to: loads of initiation and coalescence, growth, time",
-        "geomech report outputs/two_cracks/*",
+        "report", _report, "tabulate what runs came to, and write a page with tables, curves and pictures: report.html",
+        "geomech report outputs/two_cracks/phi_0\ngeomech report outputs/two_cracks\ngeomech report outputs/bench_ddm",
     )  # fmt: skip
-    report.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="run folders, or folders of run folders")
-    report.add_argument("--csv", action="store_true", help="write the table as CSV")
+    report.description += (
+        " The page is one file that needs nothing else: of a run, of runs side by side, or of what a benchmark left."
+    )
+    report.add_argument(
+        "runs", nargs="+", type=Path, metavar="RUN", help="run folders, folders of run folders, or a benchmark's folder"
+    )
+    report.add_argument("--csv", action="store_true", help="write the table as CSV, and no page")
+    report.add_argument("--out", type=Path, metavar="FILE", help="where the page goes (default report.html in RUN)")
+    report.add_argument("--page", action=argparse.BooleanOptionalAction, default=True, help="write the page")
 
     bench = verb(
         "bench", _bench, "measure what things cost and how right they are (run it in the project's folder)",
@@ -335,11 +342,18 @@ def _render(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace) -> int:
     from .output import Run
-    from .report import as_csv, as_text, table
+    from .report import as_csv, as_text, is_benchmark, table, write_page
 
-    folders = [found for place in options.runs for found in _run_folders(place)]
-    rows = table([_open_run(Run, folder) for folder in folders])
-    print(as_csv(rows) if options.csv else as_text(rows))
+    place, benchmark = options.runs[0], len(options.runs) == 1 and is_benchmark(options.runs[0])
+    folders = [] if benchmark else [found for place in options.runs for found in _run_folders(place)]
+    runs = [_open_run(Run, folder) for folder in folders]
+    if runs:
+        rows = table(runs)
+        print(as_csv(rows) if options.csv else as_text(rows))
+    if options.page and not options.csv:
+        if len(options.runs) > 1:
+            place = Path(os.path.commonpath([folder.resolve() for folder in folders]))
+        _say(f"page: {write_page(place, runs, options.out)}")
     return DONE
 
 

@@ -242,7 +242,7 @@ def test_default_folder_is_named_after_the_scene():
 
 
 def test_report_of_a_folder_of_runs(finished, capsys):
-    assert main(["report", str(finished.parent)]) == DONE
+    assert main(["report", str(finished.parent), "--no-page"]) == DONE
     header, row = capsys.readouterr().out.splitlines()
     assert header.split()[:2] == ["run", "end"]
     assert row.startswith("one")

@@ -1,7 +1,9 @@
-"""Curves of a run: load against strain, stress intensity factors and crack length against load."""
+"""Curves of a run: load against strain, stress intensity factors and crack length against load; where there is no load or
+nothing cracks, energies and the monitors' ways against time."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,18 +21,75 @@ _COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#3d405b")
 _SAME = 0.01
 
 
-def plots(run: Run, folder: Path) -> list[Path]:
-    """Draw the curves that ``run`` has data for as PNG files in ``folder``; their paths."""
+#: Parts of the energy budget in the order they are drawn, and what they are called.
+_ENERGIES = {
+    "elastic_energy": "elastic",
+    "contact_energy": "contacts",
+    "kinetic_energy": "kinetic",
+    "crack_work": "cracks",
+    "friction_loss": "friction",
+    "damping_loss": "damping",
+    "bond_loss": "broken bonds",
+    "scheme_loss": "time scheme",
+    "overlap_energy": "overlaps",
+}
+
+
+def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -> list[Path]:
+    """Draw the curves that ``run`` has data for as files in ``folder``; their paths. ``suffix`` ".svg" draws lines that stay
+    sharp; ``more`` draws energies and monitors as well."""
+    history, tips = run.history, run.tips
+    loaded = np.isfinite(history["load"]).sum() > 1
     wanted = {
-        "stress_strain.png": (stress_strain, np.isfinite(run.history["strain"]).sum() > 1),
-        "stress_intensity.png": (stress_intensity, len(run.tips) > 0),
-        "crack_length.png": (crack_length, len(run.tips) > 0),
+        "stress_strain": (stress_strain, loaded and np.isfinite(history["strain"]).sum() > 1),
+        "stress_intensity": (stress_intensity, loaded and len(tips) > 0),
+        "crack_length": (crack_length, loaded and len(tips) > 0),
+        "energy": (energies, more and bool(_energy_curves(run))),
+        "monitors": (monitors, more and bool(_monitor_curves(run))),
     }
-    paths = []
-    for name, (curve, has_data) in wanted.items():
-        if has_data:
-            paths.append(_save(curve, run, folder / name))
-    return paths
+    return [
+        _save(curve, run, (folder / name).with_suffix(suffix)) for name, (curve, has_data) in wanted.items() if has_data
+    ]
+
+
+def energies(axes: Axes, run: Run) -> None:
+    """What the work of loads and gravity went into, against time: curves below a hundredth of the largest are left out."""
+    history = _to_the_end(run)
+    for k, (name, energy) in enumerate(_energy_curves(run).items()):
+        axes.plot(history["time"], energy, color=_COLOURS[k % len(_COLOURS)], lw=1.5, label=name)
+    # Beside the curves: there is no corner that one of them does not reach.
+    axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    axes.set(xlabel="time, s", ylabel="energy, J/m", title=run.title)
+
+
+def _energy_curves(run: Run) -> dict[str, np.ndarray]:
+    history = _to_the_end(run)
+    work = [history[name] for name in ("load_work", "gravity_work") if name in history.dtype.names]
+    curves = {"work done": np.nansum(work, axis=0)} if work else {}
+    curves |= {told: history[name] for name, told in _ENERGIES.items() if name in history.dtype.names}
+    largest = max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves.values()), default=0.0)
+    return {
+        name: curve
+        for name, curve in curves.items()
+        if np.nanmax(np.abs(curve), initial=0.0) > max(_SAME * largest, 0.0)
+    }
+
+
+def monitors(axes: Axes, run: Run) -> None:
+    """How far each monitored point has moved, against time."""
+    history = _to_the_end(run)
+    for k, (name, way) in enumerate(_monitor_curves(run).items()):
+        axes.plot(history["time"], 1e3 * way, color=_COLOURS[k % len(_COLOURS)], lw=1.5, label=name)
+    axes.legend(frameon=False, fontsize=8)
+    axes.set(xlabel="time, s", ylabel="displacement, mm", title=run.title)
+
+
+def _monitor_curves(run: Run) -> dict[str, np.ndarray]:
+    history = _to_the_end(run)
+    names = [
+        name[:-3] for name in history.dtype.names if name.endswith("_ux") and f"{name[:-3]}_uy" in history.dtype.names
+    ]
+    return {name: np.hypot(history[f"{name}_ux"], history[f"{name}_uy"]) for name in names[: len(_COLOURS)]}
 
 
 def stress_strain(axes: Axes, run: Run) -> None:
@@ -41,6 +100,27 @@ def stress_strain(axes: Axes, run: Run) -> None:
     _first_events(axes, run, sign * 1e3 * history["strain"])
     lengthening = ", lengthening positive" if sign < 0 else ""
     axes.set(xlabel=f"axial strain, 10⁻³{lengthening}", ylabel=_load_label(run), title=run.title)
+
+
+def compared(runs: Mapping[str, Run], path: Path) -> Path | None:
+    """Draw load against axial strain of ``runs``, by name, into one file; None where none of them has both."""
+    known = {
+        name: run for name, run in runs.items() if (np.isfinite(run.history["load"] + run.history["strain"])).sum() > 1
+    }
+    if not known:
+        return None
+
+    def curves(axes: Axes, _: Run) -> None:
+        for k, (name, run) in enumerate(known.items()):
+            history, sign = _to_the_end(run), _sense(run)
+            colour, line = _COLOURS[k % len(_COLOURS)], ("-", "--", ":")[k // len(_COLOURS) % 3]
+            axes.plot(
+                1e3 * sign * history["strain"], sign * history["load"] / 1e6, color=colour, ls=line, lw=1.4, label=name
+            )
+        axes.legend(frameon=False, fontsize=8)
+        axes.set(xlabel="axial strain, 10⁻³", ylabel="load, MPa")
+
+    return _save(curves, next(iter(known.values())), path)
 
 
 def stress_intensity(axes: Axes, run: Run) -> None:
@@ -175,5 +255,5 @@ def _save(curve, run: Run, path: Path) -> Path:
     curve(axes, run)
     axes.spines[["top", "right"]].set_visible(False)
     axes.title.set_fontsize(min(10.0, 10.0 * 72 / max(1, len(run.title))))
-    figure.savefig(path)
+    figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
     return path

@@ -7,7 +7,7 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from .output.reading import Run
+from ..output.reading import Run
 
 #: Header → how a number is written.
 COLUMNS = {

@@ -1,0 +1,34 @@
+"""What runs and benchmarks came to: a table for the terminal, a page for the reader."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..output.reading import Run
+from .table import COLUMNS, as_csv, as_text, table
+
+__all__ = ["COLUMNS", "as_csv", "as_text", "is_benchmark", "table", "write_page"]
+
+
+def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> Path:
+    """Write the page of ``runs``, which lie in ``folder`` (one: in it), or with none of the benchmark there; the file, by
+    default ``report.html`` in ``folder``."""
+    if not runs:
+        from .of_benchmark import page_of_benchmark
+
+        made = page_of_benchmark(folder)
+    elif len(runs) == 1:
+        from .of_run import page_of_run
+
+        made = page_of_run(runs[0])
+    else:
+        from .of_runs import page_of_runs
+
+        made = page_of_runs(runs, folder)
+    return made.write(folder / "report.html" if path is None else path)
+
+
+def is_benchmark(folder: Path) -> bool:
+    """Whether ``folder`` holds what `geomech bench` leaves, and no runs."""
+    return any(folder.glob("*.json")) and not any(folder.rglob("history.csv"))

@@ -1,0 +1,56 @@
+"""The page of a benchmark: its pictures, and the tables in the JSON that it left."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .page import Page
+
+#: So many rows of a table are shown, the rest is in the file.
+LISTED = 200
+
+
+def page_of_benchmark(folder: Path) -> Page:
+    """The page of the JSON files and pictures in ``folder``. Raises ValueError naming a file that is no JSON."""
+    page = Page(f"Benchmark {folder.name.removeprefix('bench_')}", f"from {folder}")
+    pictures = sorted(p for kind in ("*.png", "*.svg") for p in folder.glob(kind))
+    if pictures:
+        page.section("Plots")
+        page.figures([(path, path.stem.replace("_", " ")) for path in pictures], least_rem=30)
+    for path in sorted(folder.glob("*.json")):
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError as error:
+            raise ValueError(f"{path} is no JSON: {error}") from None
+        page.section(path.stem.replace("_", " "))
+        _add(page, found, "")
+    return page
+
+
+def _add(page: Page, value: Any, name: str) -> None:
+    """``value`` as a table, as tiles, or, where it holds more of them, one after the other."""
+    if isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
+        headers = list(dict.fromkeys(key for row in value for key in row if _plain(row[key])))
+        page.table(
+            [key.replace("_", " ") for key in headers], [[row.get(k) for k in headers] for row in value[:LISTED]], name
+        )
+        if len(value) > LISTED:
+            page.text(f"{len(value) - LISTED} more rows in the file.")
+    elif isinstance(value, Mapping):
+        plain = {key.replace("_", " "): inner for key, inner in value.items() if _plain(inner)}
+        if plain and name:
+            page.table([name, ""], list(plain.items()))
+        else:
+            page.facts(plain)
+        for key, inner in value.items():
+            if not _plain(inner):
+                _add(page, inner, " · ".join(filter(None, (name, key.replace("_", " ")))))
+    elif isinstance(value, list) and value:
+        page.text(f"{name}: " + ", ".join(map(str, value[:LISTED])))
+
+
+def _plain(value: Any) -> bool:
+    return value is None or isinstance(value, (str, int, float))

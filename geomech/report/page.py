@@ -1,0 +1,216 @@
+"""A self-contained HTML page: text, tables and pictures in one file, to be read on a phone, at a desk or on paper.
+
+Nothing is fetched: pictures are data in the page, there is no script, and letters are the reader's own.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from string import Template
+from typing import Any
+
+_KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif", ".jpg": "image/jpeg"}
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+_PAGE = Template("""\
+<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>$title</title>
+<style>
+$style
+</style>
+</head>
+<body>
+<header>
+<h1>$title</h1>
+$lead
+</header>
+$contents
+<main>
+$body
+</main>
+</body>
+</html>
+""")
+
+_STYLE = """\
+:root { --ink: #1d2026; --soft: #5d636e; --line: #d9dade; --tint: #f4f5f6; --accent: #1f6f8b; }
+* { box-sizing: border-box; }
+html { -webkit-text-size-adjust: 100%; }
+body { margin: 0 auto; padding: 1.5rem 1.1rem 4rem; max-width: 62rem; color: var(--ink); background: #fff;
+  font: 1rem/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
+h1 { font-size: 1.65rem; line-height: 1.2; margin: 0 0 .4rem; }
+h2 { font-size: 1.2rem; line-height: 1.25; margin: 2.4rem 0 .6rem; padding-bottom: .25rem; border-bottom: 1px solid var(--line); }
+p { margin: .5rem 0; max-width: 46rem; }
+.lead { color: var(--soft); }
+nav { margin: 1rem 0 0; font-size: .92rem; }
+nav a { color: var(--accent); text-decoration: none; margin-right: 1rem; white-space: nowrap; }
+.facts { display: grid; grid-template-columns: repeat(auto-fill, minmax(10.5rem, 1fr)); gap: .6rem; margin: 1rem 0; padding: 0; }
+.facts div { background: var(--tint); border-radius: .35rem; padding: .5rem .7rem; }
+.facts dt { color: var(--soft); font-size: .82rem; }
+.facts dd { margin: 0; font-weight: 600; overflow-wrap: anywhere; }
+.wide { overflow-x: auto; margin: .8rem 0; }
+table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
+caption { caption-side: top; text-align: left; color: var(--soft); padding: 0 0 .35rem; }
+th, td { padding: .28rem .75rem .28rem 0; text-align: right; vertical-align: top; border-bottom: 1px solid var(--line); }
+th { font-weight: 600; vertical-align: bottom; border-bottom: 1.5px solid var(--soft); }
+th.words, td.words { text-align: left; }
+td.told { text-align: left; min-width: 11rem; }
+.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, var(--least, 17rem)), 1fr)); gap: 1rem; margin: 1rem 0; }
+figure { margin: 0; min-width: 0; }
+figure img { width: 100%; max-width: 40rem; height: auto; display: block; }
+figcaption { color: var(--soft); font-size: .88rem; margin-top: .3rem; }
+pre { background: var(--tint); border-radius: .35rem; padding: .7rem .9rem; overflow-x: auto; font-size: .85rem; line-height: 1.4; }
+details { margin: .8rem 0; }
+summary { cursor: pointer; color: var(--accent); }
+td.bar { width: 40%; min-width: 6rem; padding-right: 0; vertical-align: middle; }
+td.bar span { display: block; height: .7rem; border-radius: .15rem; background: var(--accent); print-color-adjust: exact;
+  -webkit-print-color-adjust: exact; }
+.warning { border-left: 3px solid #c8553d; padding-left: .7rem; overflow-wrap: anywhere; }
+@page { size: A4; margin: 16mm 15mm; }
+@media print {
+  body { max-width: none; padding: 0; font-size: 10pt; }
+  nav, summary { display: none; }
+  h2 { break-after: avoid; margin-top: 1.4rem; }
+  figure, tr, .facts div { break-inside: avoid; }
+  .wide { overflow: visible; }
+  table { font-size: 8.5pt; }
+  .figures { grid-template-columns: repeat(2, 1fr); }
+  pre { white-space: pre-wrap; }
+}"""
+
+
+class Page:
+    """A page in the making: every method adds below what is there."""
+
+    def __init__(self, title: str, lead: str = "") -> None:
+        self.title = title
+        self._lead = lead
+        self._body: list[str] = []
+        self._sections: list[str] = []
+
+    def section(self, title: str) -> None:
+        self._sections.append(title)
+        self._body.append(f'<h2 id="s{len(self._sections)}">{html.escape(title)}</h2>')
+
+    def text(self, *paragraphs: str) -> None:
+        self._body += [f"<p>{html.escape(words)}</p>" for words in paragraphs]
+
+    def warning(self, words: str) -> None:
+        self._body.append(f'<p class="warning">{html.escape(words)}</p>')
+
+    def facts(self, pairs: Mapping[str, Any]) -> None:
+        """Name → value, as tiles; those without a value are left out."""
+        tiles = [
+            f"<div><dt>{html.escape(name)}</dt><dd>{html.escape(written(value))}</dd></div>"
+            for name, value in pairs.items()
+            if value is not None
+        ]
+        if tiles:
+            self._body.append(f'<dl class="facts">{"".join(tiles)}</dl>')
+
+    def table(self, headers: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> None:
+        """A row a sequence of cells: words, numbers, None. Columns of numbers are set to the right."""
+        rows = [list(row) for row in rows]
+        words = [any(isinstance(row[k], str) and not _is_number(row[k]) for row in rows) for k in range(len(headers))]
+        long = [any(isinstance(row[k], str) and len(row[k]) > 40 for row in rows) for k in range(len(headers))]
+        kinds = ["told" if lengthy else "words" if wordy else "" for lengthy, wordy in zip(long, words)]
+
+        def line(tag: str, cells: Sequence[Any]) -> str:
+            return "".join(
+                f"<{tag}{_of('words' if tag == 'th' and kind else kind)}>{html.escape(written(cell))}</{tag}>"
+                for kind, cell in zip(kinds, cells, strict=True)
+            )
+
+        title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
+        body = "\n".join(f"<tr>{line('td', row)}</tr>" for row in rows)
+        self._body.append(
+            f'<div class="wide"><table>{title}<thead><tr>{line("th", headers)}</tr></thead>\n<tbody>{body}</tbody></table></div>'
+        )
+
+    def bars(self, headers: Sequence[str], sizes: Mapping[str, float]) -> None:
+        """Name → size as a table with a bar each, the largest as long as its column."""
+        most = max(sizes.values(), default=0.0) or 1.0
+        rows = "\n".join(
+            f'<tr><td class="words">{html.escape(name)}</td><td>{html.escape(written(size))}</td>'
+            f'<td class="bar"><span style="width:{100 * size / most:.1f}%"></span></td></tr>'
+            for name, size in sizes.items()
+        )
+        head = "".join(
+            f"<th{_of('words' if k == 0 else '')}>{html.escape(name)}</th>" for k, name in enumerate(headers)
+        )
+        self._body.append(
+            f'<div class="wide"><table style="width:100%"><thead><tr>{head}<th></th></tr></thead><tbody>{rows}</tbody></table></div>'
+        )
+
+    def figures(self, pictures: Iterable[tuple[Path, str]], least_rem: float = 17.0) -> None:
+        """(file, caption) side by side as far as each keeps ``least_rem`` of width."""
+        shown = [
+            f'<figure><img alt="{html.escape(caption, quote=True)}" src="{_data(path)}">'
+            f"<figcaption>{html.escape(caption)}</figcaption></figure>"
+            for path, caption in pictures
+        ]
+        if shown:
+            self._body.append(f'<div class="figures" style="--least:{least_rem:g}rem">{"".join(shown)}</div>')
+
+    def code(self, text: str) -> None:
+        self._body.append(f"<pre>{html.escape(text)}</pre>")
+
+    def folded(self, summary: str, text: str) -> None:
+        """``text`` as it stands, shown when ``summary`` is touched."""
+        self._body.append(f"<details><summary>{html.escape(summary)}</summary><pre>{html.escape(text)}</pre></details>")
+
+    def __str__(self) -> str:
+        links = [f'<a href="#s{k}">{html.escape(name)}</a>' for k, name in enumerate(self._sections, 1)]
+        return _PAGE.substitute(
+            title=html.escape(self.title),
+            style=_STYLE,
+            lead=f'<p class="lead">{html.escape(self._lead)}</p>' if self._lead else "",
+            contents=f"<nav>{' '.join(links)}</nav>" if len(links) > 2 else "",
+            body="\n".join(self._body),
+        )
+
+    def write(self, path: Path) -> Path:
+        """The page as the file ``path``, whole or not at all."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside = path.with_name(path.name + ".part")
+        beside.write_text(str(self), encoding="utf-8")
+        beside.replace(path)
+        return path
+
+
+def written(value: Any) -> str:
+    """A cell: words as they are, numbers to four digits, what is not there as a dash."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return f"{value:,}".replace(",", "\u202f").replace("-", "−")
+    if isinstance(value, float):
+        mantissa, _, power = f"{value:.4g}".partition("e")
+        return (mantissa + (f"·10{str(int(power)).translate(_RAISED)}" if power else "")).replace("-", "−")
+    return str(value)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace("−", "-").replace("\u202f", ""))
+    except ValueError:
+        return text in ("", "–")
+    return True
+
+
+def _of(kind: str) -> str:
+    return f' class="{kind}"' if kind else ""
+
+
+def _data(path: Path) -> str:
+    return f"data:{_KINDS[path.suffix.lower()]};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
