@@ -9,8 +9,8 @@ import numpy as np
 
 from .. import dda
 from ..dda import StepResult
-from ..model import State
-from .bodies import boundary_loads, threads_for
+from ..model import TIP, State
+from .bodies import boundary_loads, threads_for, tip_rows
 from .compliance import crack_response
 from .cracked_blocks import CrackedBlocks
 from .settling import Settling
@@ -33,10 +33,12 @@ COMPLIANCE_PASSES = 12
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The step of the blocks, the solutions of the cracked ones (block → `ddm.Solution`), and how well the two agree."""
+    """The step of the blocks, the solutions of the cracked ones (block → `ddm.Solution`), their TIP rows with the criterion's
+    angle and K_eq, and how well the two solvers agree."""
 
     result: StepResult
     solutions: dict
+    tips: np.ndarray
     statistics: dict[str, float] = field(default_factory=dict)
 
 
@@ -56,7 +58,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
             if load_time is not None and result.state.time != load_time:
                 result = replace(result, state=replace(result.state, time=load_time))
         if not now.bodies:
-            return Balance(result, {})
+            return Balance(result, {}, np.empty(0, TIP))
         _solve_bodies(now, result)
         mismatch = _take_response(now, result.state, settling, tolerance)
         if mismatch < tolerance:
@@ -67,7 +69,8 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
         "compliance_mismatch": mismatch,
         "traction_imbalance": imbalance,
     }
-    return Balance(result, now.solutions, statistics)
+    tips = tip_rows(now.problem, now.blocks, now.solutions, now.nodes_of)
+    return Balance(result, now.solutions, tips, statistics)
 
 
 def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:

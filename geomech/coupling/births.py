@@ -10,6 +10,21 @@ import numpy as np
 from ..model import Blocks, Cracks, GrowthSettings, Material
 
 
+def born_first(
+    blocks: Blocks, materials: Sequence[Material], solutions: dict, settings: GrowthSettings
+) -> tuple[Sequence, int]:
+    """The births (`ddm.initiation.Birth`) of the most overstressed block (keys of ``solutions``), whether or not it has
+    reached its strength, and that block; ((), −1) when none has a strength to exceed."""
+    from ..ddm.initiation import births
+
+    best, where = (), -1
+    for b, solution in solutions.items():
+        found = births(solution, materials[blocks.material[b]], settings, b)
+        if found and (not best or found[0].overstress > best[0].overstress):
+            best, where = found, b
+    return best, where
+
+
 def bear_in_blocks(
     cracks: Cracks,
     blocks: Blocks,
@@ -17,18 +32,15 @@ def bear_in_blocks(
     solutions: dict,
     settings: GrowthSettings,
     cycle: int,
+    enough: float = 1.0,
 ):
     """``cracks`` with those that are born in the most overstressed block, as a `Growth`, and the births; (None, ()) when no
-    block (keys of ``solutions``) is strained to its strength. One block at a time: the others then carry other loads."""
+    block is strained to ``enough`` times its strength. One block at a time: the others then carry other loads."""
     from ..ddm.growth import Growth
-    from ..ddm.initiation import bear, births
+    from ..ddm.initiation import bear
 
-    best, where = [], -1
-    for b, solution in solutions.items():
-        found = births(solution, materials[blocks.material[b]], settings, b)
-        if found and found[0].overstress >= 1 and (not best or found[0].overstress > best[0].overstress):
-            best, where = found, b
-    if not best:
+    best, where = born_first(blocks, materials, solutions, settings)
+    if not best or best[0].overstress < enough:
         return None, ()
     # The body's segments are those of its block, in order.
     of_block = np.flatnonzero(cracks.block == where)

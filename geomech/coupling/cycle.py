@@ -1,7 +1,8 @@
 """The coupling cycle: blocks move, their contact forces load the cracked ones, cracks grow and soften them, again.
 
 At each load the cycle is repeated from the same start of the step until no tip grows; every pass is yielded as a
-`Cycle`. The state that leaves the last pass starts the next load step.
+`Cycle`. The state that leaves the last pass starts the next load step. Where the load follows the cracks (`event_steps`),
+each pass in which they grow is a load step of its own.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from .. import dda
 from ..dda.excavation import until_next_event
 from ..model import TIP, Cycle, Event, Problem
 from .balance import balanced
-from .bodies import tip_rows
 from .collapse import lost, relax
 from .cracked_blocks import CrackedBlocks
-from .growing import births, growth_of_tips, initiations, take_growth, toughness
+from .event_steps import SETTLED, TOGETHER, EventSteps
+from .growing import births, growth_of_tips, initiations, take_growth
 from .record import event, record
 
 log = logging.getLogger(__name__)
@@ -30,7 +31,8 @@ def cycles(problem: Problem) -> Iterator[Cycle]:
     """Run ``problem``, one `Cycle` a coupling cycle, from the initial state (number 0) to the scene's end.
 
     A static run also ends when a block goes out of reach, with a ``collapse`` event. Raises `geomech.dda.NotConverged`
-    when the block system finds no consistent contact state even at the smallest step.
+    when the block system finds no consistent contact state even at the smallest step, and ValueError where a dynamic run is
+    to step from event to event.
     """
     return Coupling(problem).cycles()
 
@@ -58,6 +60,20 @@ class Coupling:
         self.problem = problem
         self.now = CrackedBlocks(problem)
         self.length = dda.StepLength(problem.dda)
+        self.static = problem.dda.dynamic_factor == 0.0
+        self.events: EventSteps | None = None
+        if problem.run.stepping == "events":
+            if not self.static or problem.dda.equilibrium == "loads":
+                raise ValueError(
+                    'stepping "events" is for static runs that do not relax at every load: dynamic_factor = 0 and '
+                    'equilibrium "" or "start"'
+                )
+            self.events = EventSteps(problem)
+        self.follows = problem.run.control == "toughness"
+        if self.follows and self.events is None:
+            raise ValueError('control "toughness" needs stepping "events"')
+        #: What the growth that ended the last load step brought, where the load follows the cracks.
+        self._brought: tuple[Event, ...] = ()
         self.under_way: UnderWay | None = None
         self.between: Callable[[], None] = _go_on
 
@@ -70,7 +86,8 @@ class Coupling:
     @property
     def stops_next(self) -> bool:
         """Whether the next pass is the last one, because of what has happened."""
-        return self.under_way is not None and self._stops(self.under_way.told + self.under_way.pending)
+        told = () if self.under_way is None else self.under_way.told + self.under_way.pending
+        return self._stops(told + self._brought)
 
     def cycles(self) -> Iterator[Cycle]:
         now = self.now
@@ -92,12 +109,14 @@ class Coupling:
     def _load_step(self):
         """All passes at one load. Returns True when a stop event happened."""
         now, growing = self.now, self.problem.growth
-        static = self.problem.dda.dynamic_factor == 0.0
+        static = self.static
+        # Near enough to the toughness to grow, and to grow with another.
+        enough, together = (1.0, 1.0) if self.events is None else (1.0 - SETTLED, 1.0 - TOGETHER)
         begun, self.under_way = self.under_way, None
         if begun is None:
             now.load_step += 1
             dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
-            begun = UnderWay(dt, None, (), self._excavated(), 0)
+            begun, self._brought = UnderWay(dt, None, (), self._brought + self._excavated(), 0), ()
         dt, load_time, pending, stops = begun.dt, begun.load_time, begun.pending, self._stops(begun.told)
         if begun.next_pass == 0 and static and self.problem.dda.equilibrium == "loads":
             load_time = now.state.time + until_next_event(now.problem.loads, now.state.time, dt)
@@ -110,7 +129,11 @@ class Coupling:
         for growth_pass in range(begun.next_pass, growing.max_passes + 1):
             now.number += 1
             try:
-                found = balanced(now, dt, load_time)
+                if self.events is not None and growth_pass == 0:
+                    found = self.events.first_pass(now, self.problem.run.end_time)
+                    dt = found.result.dt
+                else:
+                    found = balanced(now, dt, load_time)
             except dda.NotConverged as failure:
                 if not (stops or self._stops(pending)):
                     raise
@@ -123,12 +146,12 @@ class Coupling:
             if static:
                 # The passes of a step share its load, also when one of them has to take a shorter step.
                 load_time = result.state.time
-            tips = tip_rows(now.problem, now.blocks, solutions, now.nodes_of)
+            tips = found.tips
             may_grow = growth_pass < growing.max_passes
             events, stops = pending, stops or self._stops(pending)
-            growth = growth_of_tips(now, tips, toughness(now, tips)) if may_grow and not stops else None
+            growth = growth_of_tips(now, tips, enough, together) if may_grow and not stops else None
             if growth is None and may_grow and not stops and growing.initiation:
-                growth, born = births(now, solutions, result.state)
+                growth, born = births(now, solutions, result.state, enough)
                 events += born
             if growth is None and static and not stops:
                 # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
@@ -143,8 +166,8 @@ class Coupling:
             budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)
-            if growth is None:
-                if not may_grow:
+            if growth is None or self.follows:
+                if growth is None and not may_grow:
                     log.warning(
                         "cycle %d: tips still grow after %d passes at one load; going on to the next load",
                         now.number,
@@ -153,6 +176,11 @@ class Coupling:
                 self.length.after(result, dt, now.system.allowed_ratio)
                 now.state, now.budget = result.state, budget
                 now.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
+                if growth is not None:
+                    self.events.grown()
+                    self._brought = take_growth(now, growth, result.state, solutions)
+                elif self.events is not None:
+                    self.events.after(now, found)
                 return stops
             pending = take_growth(now, growth, result.state, solutions)
             self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import Event, State
+from .balance import Balance
 from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
 from .mean_stress import rotated_mean_stress
@@ -12,11 +13,13 @@ from .record import event
 from .splitting import split_blocks
 
 
-def growth_of_tips(now: CrackedBlocks, tips: np.ndarray, k_ic: np.ndarray):
-    """The new network (`ddm.growth.Growth`) when some of ``tips`` has reached its toughness ``k_ic`` (n_tips,), else None.
-    Sets the angles that were followed."""
-    if not np.any(tips["k_eq"] >= k_ic):
+def growth_of_tips(now: CrackedBlocks, tips: np.ndarray, enough: float = 1.0, together: float = 1.0):
+    """The new network (`ddm.growth.Growth`) when some of ``tips`` has a K_eq of ``enough`` times its toughness, else None;
+    those with ``together`` times theirs grow with it. Sets the angles that were followed."""
+    k_ic = _toughness(now, tips)
+    if not np.any(tips["k_eq"] >= enough * k_ic):
         return None
+    k_ic = together * k_ic
     from ..ddm.growth import advance
     from ..ddm.path import corrected
 
@@ -38,18 +41,31 @@ def growth_of_tips(now: CrackedBlocks, tips: np.ndarray, k_ic: np.ndarray):
     return growth
 
 
-def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
+def _toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
     """(n_tips,) K_Ic of the rock that each tip stands in, Pa √m."""
     return np.array([now.problem.materials[m].k_ic for m in now.blocks.material[tips["block"]]])
 
 
-def births(now: CrackedBlocks, solutions: dict, state: State):
-    """New cracks, and their events, where no tip grows and whole rock is strained to its strength."""
+def drive(now: CrackedBlocks, found: Balance) -> float:
+    """How near to growth the cracks are: the largest K_eq/K_Ic, or the largest overstress where cracks may be born; growth
+    starts at one."""
+    most = float(np.max(found.tips["k_eq"] / _toughness(now, found.tips), initial=0.0))
+    if now.problem.growth.initiation:
+        from .births import born_first
+
+        with now.timed("growth"):
+            born, _ = born_first(now.blocks, now.problem.materials, found.solutions, now.problem.growth)
+        most = max([most, *(birth.overstress for birth in born[:1])])
+    return most
+
+
+def births(now: CrackedBlocks, solutions: dict, state: State, enough: float = 1.0):
+    """New cracks, and their events, where no tip grows and whole rock is strained to ``enough`` times its strength."""
     from .births import bear_in_blocks
 
     with now.timed("growth"):
         growth, born = bear_in_blocks(
-            now.cracks, now.blocks, now.problem.materials, solutions, now.problem.growth, now.number
+            now.cracks, now.blocks, now.problem.materials, solutions, now.problem.growth, now.number, enough
         )
     names = growth.cracks.names[now.cracks.n_cracks :] if growth is not None else ()
     return growth, tuple(

@@ -28,6 +28,8 @@ _NEVER = -1
 #: Radius of corners, in sizes (√area) of the smaller block. Two corners that press on each other would slip off by less than
 #: they press each other in, and no state would fit; corners of rock are rounder than this.
 _ROUNDING = 1e-5
+#: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
+_DEEPER = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +139,8 @@ class ContactFinder:
         if len(old):
             # Faces that slid apart press at a distance.
             window += max(0.0, float(old["lift"].max()))
+            # What soft springs have let in deeper than that touches still.
+            window = max(window, -_DEEPER * float(old["gap"][old["state"] != OPEN].min(initial=0.0)))
         keys = old["vertex"] * len(vertices) + old["edge"]
         rank = np.argsort(keys, kind="stable")
         table = find_contacts(

@@ -98,13 +98,21 @@ class GrowthSettings:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``. ``boundary_stress``
-    says how contact forces load cracked blocks: "contacts" spread over faces, "springs" at points,
-    "kelvin-springs" at points of the infinite plane."""
+    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``.
+
+    ``stepping`` "fixed": steps of `DdaSettings.time_step`; "events": static steps that end where a tip has just reached its
+    toughness, otherwise as long as blocks may move in one, or ``longest_step`` s. ``control`` "load": loads and imposed motion
+    rise with time; "toughness" (with "events"): they are those at which the most driven tip has K_eq = K_Ic, more or less
+    than before. ``boundary_stress`` says how contact forces load cracked blocks: "contacts" spread over faces, "springs" at
+    points, "kelvin-springs" at points of the infinite plane.
+    """
 
     end_time: float = 1.0
     stop_at: tuple[str, ...] = ("coalescence", "split")
     boundary_stress: str = "contacts"
+    stepping: str = "fixed"
+    longest_step: float | None = None
+    control: str = "load"
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,7 +78,12 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         ddm=DdmSettings(**tables.ddm.model_dump()),
         growth=_growth(tables, cracks),
         run=RunSettings(
-            end_time=tables.run.end_time_s, stop_at=tables.run.stop_at, boundary_stress=tables.run.boundary_stress
+            end_time=tables.run.end_time_s,
+            stop_at=tables.run.stop_at,
+            boundary_stress=tables.run.boundary_stress,
+            stepping=tables.run.stepping,
+            longest_step=tables.run.longest_step_s,
+            control=tables.run.control,
         ),
         load_edge=_leading_edge(tables),
         gauge=None if carriers is None else ((carriers[0], tables.gauge.start), (carriers[1], tables.gauge.to)),

@@ -33,6 +33,7 @@ def check(c: Check) -> None:
         _strength(c)
         _rigid(c)
     _statics(c)
+    _stepping(c)
 
 
 def _times(c: Check) -> None:
@@ -64,6 +65,34 @@ def _statics(c: Check) -> None:
             "viscous boundaries do nothing in a static run",
             "set dda.dynamic_factor = 1, or leave them out",
         )
+
+
+def _stepping(c: Check) -> None:
+    """What steps from event to event can do, and what only they can."""
+    run, dda = c.tables.run, c.tables.dda
+    if run is None or dda is None:
+        return
+    if run.stepping == "events":
+        for key, hinders, way_out in (
+            ("dynamic_factor", dda.dynamic_factor > 0, "set dda.dynamic_factor = 0"),
+            ("equilibrium", dda.equilibrium == "loads", 'say dda.equilibrium = "start", or ""'),
+            (
+                "automatic_time_step",
+                dda.automatic_time_step,
+                "leave dda.automatic_time_step out: steps grow by themselves",
+            ),
+        ):
+            if hinders:
+                value = getattr(dda, key)
+                c.refuse(
+                    ("run", "stepping"),
+                    f"steps to the next event are for static runs, and dda.{key} is {str(value).lower()}",
+                    f'{way_out}, or stepping = "fixed"',
+                )
+        return
+    for key, given in (("control", run.control != "load"), ("longest_step_s", run.longest_step_s is not None)):
+        if given:
+            c.refuse(("run", key), f'run.{key} belongs to stepping "events"', 'set run.stepping = "events"')
 
 
 def _growth_lengths(c: Check) -> None:

@@ -63,6 +63,15 @@ SPOILT = [
         "is for static runs",
         'equilibrium = "start"',
     ),
+    (
+        "[run]",
+        '[dda]\ndynamic_factor = 1\n[run]\nstepping = "events"',
+        "run.stepping",
+        "for static runs, and dda.dynamic_factor",
+        "set dda.dynamic_factor = 0",
+    ),
+    ("[run]", '[run]\ncontrol = "toughness"', "run.control", 'belongs to stepping "events"', "run.stepping"),
+    ("[run]", "[run]\nlongest_step_s = 3", "run.longest_step_s", 'belongs to stepping "events"', "run.stepping"),
     ("density_kg_m3 = 2500", "density_kg_m3 = 2500\nrigid = true", "materials.rock.rigid", "holds a crack", "rigid"),
     ("[run]", "[dda]\nnewmark = [0.2, 0.5]\n[run]", "dda.newmark", "not stable at every time step", "trapezoidal"),
     (

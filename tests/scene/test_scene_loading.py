@@ -231,6 +231,12 @@ def test_every_setting_arrives(scene_file):
     assert p.monitors == {"corner": (0, (1.0, 1.0))}
 
 
+def test_steps_to_events(scene_file):
+    overrides = ['run.stepping="events"', "run.longest_step_s=20", 'run.control="toughness"']
+    run = load_scene(scene_file(GOOD), overrides).problem().run
+    assert (run.stepping, run.longest_step, run.control) == ("events", 20.0, "toughness")
+
+
 def test_growth_switched_off_needs_no_toughness(scene_file):
     text = GOOD.replace("k_ic_pa_sqrt_m = 1e6\n", "") + "[growth]\nenabled = false\n"
     assert load_scene(scene_file(text)).problem().materials[0].k_ic == math.inf

@@ -149,6 +149,20 @@ class RunTable(Table):
     stop_at: Annotated[
         tuple[Literal["initiation", "birth", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
     ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
+    stepping: Literal["fixed", "events"] = Field(
+        "fixed",
+        description='static load steps: "fixed", of `dda.time_step_s`; "events", that end at the very load at which a tip '
+        "reaches its toughness, and else are as long as blocks may move in one",
+    )
+    longest_step_s: Positive | None = Field(
+        None, description='longest step of stepping "events", s (unset: none but by how far blocks move in it)'
+    )
+    control: Literal["load", "toughness"] = Field(
+        "load",
+        description='"load": loads and imposed motion follow their histories; "toughness": every increment of growth is made '
+        "at the load at which the most driven tip has K_eq = K_Ic, also where that is less than before (time is what the "
+        "loads are functions of, and goes back with them)",
+    )
     boundary_stress: Literal["contacts", "springs", "kelvin-springs"] = Field(
         "contacts",
         description='how contact forces load cracked blocks: "contacts", linear over each face; "springs", as point forces '

@@ -1,0 +1,151 @@
+"""Load steps that end where something happens: at the time, and so at the load, at which the most driven tip has just
+K_eq = K_Ic, or whole rock its strength, instead of at the end of the fixed step in which that comes about.
+
+While nothing changes state K is nearly linear in the load, so secants find that time in two or three solutions, all of them
+steps from the same start. On the way there steps are as long as blocks may move in one. Loads at which tips start, join
+and cut through then do not depend on the time step.
+
+With control "toughness" the load follows the cracks: every increment of growth is made at the load at which the most driven
+tip has K_eq = K_Ic, whether that is higher than the last one (stable growth) or lower (growth that would run away under a
+dead load). Time is then no more than what the loads are functions of, and goes back where the load does.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..dda.excavation import until_next_event
+from ..model import History, Loads, Problem
+from .balance import Balance, balanced
+from .cracked_blocks import CrackedBlocks
+from .crossing import Crossing
+from .growing import drive
+
+#: An event is found when the drive, K_eq/K_Ic, is off one by less than this.
+SETTLED = 1e-6
+#: Tips driven within this part of their toughness grow with the one that has reached it: images of one another by symmetry
+#: differ by the rounding of their paths, which must not part them.
+TOGETHER = 1e-3
+#: Forces are in equilibrium on the geometry at the start of a step. A step to an event that would move blocks by more than the
+#: first (in units of half the height, as ``max_displacement_ratio``) goes the second part of the way, and the next one the
+#: rest: K at the event is then off by no more than the former, times what K depends on the shape of the blocks.
+NEAR, APPROACH = 1e-5, 0.98
+#: Steps on the way are to move blocks by this part of what a step may.
+USE = 0.8
+#: Solutions that one search may take, and those without the event between two of them.
+MOST, OPEN = 40, 5
+#: An event within this part of the time itself is a jump of the drive (faces that close): tips grow beyond it.
+JUMP = 1e-12
+
+
+class EventSteps:
+    """The first pass of every load step of a static run: how far it goes, from what the last ones have shown."""
+
+    def __init__(self, problem: Problem) -> None:
+        run, histories = problem.run, _histories(problem.loads)
+        self.time_step = problem.dda.time_step
+        self._corners = np.unique(np.concatenate([np.asarray(h.times, dtype=float) for h in histories]))
+        # Between the corners of piecewise linear histories a step may take any length; within a sinusoid it may not.
+        swings = any(h.wave is not None for h in histories)
+        self._longest = run.longest_step or (self.time_step if swings else math.inf)
+        #: Drive of the cracks as they are, at the start of the step, and its growth per second; None: not known yet.
+        self._drive: float | None = 0.0
+        self._rate = 0.0
+        #: Displacement ratio per second in the last step; None before there is one.
+        self._pace: float | None = None
+
+    def first_pass(self, now: CrackedBlocks, end: float) -> Balance:
+        """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; the load may
+        go back to an event that lies behind. Raises `dda.NotConverged`."""
+        start = now.state.time
+        search = Crossing(self._rate)
+        if self._drive is None:
+            found, excess = self._at(now, start)
+            search.slope *= 1 + excess
+            search.add(start, excess)
+            if excess > SETTLED:
+                found, excess = self._back(now, search)
+        else:
+            excess = self._drive - 1
+            search.add(start, excess)
+        if excess < -SETTLED or self._drive is not None:
+            found, excess = self._ahead(now, search, end)
+        self._drive, self._rate = 1 + excess, search.slope
+        return found
+
+    def after(self, now: CrackedBlocks, found: Balance) -> None:
+        """The load step has ended with a pass at the load of the first one, in which nothing grew."""
+        before, self._drive = self._drive, drive(now, found)
+        # Where loads are proportional to time, and in most other cases nearly, the rate changes as the drive does.
+        self._rate *= self._drive / before if before else 1.0
+
+    def grown(self) -> None:
+        """The cracks have grown at the end of the load step."""
+        self._drive = None
+
+    def _ahead(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
+        start = now.state.time
+        limit = self._limit(now, start, end)
+        event = search.next if search.next > start else limit
+        whole = event <= limit and not self._far(event - start)
+        aim = event if whole else min(start + APPROACH * (event - start), limit)
+        for k in range(MOST):
+            found, excess = self._at(now, aim, free=k == 0)
+            at = found.result.state.time
+            search.add(at, excess)
+            if abs(excess) <= SETTLED or (excess > 0 and search.width <= JUMP * abs(at)):
+                break
+            if excess < 0 and not (whole and (search.enclosed or (at < limit and k < OPEN))):
+                break
+            # A later one would be met by the next step.
+            aim = min(search.next, limit)
+            whole = whole or not self._far(aim - start)
+            if not whole:
+                aim = start + APPROACH * (aim - start)
+        return found, excess
+
+    def _back(self, now: CrackedBlocks, search: Crossing) -> tuple[Balance, float]:
+        """Down to the load at which tips are driven no further; where none is low enough, to no load."""
+        for _ in range(MOST):
+            at = max(search.next, 0.0)
+            found, excess = self._at(now, at)
+            search.add(at, excess)
+            if abs(excess) <= SETTLED or (excess > 0 and (at == 0.0 or search.width <= JUMP * at)):
+                break
+        return found, excess
+
+    def _at(self, now: CrackedBlocks, time: float, free: bool = False) -> tuple[Balance, float]:
+        """A pass at the loads of ``time`` from the start of the step, and how far the drive then is above one. A ``free`` one
+        may be cut short by how far blocks may move."""
+        way = time - now.state.time
+        # The length of a static step is no more than its inertia: short ones would hold the blocks back.
+        found = balanced(now, max(way, self.time_step), None if free and way >= self.time_step else time)
+        way = found.result.state.time - now.state.time
+        if way > 0:
+            self._pace = found.result.statistics["max_displacement_ratio"] / way
+        return found, drive(now, found) - 1
+
+    def _far(self, way: float) -> bool:
+        return self._pace is None or self._pace * way > NEAR
+
+    def _limit(self, now: CrackedBlocks, start: float, end: float) -> float:
+        """The latest time to which a step from ``start`` may go, s."""
+        stage = until_next_event(now.problem.loads, start, end - start)
+        corner = self._corners[np.searchsorted(self._corners, start * (1 + 1e-12), side="right") :]
+        moved = self.time_step
+        if self._pace is not None:
+            moved = max(moved, USE * now.system.allowed_ratio / self._pace) if self._pace > 0 else math.inf
+        return min(start + min(stage, self._longest, moved), *corner[:1].tolist(), end)
+
+
+def _histories(loads: Loads) -> list[History]:
+    """All functions of time that act."""
+    timed = [*loads.edge_tractions, *loads.point_loads, *loads.block_motions, *loads.point_motions]
+    found = [loads.gravity, *(each.history for each in timed)]
+    if loads.water is not None and loads.water.level is not None:
+        found.append(loads.water.level)
+    if loads.base is not None:
+        found.append(loads.base.acceleration)
+    return found

@@ -1,0 +1,135 @@
+"""Steps to the very load at which tips reach their toughness, held against the crack solver alone, fixed steps, closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geomech import ddm
+from geomech.coupling import cycles
+from geomech.ddm.criteria import maximum_tangential_stress
+from geomech.model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    EdgeTraction,
+    GrowthSettings,
+    History,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+)
+
+W, H, HALF = 0.03, 0.06, 0.005
+ROCK = Material("rock", 17e9, 0.21, 2200.0, 1e6)
+ENDS = np.array([[[W, H], [-W, H]], [[-W, -H], [W, -H]]])
+PULL = np.array([[[0.0, 1.0]] * 2, [[0.0, -1.0]] * 2])
+RATE = 0.05e6
+SLANTED = np.array([[-HALF, -0.6 * HALF], [HALF, 0.6 * HALF]])
+
+
+def plate(lines=(SLANTED,), rate=RATE, stop_at=("initiation",), growth=None, **run):
+    """A plate with open slots under rising tension on its ends; a load of ``rate`` Pa more a second."""
+    polygon = np.array([[-W, -H], [W, -H], [W, H], [-W, H]])
+    ends = (("load:top", rate), ("load:bottom", -rate))
+    return Problem(
+        title="plate",
+        blocks=Blocks.from_polygons([polygon], edge_names=[[["load:bottom", "", "load:top", ""]]]),
+        cracks=Cracks.from_polylines(list(lines), aperture=np.inf),
+        materials=(ROCK,),
+        joints=(),
+        loads=Loads(edge_tractions=tuple(EdgeTraction(name, History.ramp([0.0, r])) for name, r in ends)),
+        dda=DdaSettings(time_step=1.0),
+        growth=growth or GrowthSettings(increment=1e-3),
+        run=RunSettings(**{"end_time": 4000.0, "stop_at": stop_at, "stepping": "events"} | run),
+        load_edge="load:top",
+    )
+
+
+def first_growth(problem):
+    return next(cycle for cycle in cycles(problem) if cycle.tips["grown"].any())
+
+
+def toughness_factor(problem):
+    """Load on the ends, Pa, at which the crack solver alone has K_eq = K_Ic: it is proportional to the load."""
+    body = ddm.Body(problem.blocks.loops(0), problem.cracks, ROCK, problem.ddm)
+    tips = body.solve(ddm.BodyLoad(segments=ENDS, tractions=PULL)).tips
+    return ROCK.k_ic / maximum_tangential_stress(tips["k_i"], tips["k_ii"])[1].max()
+
+
+def test_growth_starts_at_the_load_of_the_crack_solver_alone():
+    """K_eq = K_Ic to 1e-6, and the load to 2e-6 of that of small strain: the steps before have strained the plate by 7e-4, and
+    a load on the block's own ends feels nothing of it but through its rotation."""
+    problem = plate()
+    found = first_growth(problem)
+    assert found.tips["k_eq"].max() == pytest.approx(ROCK.k_ic, rel=1e-6)
+    assert -found.load == pytest.approx(toughness_factor(problem), rel=2e-6)
+
+
+def test_growth_starts_at_the_same_load_whatever_the_steps():
+    """Loads rising slowly or fast, steps kept short or not: 1e-6, the drive's own tolerance; fixed steps end up to one load
+    step above."""
+    expected = -first_growth(plate()).load
+    for problem in (
+        plate(rate=7 * RATE),
+        plate(longest_step=20.0),
+        replace(plate(), dda=DdaSettings(time_step=30.0)),
+        replace(plate(), dda=DdaSettings(time_step=0.01, max_displacement_ratio=1e-4)),
+    ):
+        assert -first_growth(problem).load == pytest.approx(expected, rel=2e-6)
+    for dt in (16.0, 4.0):
+        fixed = replace(plate(stepping="fixed"), dda=DdaSettings(time_step=dt))
+        assert 0 <= -first_growth(fixed).load - expected <= dt * RATE
+
+
+def test_tips_that_are_images_of_one_another_grow_together():
+    """Half a turn maps the plate on itself: both tips start in one cycle, and their paths stay images to 1e-9 of its size."""
+    problem = plate(stop_at=("daylighting",), growth=GrowthSettings(increment=4e-3))
+    seen = [cycle for cycle in cycles(problem) if cycle.tips["grown"].any()]
+    assert len({cycle.load for cycle in seen}) == 1  # it runs away at one load
+    for cycle in seen[:-1]:
+        first, second = cycle.tips
+        assert np.abs(first["point"] + second["point"]).max() < 1e-9 * H
+        assert first["grown"] == pytest.approx(second["grown"], abs=1e-9 * H)
+
+
+def test_steps_do_not_pass_the_corners_of_a_history():
+    """Tension that comes and goes, too weak to grow anything, twice: every turn of it is a step's end."""
+    path = History.table([0.0, 3.0, 5.5, 11.0, 12.0], np.outer([0.0, 1e5, 0.0, 2e5, 0.0], [0.0, 1.0]))
+    back = History(path.times, -path.values)
+    problem = replace(
+        plate(end_time=20.0),
+        loads=Loads(edge_tractions=(EdgeTraction("load:top", path), EdgeTraction("load:bottom", back))),
+    )
+    times = [cycle.state.time for cycle in cycles(problem)]
+    assert {3.0, 5.5, 11.0, 12.0, 20.0} <= set(times) and len(times) < 12
+
+
+def test_births_are_events_too():
+    """No crack is there: the load at which two are born at a hole is that of the crack solver alone, to 1e-5 (stress at a point
+    on a surface, after a strain of 2e-4)."""
+    rock = replace(ROCK, k_ic=0.3e6, tensile_strength=3e6)
+    angle = 2 * np.pi * (np.arange(16) + 0.5) / 16
+    hole = 0.006 * np.column_stack([np.cos(angle), -np.sin(angle)])
+    polygon = np.array([[-W, -H], [W, -H], [W, H], [-W, H]])
+    growth = GrowthSettings(increment=2e-3, initiation="surface", initiation_spacing=6e-3)
+    names = [[["load:bottom", "", "load:top", ""], [""] * 16]]
+    problem = replace(
+        plate(lines=(), stop_at=("birth",), growth=growth),
+        blocks=Blocks.from_polygons([[polygon, hole]], edge_names=names),
+        materials=(rock,),
+    )
+    born = [event for cycle in cycles(problem) for event in cycle.events]
+    load = ddm.BodyLoad(segments=ENDS, tractions=PULL)
+    alone = next(ddm.propagate([polygon, hole], problem.cracks, rock, load, growth, control="toughness"))
+    assert [event.kind for event in born] == ["birth", "birth"]
+    assert -born[0].load == pytest.approx(alone.load_factor, rel=1e-5)
+
+
+def test_dynamic_runs_and_relaxed_ones_are_refused():
+    for dda in (DdaSettings(dynamic_factor=1.0), DdaSettings(equilibrium="loads")):
+        with pytest.raises(ValueError, match="static runs"):
+            next(cycles(replace(plate(), dda=dda)))
+    with pytest.raises(ValueError, match='needs stepping "events"'):
+        next(cycles(plate(stepping="fixed", control="toughness")))
