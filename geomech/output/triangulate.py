@@ -8,7 +8,7 @@ from geomech.model import Blocks
 
 
 class Triangles:
-    """The triangles of a block system, kept from call to call for every block whose outline has not changed."""
+    """The triangles of a block system, kept while it stands; of blocks that are not convex, while their outline does."""
 
     def __init__(self) -> None:
         self._blocks: Blocks | None = None
@@ -20,36 +20,44 @@ class Triangles:
         naming a block whose outline crosses itself."""
         if blocks is self._blocks:
             return self._cells
-        known, cells, owner = {}, [], []
-        for b in range(blocks.n_blocks):
+        if blocks.n_blocks == 0:
+            return self._cells
+        fan = _convex(blocks)
+        known, others = {}, []
+        for b in np.flatnonzero(~fan).tolist():
             loops = blocks.loops(b)
             key = b"".join(loop.tobytes() + b"|" for loop in loops)
-            triangles = self._known.get(key)
-            if triangles is None:
-                simple = len(loops) == 1 and _convex(loops[0])
-                triangles = _fan(loops[0]) if simple else _delaunay(loops, blocks.names[b])
-            known[key] = triangles
-            cells.append(triangles + blocks.vertex_start[b])
-            owner.append(np.full(len(triangles), b))
-        self._blocks, self._known = blocks, known
-        self._cells = (np.concatenate(cells), np.concatenate(owner)) if cells else self._cells
+            known[key] = self._known[key] if key in self._known else _delaunay(loops, blocks.names[b])
+            others.append(known[key])
+        start, corners = blocks.vertex_start[:-1], np.diff(blocks.vertex_start)
+        count = corners - 2
+        count[~fan] = [len(triangles) for triangles in others]
+        first = np.concatenate([[0], np.cumsum(count)])
+        owner = np.repeat(np.arange(blocks.n_blocks), count)
+        # A fan about the first corner …
+        k = np.arange(first[-1]) - first[owner]
+        cells = start[owner, None] + np.stack([np.zeros_like(k), k + 1, k + 2], axis=1)
+        # … and what is no fan in its place.
+        for b, triangles in zip(np.flatnonzero(~fan).tolist(), others, strict=True):
+            cells[first[b] : first[b + 1]] = triangles + start[b]
+        self._blocks, self._known, self._cells = blocks, known, (cells, owner)
         return self._cells
 
 
-def _convex(loop: np.ndarray) -> bool:
-    """Strictly convex: a straight corner would make a fan's triangle flat."""
-    edge = np.roll(loop, -1, axis=0) - loop
-    before = np.roll(edge, 1, axis=0)
-    cross = before[:, 0] * edge[:, 1] - before[:, 1] * edge[:, 0]
-    length = np.hypot(edge[:, 0], edge[:, 1])
+def _convex(blocks: Blocks) -> np.ndarray:
+    """(n_blocks,) strictly convex and without holes: a straight corner would make a fan's triangle flat."""
+    ring, of_loop = blocks.loop_start, np.repeat(np.arange(len(blocks.loop_start) - 1), np.diff(blocks.loop_start))
+    after, before = np.arange(1, len(of_loop) + 1), np.arange(-1, len(of_loop) - 1)
+    after[ring[1:] - 1], before[ring[:-1]] = ring[:-1], ring[1:] - 1
+    edge = blocks.vertices[after] - blocks.vertices
+    x, y = edge.T
+    cross = x[before] * y - y[before] * x
+    length = np.hypot(x, y)
     # One turn only: a pentagram turns left at every corner as well.
-    turn = np.arctan2(cross, np.einsum("ij,ij->i", before, edge)).sum()
-    return bool((cross > 1e-9 * length * np.roll(length, 1)).all() and abs(turn - 2 * np.pi) < 1e-6)
-
-
-def _fan(loop: np.ndarray) -> np.ndarray:
-    k = np.arange(1, len(loop) - 1)
-    return np.stack([np.zeros_like(k), k, k + 1], axis=1)
+    turn = np.bincount(of_loop, np.arctan2(cross, x[before] * x + y[before] * y), len(ring) - 1)
+    bent = np.bincount(of_loop, cross <= 1e-9 * length * length[before], len(ring) - 1)
+    convex = (bent == 0) & (np.abs(turn - 2 * np.pi) < 1e-6)
+    return convex[blocks.block_loop[:-1]] & (np.diff(blocks.block_loop) == 1)
 
 
 def _delaunay(loops: list[np.ndarray], name: str) -> np.ndarray:
