@@ -18,6 +18,7 @@ TOPICS = {
     "ddm": "geomech.bench.work_precision",
     "kernels": "geomech.bench.kernels",
     "many": "geomech.bench.many_cracks",
+    "output": "geomech.bench.output_cost",
     "schemes": "geomech.bench.block_schemes",
     "stability": "geomech.bench.stability",
     "startup": "geomech.bench.startup",

@@ -1,0 +1,185 @@
+"""What writing a large run costs: a wall of 10 000 bricks over 500 cycles, beside the run itself and beside other writers.
+
+The cycles are those of one step, moved on a little from one to the next, so that every number in the files is another. The
+share of a run is that of a real one, block solver and all, with all that it does.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..model import Cracks, Cycle, DdmSettings, GrowthSettings, Problem, RunSettings
+from . import block_scenes
+from .figures import Measured
+
+#: Where the numbers go, below the working folder.
+FOLDER = Path("outputs/bench_output")
+TIME_STEP = 1e-3
+#: Goal: share of a run that writing may take.
+SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Written:
+    """What `blocks` over so many ``cycles`` came to: seconds that the run waited a cycle, bytes of its files a cycle and of
+    the blocks' file a cell, and MB/s of arrays (before they are packed) until all was on disk."""
+
+    blocks: int
+    cells: int
+    cycles: int
+    waited: float
+    bytes_a_cycle: float
+    bytes_a_cell: float
+    rate: float
+
+
+def wall(n: int, end: float) -> Problem:
+    """A dry wall under its weight, from rest."""
+    return Problem(
+        title="a wall",
+        blocks=block_scenes.wall(n),
+        cracks=Cracks.from_polylines([]),
+        materials=(block_scenes.ROCK,),
+        joints=(block_scenes.JOINT,),
+        loads=block_scenes.WEIGHT,
+        dda=block_scenes.settings(TIME_STEP),
+        ddm=DdmSettings(),
+        growth=GrowthSettings(),
+        run=RunSettings(end_time=end),
+    )
+
+
+def measure(quick: bool = False) -> Measured:
+    """The table; leaves ``output.json`` in `FOLDER`. ``quick``: 2 000 bricks, 40 cycles."""
+    n, cycles, steps = (2000, 40, 8) if quick else (10_000, 500, 12)
+    problem = wall(n, (steps - 0.5) * TIME_STEP)
+    share, cycle = share_of_a_run(problem)
+    found = series(problem, cycle, cycles)
+    writers = {name: statistics.median(times) for name, times in _writers(problem, cycle, 3 if quick else 7).items()}
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    told = {"series": asdict(found), "share of a run": share, "writers_s": writers, "quick": quick}
+    (FOLDER / "output.json").write_text(json.dumps(told, indent=1, ensure_ascii=False), encoding="utf-8")
+    ours = writers[OURS]
+    lines = [
+        f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles: {found.bytes_a_cycle / 1e6:.2f} MB a cycle,"
+        f" {found.bytes_a_cell:.0f} bytes a cell of the blocks' series",
+        f"  {found.rate / 1e6:.0f} MB of arrays a second until all is on disk; the run waits {1e3 * found.waited:.1f} ms a cycle",
+        f"  share of a run of {steps} steps of {1e3 * TIME_STEP:g} ms: {share:.1%} (goal below {SHARE:.0%})",
+        "one file of the blocks, as this project and as others write it",
+    ]
+    lines += [f"  {name:<32}{1e3 * spent:9.1f} ms  {spent / ours:6.1f} times" for name, spent in writers.items()]
+    return Measured.of(
+        "\n".join(lines), times={"a cycle": found.waited} | {f"a file: {k}": v for k, v in writers.items()}
+    )
+
+
+def share_of_a_run(problem: Problem) -> tuple[float, Cycle]:
+    """The part of ``problem``'s time that its series make it wait, the first step left out, and its last cycle."""
+    from ..coupling import cycles
+    from ..output.series import Series
+
+    with tempfile.TemporaryDirectory() as folder:
+        observer, cycle, began, before = Series(interior_every=0), None, 0.0, 0.0
+        observer.on_start(problem, Path(folder))
+        for cycle in cycles(problem):
+            observer.on_cycle(cycle)
+            if cycle.load_step == 1:
+                # What a run pays once, compiled kernels and orderings, is in the first step.
+                began, before = time.perf_counter(), observer.seconds
+        observer.on_end({})
+        return (observer.seconds - before) / (time.perf_counter() - began), cycle
+
+
+def moved_on(cycle: Cycle, count: int) -> Iterator[Cycle]:
+    """``count`` cycles after ``cycle``, each a little farther along its velocities and harder pressed."""
+    for k in range(1, count + 1):
+        vertices = cycle.state.vertices * (1.0 + 1e-7 * k)
+        stress = cycle.state.stress * (1.0 + 1e-3 * k)
+        state = replace(cycle.state, time=cycle.state.time + k * TIME_STEP, vertices=vertices, stress=stress)
+        yield replace(cycle, number=cycle.number + k, state=state, events=())
+
+
+def series(problem: Problem, cycle: Cycle, count: int) -> Written:
+    """All series of ``count`` cycles like ``cycle``, into a folder that goes again (some gigabytes)."""
+    from ..output.series import Series
+
+    with tempfile.TemporaryDirectory() as scratch:
+        folder, size, blocks_size = Path(scratch), 0, 0
+        observer = Series(interior_every=0)
+        observer.on_start(problem, folder)
+        began = time.perf_counter()
+        for each in moved_on(cycle, count):
+            observer.on_cycle(each)
+        waited = observer.seconds
+        observer.on_end({})
+        whole = time.perf_counter() - began
+        for file in folder.rglob("*.vtu"):
+            size += file.stat().st_size
+            blocks_size += file.stat().st_size * file.name.startswith("blocks_")
+    cells = int((np.diff(problem.blocks.vertex_start) - 2).sum())
+    arrays = sum(
+        array.nbytes
+        for grid in _grids(problem, cycle)
+        for array in (grid.points, grid.connectivity, *grid.point_data.values(), *grid.cell_data.values())
+    )
+    return Written(
+        problem.blocks.n_blocks, cells, count, waited / count, size / count, blocks_size / count / cells,
+        arrays * count / whole,
+    )  # fmt: skip
+
+
+def _grids(problem: Problem, cycle: Cycle) -> list:
+    from ..output import grids
+    from ..output.triangulate import Triangles
+
+    blocks = grids.blocks_grid(cycle, problem.materials, "reference", Triangles(), grids.KeyBlocks(problem))
+    return [blocks, grids.contacts_grid(cycle, "reference")]
+
+
+OURS = "this project"
+
+
+def _writers(problem: Problem, cycle: Cycle, repeats: int) -> dict[str, list[float]]:
+    """Name → seconds of each file; all hold the same arrays, zlib-packed in 64-bit numbers."""
+    import meshio
+    import pyvista
+
+    from ..output.vtu import TRIANGLE, GridFiles
+
+    grid = _grids(problem, cycle)[0]
+    cells = grid.connectivity.reshape(-1, 3)
+    points = np.column_stack([grid.points, np.zeros(len(grid.points))])
+    files = GridFiles("blocks")
+
+    def with_meshio(path: Path) -> None:
+        data = {name: [np.asarray(array)] for name, array in grid.cell_data.items()}
+        data = {name: [array[0].astype("u1") if array[0].dtype == bool else array[0]] for name, array in data.items()}
+        meshio.Mesh(points, [("triangle", cells)], dict(grid.point_data), data).write(path)
+
+    def with_pyvista(path: Path) -> None:
+        mesh = pyvista.UnstructuredGrid({TRIANGLE: cells}, points)
+        mesh.point_data.update({name: np.asarray(array) for name, array in grid.point_data.items()})
+        mesh.cell_data.update({name: np.asarray(array) for name, array in grid.cell_data.items()})
+        mesh.save(path)
+
+    writers: dict[str, Callable[[Path], object]] = {
+        OURS: lambda path: files.write(path, grid, {}),
+        "meshio": with_meshio,
+        "PyVista (VTK's own)": with_pyvista,
+    }
+    spent: dict[str, list[float]] = {name: [] for name in writers}
+    with tempfile.TemporaryDirectory() as folder:
+        for k in range(repeats):
+            for name, write in writers.items():
+                began = time.perf_counter()
+                write(Path(folder) / f"{k}.vtu")
+                spent[name].append(time.perf_counter() - began)
+    return spent
