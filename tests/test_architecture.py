@@ -28,17 +28,17 @@ MAY_IMPORT = {
 #: The edge, where everything is put together; nothing above imports it.
 EDGE = {"__init__", "__main__", "bench", "cli", "doctor", "pipeline", "report", "sweep"}
 
-#: Distributions that only these parts import.
+#: Distributions that only these parts import; benchmarks time the writers of others.
 ONLY_IN = {
     "gmsh": {"shapes"},
     "ezdxf": {"shapes"},
     "vtk": {"output", "render"},
     "vtkmodules": {"output", "render"},
-    "pyvista": {"output", "render"},
+    "pyvista": {"output", "render", "bench"},
     "matplotlib": {"render"},
     "imageio": {"render"},
     "pydantic": {"scene"},
-    "meshio": {"shapes", "output"},
+    "meshio": {"shapes", "output", "bench"},
     "numba": {"dda", "ddm", "coupling"},
     "shapely": {"shapes", "scene", "coupling", "output", "render"},
 }

@@ -69,8 +69,8 @@ def measure(quick: bool = False) -> Measured:
     (FOLDER / "output.json").write_text(json.dumps(told, indent=1, ensure_ascii=False), encoding="utf-8")
     ours = writers[OURS]
     lines = [
-        f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles: {found.bytes_a_cycle / 1e6:.2f} MB a cycle,"
-        f" {found.bytes_a_cell:.0f} bytes a cell of the blocks' series",
+        f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles: {found.bytes_a_cycle / 1e6:.2f} MB a cycle",
+        f"  the blocks' series takes {found.bytes_a_cell:.0f} bytes a cell",
         f"  {found.rate / 1e6:.0f} MB of arrays a second until all is on disk; the run waits {1e3 * found.waited:.1f} ms a cycle",
         f"  share of a run of {steps} steps of {1e3 * TIME_STEP:g} ms: {share:.1%} (goal below {SHARE:.0%})",
         "one file of the blocks, as this project and as others write it",
