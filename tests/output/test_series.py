@@ -373,8 +373,9 @@ def test_a_killed_run_leaves_a_readable_series(tmp_path):
     running = subprocess.Popen([sys.executable, "-c", code])
     try:
         deadline = time.monotonic() + 30
-        pvd = tmp_path / "contacts.pvd"
-        while time.monotonic() < deadline and not (pvd.exists() and len(read_collection(pvd)) > 20):
+        # Each is renewed in its own time.
+        pvds = [tmp_path / f"{name}.pvd" for name in ("blocks", "cracks", "tips", "contacts")]
+        while time.monotonic() < deadline and not all(p.exists() and len(read_collection(p)) > 20 for p in pvds):
             time.sleep(0.05)
     finally:
         running.kill()
