@@ -23,6 +23,7 @@ from .cracked_blocks import CrackedBlocks
 from .event_steps import SETTLED, TOGETHER, EventSteps
 from .growing import births, growth_of_tips, initiations, take_growth
 from .record import event, record
+from .tips_in_time import TipsInTime
 
 log = logging.getLogger(__name__)
 
@@ -74,6 +75,7 @@ class Coupling:
             raise ValueError('control "toughness" needs stepping "events"')
         #: What the growth that ended the last load step brought, where the load follows the cracks.
         self._brought: tuple[Event, ...] = ()
+        self.tips = None if self.static else TipsInTime(problem)
         self.under_way: UnderWay | None = None
         self.between: Callable[[], None] = _go_on
 
@@ -149,7 +151,10 @@ class Coupling:
             tips = found.tips
             may_grow = growth_pass < growing.max_passes
             events, stops = pending, stops or self._stops(pending)
-            growth = growth_of_tips(now, tips, enough, together) if may_grow and not stops else None
+            growth = None
+            if may_grow and not stops:
+                longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, result.dt)
+                growth = growth_of_tips(now, tips, enough, together, longest)
             if growth is None and may_grow and not stops and growing.initiation:
                 growth, born = births(now, solutions, result.state, enough)
                 events += born
@@ -159,12 +164,16 @@ class Coupling:
                 events, stops = events + collapse, bool(collapse)
             if growth is not None:
                 tips["grown"] = growth.grown
+                if self.tips is not None:
+                    self.tips.went(tips)
                 events += initiations(now, tips, result.state)
                 stops = self._stops(events)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed
             budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
+            if self.tips is not None and len(tips):
+                statistics["fastest_tip"] = self.tips.speed.fastest(result.dt)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)
             if growth is None or self.follows:
                 if growth is None and not may_grow:
@@ -174,6 +183,8 @@ class Coupling:
                         growth_pass,
                     )
                 self.length.after(result, dt, now.system.allowed_ratio)
+                if self.tips is not None:
+                    self.tips.end(tips, now.blocks, result.dt)
                 now.state, now.budget = result.state, budget
                 now.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
                 if growth is not None:

@@ -13,11 +13,18 @@ from .record import event
 from .splitting import split_blocks
 
 
-def growth_of_tips(now: CrackedBlocks, tips: np.ndarray, enough: float = 1.0, together: float = 1.0):
+def growth_of_tips(
+    now: CrackedBlocks,
+    tips: np.ndarray,
+    enough: float = 1.0,
+    together: float = 1.0,
+    longest: np.ndarray | float = np.inf,
+):
     """The new network (`ddm.growth.Growth`) when some of ``tips`` has a K_eq of ``enough`` times its toughness, else None;
-    those with ``together`` times theirs grow with it. Sets the angles that were followed."""
+    those with ``together`` times theirs grow with it. No tip goes farther than ``longest`` (n_tips,) m, and none with 0.
+    Sets the angles that were followed."""
     k_ic = _toughness(now, tips)
-    if not np.any(tips["k_eq"] >= enough * k_ic):
+    if not np.any((tips["k_eq"] >= enough * k_ic) & (np.asarray(longest) > 0)):
         return None
     k_ic = together * k_ic
     from ..ddm.growth import advance
@@ -27,7 +34,7 @@ def growth_of_tips(now: CrackedBlocks, tips: np.ndarray, enough: float = 1.0, to
 
     def grow():
         with now.timed("growth"):
-            return advance(now.cracks, now.blocks.loops, tips, now.problem.growth, k_ic, now.number)
+            return advance(now.cracks, now.blocks.loops, tips, now.problem.growth, k_ic, now.number, longest)
 
     def look_ahead(cracks):
         nonlocal trial

@@ -89,24 +89,27 @@ def advance(
     settings: GrowthSettings,
     k_ic: np.ndarray,
     cycle: int,
+    longest: np.ndarray | float = math.inf,
 ) -> Growth:
     """Advance every tip whose ``k_eq`` has reached ``k_ic`` by one segment.
 
     ``loops_of(block)`` gives the block's outline and holes in reference coordinates ([] for an infinite plane); ``tips``
     are TIP rows with ``k_eq`` and ``angle`` filled; ``k_ic`` (n_tips,) Pa √m; ``cycle`` is the birth cycle of new
     segments. The increment is settings.increment times (K_eq/K_Ic) over its largest value, but no less than
-    settings.min_increment. New segments carry aperture 0 and continue their crack's direction and place in the
+    settings.min_increment, and no more than ``longest`` (n_tips,) m; where that is 0 the tip stands. New segments carry aperture 0 and continue their crack's direction and place in the
     list. Tips are served in the order given. Raises ValueError for a tip row that is no tip of the network, or whose
     angle is not finite.
     """
     k_ic = np.broadcast_to(np.asarray(k_ic, dtype=float), (len(tips),))
     grown = np.zeros(len(tips))
-    growing = np.flatnonzero((tips["k_eq"] >= k_ic) & (tips["k_eq"] > 0))
+    longest = np.broadcast_to(np.asarray(longest, dtype=float), (len(tips),))
+    growing = np.flatnonzero((tips["k_eq"] >= k_ic) & (tips["k_eq"] > 0) & (longest > 0))
     if not len(growing):
         return Growth(cracks, grown, ())
     loose = set(cracks.tips.tolist())
     drive = tips["k_eq"][growing] / k_ic[growing]
     lengths = np.clip(settings.increment * drive / drive.max(), settings.min_increment, settings.increment)
+    lengths = np.minimum(lengths, longest[growing])
     steps = []
     for row, length in zip(growing, lengths):
         tip = tips[row]

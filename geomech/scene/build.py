@@ -244,6 +244,7 @@ def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
         initiation_distance=g.initiation_distance_m,
         initiation_spacing=g.initiation_spacing_m,
         trial_kink=g.trial_kink_m,
+        speed_limit=g.speed_limit,
     )
 
 

@@ -142,6 +142,11 @@ class GrowthTable(Table):
         description='length of the kinks that criterion "f" tries in all directions, faces in contact and with friction, m '
         "(0: kinks of no length, on which nothing presses; an increment or less sees shear cracks under compression)",
     )
+    speed_limit: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.4,
+        description="in dynamic runs no tip runs faster than this part of the rock's Rayleigh speed, c_R = (0.87 + 1.12 ν)/(1 + ν)"
+        " √(μ/ρ) (Viktorov 1967)",
+    )
 
 
 class RunTable(Table):

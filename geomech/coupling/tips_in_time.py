@@ -1,0 +1,34 @@
+"""What tips do in the time of a dynamic run: they start when waves have had the time to reach them, and run no faster
+than waves do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model import Blocks, Problem
+from .tip_speed import TipSpeed
+from .wave_time import WaveTime
+
+
+class TipsInTime:
+    """`TipSpeed` and `WaveTime` of the tips of ``problem``."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.speed, self.waves = TipSpeed(problem), WaveTime(problem)
+        self._k_ic = np.array([m.k_ic for m in problem.materials])
+
+    def may_go(self, tips: np.ndarray, blocks: Blocks, dt: float) -> np.ndarray:
+        """(n_tips,) m, how far ``tips`` may still go in the present step of ``dt`` s."""
+        return np.where(self._driven(tips, blocks, dt), self.speed.left(tips, blocks, dt), 0.0)
+
+    def went(self, tips: np.ndarray) -> None:
+        """``tips`` have ``grown`` in a pass of the present step."""
+        self.speed.went(tips)
+
+    def end(self, tips: np.ndarray, blocks: Blocks, dt: float) -> None:
+        """The step of ``dt`` s has ended with ``tips``."""
+        self.speed.end(tips, blocks, dt, self._driven(tips, blocks, dt))
+        self.waves.end(tips, blocks, dt)
+
+    def _driven(self, tips: np.ndarray, blocks: Blocks, dt: float) -> np.ndarray:
+        return self.waves.drive(tips, blocks, dt) >= self._k_ic[blocks.material[tips["block"]]]
