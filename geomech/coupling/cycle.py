@@ -150,6 +150,8 @@ class Coupling:
                 load_time = result.state.time
             tips = found.tips
             may_grow = growth_pass < growing.max_passes
+            if self.follows and not self.events.reached:
+                may_grow = False  # on the way to a lower load
             events, stops = pending, stops or self._stops(pending)
             growth = None
             if may_grow and not stops:
@@ -176,7 +178,7 @@ class Coupling:
                 statistics["fastest_tip"] = self.tips.speed.fastest(result.dt)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)
             if growth is None or self.follows:
-                if growth is None and not may_grow:
+                if growth_pass == growing.max_passes:
                     log.warning(
                         "cycle %d: tips still grow after %d passes at one load; going on to the next load",
                         now.number,

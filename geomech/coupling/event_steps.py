@@ -45,7 +45,7 @@ class EventSteps:
 
     def __init__(self, problem: Problem) -> None:
         run, histories = problem.run, _histories(problem.loads)
-        self.time_step = problem.dda.time_step
+        self.time_step, self.follows = problem.dda.time_step, run.control == "toughness"
         self._corners = np.unique(np.concatenate([np.asarray(h.times, dtype=float) for h in histories]))
         # Between the corners of piecewise linear histories a step may take any length; within a sinusoid it may not.
         swings = any(h.wave is not None for h in histories)
@@ -55,23 +55,25 @@ class EventSteps:
         self._rate = 0.0
         #: Displacement ratio per second in the last step; None before there is one.
         self._pace: float | None = None
+        #: Whether the last first pass ended at an event.
+        self.reached = False
 
     def first_pass(self, now: CrackedBlocks, end: float) -> Balance:
-        """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; the load may
-        go back to an event that lies behind. Raises `dda.NotConverged`."""
+        """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; with control
+        "toughness" back to it where it lies behind. ``reached`` then says whether they are there. Raises `dda.NotConverged`."""
         start = now.state.time
         search = Crossing(self._rate)
         if self._drive is None:
             found, excess = self._at(now, start)
             search.slope *= 1 + excess
-            search.add(start, excess)
-            if excess > SETTLED:
-                found, excess = self._back(now, search)
         else:
-            excess = self._drive - 1
-            search.add(start, excess)
-        if excess < -SETTLED or self._drive is not None:
-            found, excess = self._ahead(now, search, end)
+            found, excess = None, self._drive - 1
+        search.add(start, excess)
+        if found is None or abs(excess) > SETTLED:
+            way = self._back if self.follows and excess > 0 else self._ahead
+            found, excess = way(now, search, end)
+        else:
+            self.reached = True
         self._drive, self._rate = 1 + excess, search.slope
         return found
 
@@ -88,32 +90,42 @@ class EventSteps:
     def _ahead(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
         start = now.state.time
         limit = self._limit(now, start, end)
-        event = search.next if search.next > start else limit
+        event = search.next
+        if event <= start:
+            # Tips that growth has not brought to rest.
+            event = limit = min(limit, start + self.time_step)
         whole = event <= limit and not self._far(event - start)
         aim = event if whole else min(start + APPROACH * (event - start), limit)
         for k in range(MOST):
             found, excess = self._at(now, aim, free=k == 0)
             at = found.result.state.time
             search.add(at, excess)
-            if abs(excess) <= SETTLED or (excess > 0 and search.width <= JUMP * abs(at)):
+            self.reached = abs(excess) <= SETTLED or (excess > 0 and search.width <= JUMP * abs(at))
+            if self.reached or (excess < 0 and not (whole and (search.enclosed or (at < limit and k < OPEN)))):
                 break
-            if excess < 0 and not (whole and (search.enclosed or (at < limit and k < OPEN))):
-                break
-            # A later one would be met by the next step.
             aim = min(search.next, limit)
             whole = whole or not self._far(aim - start)
             if not whole:
+                # It lies within a long step.
                 aim = start + APPROACH * (aim - start)
         return found, excess
 
-    def _back(self, now: CrackedBlocks, search: Crossing) -> tuple[Balance, float]:
+    def _back(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
         """Down to the load at which tips are driven no further; where none is low enough, to no load."""
+        start = now.state.time
+        limit = max(0.0, start - self._most(now))
+        whole = search.next >= limit and not self._far(start - search.next)
+        aim = search.next if whole else max(start - APPROACH * (start - search.next), limit)
         for _ in range(MOST):
-            at = max(search.next, 0.0)
-            found, excess = self._at(now, at)
-            search.add(at, excess)
-            if abs(excess) <= SETTLED or (excess > 0 and (at == 0.0 or search.width <= JUMP * at)):
+            found, excess = self._at(now, aim)
+            search.add(aim, excess)
+            self.reached = abs(excess) <= SETTLED or (excess > 0 and (aim == 0.0 or search.width <= JUMP * aim))
+            if self.reached or (excess > 0 and not (whole and (search.enclosed or aim > limit))):
                 break
+            aim = max(search.next, limit)
+            whole = whole or not self._far(start - aim)
+            if not whole:
+                aim = start - APPROACH * (start - aim)
         return found, excess
 
     def _at(self, now: CrackedBlocks, time: float, free: bool = False) -> tuple[Balance, float]:
@@ -121,10 +133,10 @@ class EventSteps:
         may be cut short by how far blocks may move."""
         way = time - now.state.time
         # The length of a static step is no more than its inertia: short ones would hold the blocks back.
-        found = balanced(now, max(way, self.time_step), None if free and way >= self.time_step else time)
+        found = balanced(now, max(abs(way), self.time_step), None if free and way >= self.time_step else time)
         way = found.result.state.time - now.state.time
-        if way > 0:
-            self._pace = found.result.statistics["max_displacement_ratio"] / way
+        if way != 0:
+            self._pace = found.result.statistics["max_displacement_ratio"] / abs(way)
         return found, drive(now, found) - 1
 
     def _far(self, way: float) -> bool:
@@ -134,10 +146,13 @@ class EventSteps:
         """The latest time to which a step from ``start`` may go, s."""
         stage = until_next_event(now.problem.loads, start, end - start)
         corner = self._corners[np.searchsorted(self._corners, start * (1 + 1e-12), side="right") :]
-        moved = self.time_step
-        if self._pace is not None:
-            moved = max(moved, USE * now.system.allowed_ratio / self._pace) if self._pace > 0 else math.inf
-        return min(start + min(stage, self._longest, moved), *corner[:1].tolist(), end)
+        return min(start + min(stage, self._most(now)), *corner[:1].tolist(), end)
+
+    def _most(self, now: CrackedBlocks) -> float:
+        """The longest step, s, by how fast blocks have moved in the last one."""
+        if not self._pace:
+            return min(self._longest, math.inf if self._pace == 0 else self.time_step)
+        return min(self._longest, max(self.time_step, USE * now.system.allowed_ratio / self._pace))
 
 
 def _histories(loads: Loads) -> list[History]:
