@@ -46,7 +46,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds.
 
     ``load_time``: when the loads are those of that time, whatever step the blocks take; it then is the new time. Of ``now``
-    the response, loads and solutions are renewed, nothing else. Raises `dda.NotConverged`.
+    the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`.
     """
     settling = Settling()
     tolerance = COMPLIANCE_TOLERANCE if now.problem.dda.dynamic_factor == 0.0 else DYNAMIC_TOLERANCE
@@ -57,6 +57,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
             dt = min(dt, result.dt)
             if load_time is not None and result.state.time != load_time:
                 result = replace(result, state=replace(result.state, time=load_time))
+        now.acted = result.statistics
         if not now.bodies:
             return Balance(result, {}, np.empty(0, TIP))
         _solve_bodies(now, result)

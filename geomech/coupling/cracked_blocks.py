@@ -22,7 +22,7 @@ class CrackedBlocks:
     ``state`` is that at the start of the step; ``problem`` has the loads as they are on the present blocks. ``number`` and
     ``load_step`` count cycles and load steps. ``bodies`` (block → elastic body), ``nodes_of`` (block → its nodes in the whole
     network), ``solutions``, ``loads`` and ``compliances`` are of the last pass; ``response`` is what the blocks are to
-    assume of their cracks.
+    assume of their cracks, ``acted`` the statistics of the last step, with what it takes to move blocks.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -44,6 +44,7 @@ class CrackedBlocks:
         self.history: dict[int, object] = {}
         self.solved_from: dict[int, object] = {}
         self.budget = dda.EnergyBudget()
+        self.acted: dict[str, float] = {}
         self.removed: np.ndarray | None = None
         self._motion: tuple[State, Motion] | None = None
         self._take_blocks()

@@ -184,6 +184,7 @@ class Coupling:
                         now.number,
                         growth_pass,
                     )
+                self.under_way = None
                 self.length.after(result, dt, now.system.allowed_ratio)
                 if self.tips is not None:
                     self.tips.end(tips, now.blocks, result.dt)

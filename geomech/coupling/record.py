@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ def record(
         number=now.number,
         load_step=now.load_step,
         growth_pass=growth_pass,
-        load=leading_load(now.problem, now.blocks, state.time),
+        load=leading_load(now.problem, now.blocks, state.time, now.acted),
         strain=axial_strain(now.gauge, motion),
         blocks=now.blocks,
         state=state,
@@ -45,20 +46,27 @@ def record(
 
 def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Event:
     """What happened at ``state`` in the present cycle, at ``point`` (reference coordinates)."""
-    load = leading_load(now.problem, now.blocks, state.time)
+    load = leading_load(now.problem, now.blocks, state.time, now.acted)
     return Event(kind, now.number, state.time, load, (float(point[0]), float(point[1])), detail)
 
 
-def leading_load(problem: Problem, blocks: Blocks, now: float) -> float:
-    """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one."""
+def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[str, float]) -> float:
+    """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one. Where the block
+    of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of the step."""
     name = problem.load_edge
     edges = blocks.edges_named(name) if name else []
     if not len(edges):
         return 0.0
     outward = blocks.outward_normals[edges[0]]
-    return sum(
+    tractions = sum(
         -float(load.history.at(now) @ outward) for load in problem.loads.edge_tractions if load.edge_name == name
     )
+    moved = {motion.block for motion in problem.loads.block_motions} & set(blocks.vertex_block[edges].tolist())
+    force = np.array([[acted.get(f"reaction_{axis}:{blocks.names[b]}", 0.0) for axis in "xy"] for b in sorted(moved)])
+    if not len(force):
+        return tractions
+    ends = blocks.vertices[blocks.next_vertex[edges]] - blocks.vertices[edges]
+    return tractions - float(force.sum(axis=0) @ outward) / float(np.hypot(*ends.T).sum())
 
 
 def axial_strain(gauge, motion: Motion) -> float:

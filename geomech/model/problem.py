@@ -124,7 +124,7 @@ class Problem:
     ``law`` counts in ``face_laws``.
 
     ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
-    compression); ``in_situ`` is the stress that the blocks have, at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
+    compression), or what it takes to move their block; ``in_situ`` is the stress that the blocks have, at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
     """
 
     title: str

@@ -45,12 +45,22 @@ def _tractions(c: Check) -> None:
             )
     leading = c.tables.loads.leading_edge
     # Where a traction's own edge is wrong, it may be the one that leads.
-    if leading is not None and leading not in taken and taken <= set(known):
+    if leading is not None and leading not in taken | _moved_edges(c) and taken <= set(known):
         c.refuse(
             ("loads", "leading_edge"),
-            f"no traction acts on the leading edge {leading!r}",
-            f"it must be the edge of one of [[loads.tractions]]: {nearest(leading, sorted(taken))}",
+            f"no traction acts on the leading edge {leading!r}, and no zone that has it is moved",
+            "it must be the edge of one of [[loads.tractions]], or of a zone in [[loads.motions]]: "
+            + nearest(leading, sorted(taken | _moved_edges(c))),
         )
+
+
+def _moved_edges(c: Check) -> set[str]:
+    """Names of the edges of zones that are moved."""
+    moved, blocks = {motion.zone for motion in c.tables.loads.motions}, c.drawing.blocks
+    owner = {
+        name: {c.drawing.zones[b] for b in blocks.vertex_block[blocks.edges_named(name)]} for name in _edge_names(c)
+    }
+    return {name for name, zones in owner.items() if zones & moved}
 
 
 def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:

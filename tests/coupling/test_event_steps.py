@@ -94,6 +94,15 @@ def test_tips_that_are_images_of_one_another_grow_together():
         assert first["grown"] == pytest.approx(second["grown"], abs=1e-9 * H)
 
 
+@pytest.mark.parametrize("stepping", ["fixed", "events"])
+def test_no_pass_is_made_twice(stepping):
+    """Short cracks under compression along them grow and stop: steps with growth are followed by others."""
+    problem = plate(rate=-RATE, lines=(SLANTED @ [[0, 1], [1, 0]],), stop_at=(), stepping=stepping, end_time=1300.0)
+    problem = replace(problem, dda=DdaSettings(time_step=100.0), growth=GrowthSettings(increment=3e-3))
+    passes = [(cycle.load_step, cycle.growth_pass) for cycle in cycles(problem)]
+    assert len(set(passes)) == len(passes) and passes[-1][0] > min(step for step, number in passes if number) > 0
+
+
 def test_steps_do_not_pass_the_corners_of_a_history():
     """Tension that comes and goes, too weak to grow anything, twice: every turn of it is a step's end."""
     path = History.table([0.0, 3.0, 5.5, 11.0, 12.0], np.outer([0.0, 1e5, 0.0, 2e5, 0.0], [0.0, 1.0]))
