@@ -2,7 +2,7 @@
 
 Blocks slide and rotate along joints (discontinuous deformation analysis, `geomech.dda`), cracks grow through the rock
 bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` lets each drive the
-other. `load_scene`, `cycles`, `run` and `factor_of_safety` are the whole pipeline; each solver also stands alone.
+other. `load_scene`, `cycles`, `run`, `resume` and `factor_of_safety` are the whole pipeline; each solver also stands alone.
 """
 
 import os
@@ -24,6 +24,7 @@ _PUBLIC = {
     "load_scene": "geomech.scene",
     "cycles": "geomech.pipeline",
     "run": "geomech.pipeline",
+    "resume": "geomech.resumption",
     "factor_of_safety": "geomech.pipeline",
 }
 

@@ -1,7 +1,7 @@
-"""The command line: ``geomech check | build | run | safety | render | report | bench | doctor``.
+"""The command line: ``geomech check | build | run | resume | safety | render | report | bench | doctor``.
 
-Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input. Nothing heavy is imported before a
-verb asks for it.
+Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input, 3 interrupted (Ctrl-C or SIGTERM).
+Nothing heavy is imported before a verb asks for it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .bench import TOPICS, topic
 for _library in ("OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
 #: Pixels, as for a scene's own render.width_px.
 LEAST_WIDTH = 64
 
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return verb(options)
     except KeyboardInterrupt:
         _say("interrupted")
-        return FAILED
+        return INTERRUPTED
     except Exception as error:
         if _is_bad_input(error):
             _say_errors(error)
@@ -52,7 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="geomech",
         description="How a jointed, cracked rock mass comes apart: blocks that move (DDA), cracks that grow (DDM).",
-        epilog="exit codes: 0 done, 1 failed run, 2 bad input",
+        epilog="exit codes: 0 done, 1 failed run, 2 bad input, 3 interrupted",
     )
     parser.add_argument("--version", action="version", version=f"geomech {__version__}")
     parser.add_argument("--debug", action="store_true", help="show the traceback of a failure")
@@ -92,6 +92,22 @@ def _parser() -> argparse.ArgumentParser:
     _scene_arguments(run)
     run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default outputs/NAME[/VARIANT])")
     run.add_argument("--quiet", action="store_true", help="say nothing but errors")
+
+    resume = verb(
+        "resume", _resume, "go on with a run that was interrupted, killed, or is to last longer, from its last checkpoint",
+        "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
+    )  # fmt: skip
+    resume.description += (
+        " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores itself on"
+        " Ctrl-C or SIGTERM; a second one ends it at once."
+    )
+    resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    resume.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key that does not change what has happened: run.end_time_s, run.stop_at, output.every … "
+        "(may be repeated)",
+    )  # fmt: skip
+    resume.add_argument("--quiet", action="store_true", help="say nothing but errors")
 
     safety = verb(
         "safety", _safety, "find by what factor the strength of joints may be divided before the blocks go",
@@ -206,7 +222,7 @@ def _build(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _run(options: argparse.Namespace) -> int:
+def _prepare_for_a_run() -> None:
     import atexit
     import gc
     import signal
@@ -221,6 +237,10 @@ def _run(options: argparse.Namespace) -> int:
     # Python ends with three searches for loops in all that was ever imported, a third of a second: leave these to the
     # operating system.
     atexit.register(gc.freeze)
+
+
+def _run(options: argparse.Namespace) -> int:
+    _prepare_for_a_run()
     place: Path = options.scene
     if place.is_dir() and (place / "run.py").is_file():
         return _run_script(place, options)
@@ -238,6 +258,19 @@ def _run(options: argparse.Namespace) -> int:
         # One variant with --out goes into exactly that folder.
         folder = base if name is None or (options.out and len(scenes) == 1) else base / name
         run(scene, out=folder, observers=standard_observers(scene, quiet=options.quiet))
+    return DONE
+
+
+def _resume(options: argparse.Namespace) -> int:
+    _prepare_for_a_run()
+    from .resumption import Finished, NotResumable, resume
+
+    try:
+        resume(options.run, options.overrides, quiet=options.quiet, tell=_say)
+    except Finished as nothing_left:
+        _say(f"{options.run}: {nothing_left}")
+    except NotResumable as error:
+        raise BadInput(f"{options.run}: {error}") from error
     return DONE
 
 

@@ -5,10 +5,15 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from .interruption import Interruption
 from .model import Cycle, Problem
+
+if TYPE_CHECKING:
+    from .coupling import Coupling
 
 log = logging.getLogger(__name__)
 
@@ -20,17 +25,21 @@ def cycles(scene) -> Iterator[Cycle]:
     return run_problem(_loaded(scene).problem())
 
 
-def run(scene, out: str | Path | None = None, observers: Iterable[Any] | None = None) -> dict[str, Any]:
+def run(
+    scene, out: str | Path | None = None, observers: Iterable[Any] | None = None, *, again: bool = False
+) -> dict[str, Any]:
     """Run ``scene`` to its end and return the summary that ``summary.json`` holds.
 
     ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are told of every cycle, by default
-    the writers that the scene's ``[output]`` table asks for. Whatever ends the run, what was written stays readable
+    the writers that the scene's ``[output]`` table asks for. ``again``: the scene is the copy that an earlier run has left in
+    ``out``. Whatever ends the run, what was written stays readable
     and every observer is ended; the exception is raised again. Raises SceneError on bad input
     or when ``out`` is where the scene itself is kept, `geomech.dda.NotConverged` when the blocks find no consistent contact state.
     """
     scene = _loaded(scene)
     folder = Path(out) if out is not None else Path("outputs") / scene.name
-    _spare(scene, folder)
+    if not again:
+        _spare(scene, folder)
     problem = scene.problem()
     if observers is None:
         from .output import standard_observers
@@ -43,29 +52,94 @@ def run_problem(
     problem: Problem, folder: Path, observers: Iterable[Any], warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
     """The same for a problem built in Python; ``warnings`` about it are logged once the run's log is open."""
-    from .coupling import cycles as coupled
-    from .output.observer import Group
+    return Journey(problem, folder, observers).go(warnings)
 
-    began = time.perf_counter()
-    group = Group(observers)
-    summary: dict[str, Any] = {"title": problem.title}
-    stopping: list[str] = []
-    error: BaseException | None = None
-    try:
-        group.on_start(problem, folder)
-        for warning in warnings:
-            log.warning("%s", warning)
-        for cycle in coupled(problem):
-            stopping += [event.kind for event in cycle.events if event.kind in (*problem.run.stop_at, "collapse")]
-            group.on_cycle(cycle)
-    except BaseException as failure:
-        error = failure
-        raise
-    finally:
-        summary["end"] = _end_reason(stopping, error)
-        summary["wall_s"] = time.perf_counter() - began
-        group.on_end(summary, error)
-    return summary
+
+class Journey:
+    """A run under way: the coupled problem and its observers, from its start, or from the ``stored`` content of a checkpoint
+    with ``problem`` as it is to be from then on."""
+
+    def __init__(
+        self, problem: Problem, folder: Path, observers: Iterable[Any], stored: dict[str, Any] | None = None
+    ) -> None:
+        from .output.checkpointing import Checkpoints
+        from .output.observer import Group
+
+        self.problem, self.folder, self.stored = problem, Path(folder), stored
+        self.group = Group(observers)
+        self.checkpoints = next((each for each in self.group.observers if isinstance(each, Checkpoints)), None)
+        self.interruption = Interruption()
+        self.stops_at = (*problem.run.stop_at, "collapse")
+        self.stopping = [] if stored is None else [kind for kind in stored["stopping"] if kind in self.stops_at]
+        self.ended = stored is not None and stored["ended"] and bool(self.stopping)
+        self.spent = 0.0 if stored is None else stored["wall_s"]
+        self.before_the_stop = False
+
+    def go(self, warnings: Iterable[str] = ()) -> dict[str, Any]:
+        """To the end; the summary. ``warnings`` are logged once the log is open."""
+        self.began = time.perf_counter()
+        summary: dict[str, Any] = {"title": self.problem.title}
+        error: BaseException | None = None
+        try:
+            if self.stored is None:
+                self.group.on_start(self.problem, self.folder)
+            else:
+                self.group.on_resume(self.problem, self.folder, self.stored["observers"])
+            for warning in warnings:
+                log.warning("%s", warning)
+            with self.interruption if self._stores else nullcontext():
+                self._cycles()
+        except BaseException as failure:
+            error = failure
+            raise
+        finally:
+            summary["end"] = _end_reason(self.stopping, error)
+            summary["wall_s"] = self._wall_time
+            self.group.on_end(summary, error)
+        return summary
+
+    @property
+    def _wall_time(self) -> float:
+        return self.spent + time.perf_counter() - self.began
+
+    @property
+    def _stores(self) -> bool:
+        return self.checkpoints is not None and self.checkpoints.wanted
+
+    def _cycles(self) -> None:
+        from .coupling import Coupling
+
+        coupling = Coupling(self.problem) if self.stored is None else self.stored["coupling"]
+        begun = coupling.cycles() if self.stored is None else coupling.load_steps()
+        self.stored = None  # what the run has left behind need not be kept
+        if self._stores:
+            coupling.between = lambda: self._between(coupling)
+        if self.ended:
+            return
+        for cycle in begun:
+            self.stopping += [event.kind for event in cycle.events if event.kind in self.stops_at]
+            self.group.on_cycle(cycle)
+        self.ended = True
+        if self._stores and not self.before_the_stop:
+            self._store(coupling)
+
+    def _between(self, coupling: Coupling) -> None:
+        # A run that is told afterwards not to stop goes on from before its last pass, in which no crack may grow.
+        self.before_the_stop = coupling.stops_next
+        if self.interruption.asked or self.before_the_stop or self.checkpoints.due:
+            self._store(coupling)
+        if self.interruption.asked:
+            raise KeyboardInterrupt
+
+    def _store(self, coupling: Coupling) -> None:
+        content = {
+            "coupling": coupling,
+            "observers": self.group.memories(),
+            "stopping": self.stopping,
+            "ended": self.ended,
+            "wall_s": self._wall_time,
+        }
+        self.checkpoints.write(coupling.now.number, coupling.now.state.time, content)
 
 
 def factor_of_safety(scene, load_time: float | None = None, **wishes):

@@ -283,11 +283,11 @@ def test_render_of_a_folder_of_runs_names_them(finished, capsys):
 def test_a_failure_is_told_once(scene, tmp_path, monkeypatch, capsys):
     import geomech.coupling
 
-    def fails(problem):
+    def fails(coupling):
         raise ArithmeticError("no equilibrium at t = 2 s")
         yield
 
-    monkeypatch.setattr(geomech.coupling, "cycles", fails)
+    monkeypatch.setattr(geomech.coupling.Coupling, "cycles", fails)
     assert main(["run", str(scene), "--out", str(tmp_path / "out")]) == FAILED
     told = capsys.readouterr().err
     assert told.count("no equilibrium") == 1 and "stopped before the first cycle" in told

@@ -1,5 +1,5 @@
 """Blocks and cracks drive each other: tractions from contacts, growth, compliance back, splitting, the cycle."""
 
-from .cycle import cycles
+from .cycle import Coupling, cycles
 
-__all__ = ["cycles"]
+__all__ = ["Coupling", "cycles"]

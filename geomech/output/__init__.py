@@ -8,22 +8,26 @@ from __future__ import annotations
 
 from typing import Any
 
+from .checkpointing import Checkpoints
 from .histories import Histories
 from .joint_histories import JointHistories
 from .observer import Group, Observer
 from .progress import Progress
 from .reading import Run
 from .record import RunLog, SceneCopy
+from .run_folder import RunFolder
 from .series import Series
 from .summary import Summary
 
 __all__ = [
+    "Checkpoints",
     "Group",
     "Histories",
     "JointHistories",
     "Observer",
     "Progress",
     "Run",
+    "RunFolder",
     "RunLog",
     "SceneCopy",
     "Series",
@@ -34,11 +38,13 @@ __all__ = [
 
 def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
     """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
-    (``every``, ``joints``, ``interior``, ``interior_every``, ``configuration``) and its ``resolved()`` form."""
+    (``every``, ``joints``, ``interior``, ``interior_every``, ``configuration``, ``checkpoint_every``) and its ``resolved()``
+    form."""
     output = getattr(scene, "output", None)
-    watchers: list[Observer] = [RunLog()]
-    if scene is not None:
-        watchers.append(SceneCopy(scene.resolved()))
+    resolved = None if scene is None else scene.resolved()
+    watchers: list[Observer] = [RunFolder(), RunLog()]
+    if resolved is not None:
+        watchers.append(SceneCopy(resolved))
     interior_every = getattr(output, "interior_every", 5) if getattr(output, "interior", True) else 0
     return [
         *watchers,
@@ -49,6 +55,7 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
             interior_every=interior_every,
             configuration=getattr(output, "configuration", "reference"),
         ),
+        Checkpoints(every=getattr(output, "checkpoint_every", None), scene=resolved),
         Summary(),  # after the writers, whose times it takes in
         Progress(quiet=quiet),
     ]

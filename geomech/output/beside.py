@@ -25,9 +25,13 @@ class Beside:
             self._jobs.popleft().result()
         self._jobs.append(self._thread.submit(job, *arguments))
 
+    def wait(self) -> None:
+        """Until all jobs are done."""
+        while self._jobs:
+            self._jobs.popleft().result()
+
     def close(self) -> None:
         try:
-            while self._jobs:
-                self._jobs.popleft().result()
+            self.wait()
         finally:
             self._thread.shutdown(cancel_futures=True)

@@ -8,12 +8,13 @@ import math
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from geomech.model import OPEN, Cycle, Problem
 
+from .checkpoint import FilesChanged
 from .fields import EVENTS, HISTORY, TIPS
 
 
@@ -26,6 +27,14 @@ class Histories:
         self._history = Table(folder / "history.csv", HISTORY)
         self._tips = Table(folder / "tips.csv", TIPS)
         self._events = Table(folder / "events.csv", EVENTS)
+
+    def memory(self) -> list[TableEnd]:
+        return [table.end for table in (self._history, self._tips, self._events)]
+
+    def on_resume(self, problem: Problem, folder: Path, memory: list[TableEnd]) -> None:
+        names = ("history.csv", "tips.csv", "events.csv")
+        tables = [Table.cut_back(Path(folder) / name, end) for name, end in zip(names, memory, strict=True)]
+        self._history, self._tips, self._events = tables
 
     def on_cycle(self, cycle: Cycle) -> None:
         self._history.add([history_row(cycle)])
@@ -48,6 +57,14 @@ class Histories:
             table.close()
 
 
+class TableEnd(NamedTuple):
+    """Where a `Table` ends: its columns, rows and bytes."""
+
+    columns: tuple[str, ...]
+    rows: int
+    size: int
+
+
 class Table:
     """A CSV file that grows row by row. A column not seen before (a monitor's, a step's statistic that only comes
     with contact) is added at the right, with the rows so far rewritten; that happens a few times in a run."""
@@ -55,9 +72,35 @@ class Table:
     def __init__(self, path: Path, columns: Iterable[str]) -> None:
         self.path, self.columns = Path(path), list(columns)
         self._known = set(self.columns)
+        self._rows = 0
         self._file = open(self.path, "w", newline="", encoding="utf-8")  # noqa: SIM115 (open as long as the run)
         csv.writer(self._file).writerow(self.columns)
         self._file.flush()
+
+    @property
+    def end(self) -> TableEnd:
+        return TableEnd(tuple(self.columns), self._rows, os.fstat(self._file.fileno()).st_size)
+
+    @classmethod
+    def cut_back(cls, path: Path, end: TableEnd) -> Table:
+        """Go on with the file ``path`` from where it ended as ``end`` says: columns and rows that came later are dropped.
+        Raises FilesChanged when it has not got what it had then."""
+        table = cls.__new__(cls)
+        table.path, table.columns, table._known, table._rows = path, list(end.columns), set(end.columns), end.rows
+        if not path.is_file():
+            raise FilesChanged(f"{path} is missing")
+        with open(path, "r+b") as file:
+            header = next(csv.reader([file.readline().decode("utf-8")]), [])
+            if header == table.columns and os.fstat(file.fileno()).st_size >= end.size:
+                file.truncate(end.size)
+                header = None
+        if header is not None:
+            table._narrow(header)
+        table._file = open(path, "a", newline="", encoding="utf-8")  # noqa: SIM115
+        if table.end != end:
+            table.close()
+            raise FilesChanged(f"{path} ends before its row {end.rows}, which it had at the checkpoint")
+        return table
 
     def add(self, rows: Iterable[dict[str, Any]]) -> None:
         """Append ``rows`` (column → value; a column left out stays empty) and flush."""
@@ -69,6 +112,7 @@ class Table:
             self._widen(fresh)
         text = io.StringIO()
         csv.writer(text).writerows([[_written(row.get(name)) for name in self.columns] for row in rows])
+        self._rows += len(rows)
         self._file.write(text.getvalue())
         self._file.flush()
 
@@ -81,13 +125,24 @@ class Table:
             _, *rows = csv.reader(file)
         self.columns += fresh
         self._known |= set(fresh)
+        self._rewrite([*row, *[""] * len(fresh)] for row in rows)
+        self._file = open(self.path, "a", newline="", encoding="utf-8")  # noqa: SIM115
+
+    def _narrow(self, header: list[str]) -> None:
+        """Take the columns beyond ours, and the rows beyond ours, out of the file, whose ``header`` has more."""
+        if header[: len(self.columns)] != self.columns:
+            raise FilesChanged(f"{self.path} has other columns than it had: {', '.join(header)}")
+        with open(self.path, newline="", encoding="utf-8") as file:
+            _, *rows = csv.reader(file)
+        self._rewrite(row[: len(self.columns)] for row in rows[: self._rows])
+
+    def _rewrite(self, rows: Iterable[list[str]]) -> None:
         beside = self.path.with_name(self.path.name + ".part")
         with open(beside, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(self.columns)
-            writer.writerows([*row, *[""] * len(fresh)] for row in rows)
+            writer.writerows(rows)
         os.replace(beside, self.path)
-        self._file = open(self.path, "a", newline="", encoding="utf-8")  # noqa: SIM115
 
 
 def history_row(cycle: Cycle) -> dict[str, Any]:

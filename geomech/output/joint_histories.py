@@ -9,7 +9,7 @@ from geomech.model import Cycle, Problem
 from geomech.model.joint_sums import JOINT_SUM, joint_sums, reactions
 
 from .fields import JOINTS, REACTIONS
-from .histories import Table
+from .histories import Table, TableEnd
 
 
 class JointHistories:
@@ -20,6 +20,16 @@ class JointHistories:
         folder.mkdir(parents=True, exist_ok=True)
         self._laws = problem.joints
         self._joints, self._reactions = Table(folder / "joints.csv", JOINTS), Table(folder / "reactions.csv", REACTIONS)
+
+    def memory(self) -> list[TableEnd]:
+        return [self._joints.end, self._reactions.end]
+
+    def on_resume(self, problem: Problem, folder: Path, memory: list[TableEnd]) -> None:
+        self._laws = problem.joints
+        self._joints, self._reactions = (
+            Table.cut_back(Path(folder) / name, end)
+            for name, end in zip(("joints.csv", "reactions.csv"), memory, strict=True)
+        )
 
     def on_cycle(self, cycle: Cycle) -> None:
         contacts, same = cycle.state.contacts, {"cycle": cycle.number, "time": cycle.state.time}

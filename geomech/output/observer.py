@@ -16,6 +16,10 @@ _log = logging.getLogger(__name__)
 class Observer(Protocol):
     """A run calls `on_start` once, `on_cycle` for every cycle in order, and `on_end` once, also after a failure.
 
+    An observer that writes what a resumed run is to go on with has two methods more: ``memory()``, what it needs for that
+    (anything that pickles), and ``on_resume(problem, folder, memory)``, called in place of `on_start`, which brings its files
+    back to where they were then. Whoever has none of them is started anew.
+
     ``summary`` is one mapping that all observers share: whoever runs the cycles puts in what it knows (``end``, the
     reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if one did.
     """
@@ -40,6 +44,22 @@ class Group:
             observer.on_start(problem, folder)
             self._started.append(observer)
 
+    def on_resume(self, problem: Problem, folder: Path, memories: list[tuple[str, Any]]) -> None:
+        """Go on with the ``memories`` of other such observers, each with the first of its own kind."""
+        left = list(memories)
+        for observer in self.observers:
+            mine = next((each for each in left if each[0] == _kind(observer)), None)
+            if mine is None:
+                observer.on_start(problem, folder)
+            else:
+                left.remove(mine)
+                observer.on_resume(problem, folder, mine[1])
+            self._started.append(observer)
+
+    def memories(self) -> list[tuple[str, Any]]:
+        """(kind, memory) of every observer that can go on with one."""
+        return [(_kind(observer), observer.memory()) for observer in self.observers if hasattr(observer, "memory")]
+
     def on_cycle(self, cycle: Cycle) -> None:
         for observer in self.observers:
             observer.on_cycle(cycle)
@@ -55,3 +75,7 @@ class Group:
         self._started = []
         if first is not None and error is None:
             raise first
+
+
+def _kind(observer: Any) -> str:
+    return f"{type(observer).__module__}.{type(observer).__qualname__}"

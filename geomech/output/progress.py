@@ -12,6 +12,7 @@ import numpy as np
 
 from geomech.model import Cycle, Problem, counted
 
+from . import checkpoint
 from .condition import closing, told
 
 
@@ -50,6 +51,16 @@ class Progress:
         elif not self.quiet:
             self._say(f"{problem.title}: {problem.inventory} → {folder}")
 
+    def memory(self) -> tuple[int, float] | None:
+        return None if self._last is None else (self._last.number, float(self._last.state.time))
+
+    def on_resume(self, problem: Problem, folder: Path, memory: tuple[int, float] | None) -> None:
+        self.on_start(problem, folder)
+        if memory is not None and self._bar is not None:
+            self._bar.update(memory[1])
+        elif memory is not None and not self.quiet:
+            self._say(f"  resumed after cycle {memory[0]}, t = {memory[1]:.4g} s")
+
     def on_cycle(self, cycle: Cycle) -> None:
         self._last = cycle
         if self.quiet:
@@ -78,6 +89,8 @@ class Progress:
             last = self._last
             where = "before the first cycle" if last is None else f"at {self._share(last)} %, {_told(last)}"
             self._say(f"stopped {where}\n  what was written until then is in {self._folder}")
+            if isinstance(error, (KeyboardInterrupt, OSError)) and checkpoint.found(self._folder / checkpoint.FOLDER):
+                self._say(f"  to go on: geomech resume {self._folder}")
         elif not self.quiet:
             self._say("\n".join(closing_lines(summary, self._folder)))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,19 @@ class RunLog:
         self.level = level
 
     def on_start(self, problem: Problem, folder: Path) -> None:
-        folder = Path(folder)
+        self._open(Path(folder), "w")
+        _log.info("%s: %s, %s", problem.title, problem.inventory, counted(len(problem.materials), "material"))
+
+    def memory(self) -> None:
+        """Nothing: the log goes on where it ends."""
+
+    def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
+        self._open(Path(folder), "a")
+        _log.info("%s: resumed", problem.title)
+
+    def _open(self, folder: Path, mode: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self._handler = logging.FileHandler(folder / "run.log", mode="w", encoding="utf-8")
+        self._handler = logging.FileHandler(folder / "run.log", mode=mode, encoding="utf-8")
         self._handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)-7s %(name)s: %(message)s"))
         self._handler.setLevel(self.level)
         logger = logging.getLogger("geomech")
@@ -29,7 +40,6 @@ class RunLog:
         logger.addHandler(self._handler)
         if logger.getEffectiveLevel() > self.level:
             logger.setLevel(self.level)
-        _log.info("%s: %s, %s", problem.title, problem.inventory, counted(len(problem.materials), "material"))
 
     def on_cycle(self, cycle: Cycle) -> None:
         for event in cycle.events:
@@ -63,7 +73,9 @@ class SceneCopy:
 
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "scene.toml").write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
+        beside = folder / "scene.toml.part"
+        beside.write_text(tomli_w.dumps(_without_none(self.resolved)), encoding="utf-8")
+        os.replace(beside, folder / "scene.toml")
 
     def on_cycle(self, cycle: Cycle) -> None:
         pass

@@ -11,6 +11,7 @@ from geomech.model import Cycle, Problem
 
 from . import grids
 from .beside import Beside
+from .checkpoint import FilesChanged
 from .fields import SERIES
 from .interior import InteriorMeshes
 from .triangulate import Triangles
@@ -21,6 +22,12 @@ PASS_OFFSET = 1e-6
 
 #: Interior fields cost more than everything else that is written; where no crack grows they are this much rarer.
 QUIET = 10
+
+
+#: What a `Series` knows of the run so far, besides what it has listed.
+_REMEMBERED = (
+    "_triangles", "_lines", "_meshes", "_keys", "_time", "_pending", "_last_interior", "_segments_then", "seconds",
+)  # fmt: skip
 
 
 class Series:
@@ -42,23 +49,49 @@ class Series:
         self.seconds = 0.0
 
     def on_start(self, problem: Problem, folder: Path) -> None:
-        self._materials, self._world = problem.materials, world_origin(problem)
-        self._folder = Path(folder)
-        self._vtk = self._folder / "vtk"
-        self._vtk.mkdir(parents=True, exist_ok=True)
-        for name in SERIES:
-            (self._folder / f"{name}.pvd").unlink(missing_ok=True)
-        # Files of a run before this one in the same folder are written over.
-        self._old = {path.name for name in SERIES for path in self._vtk.glob(f"{name}_[0-9]*.vtu")}
-        names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * bool(self.interior_every)
-        self._collections = {name: Collection(self._folder / f"{name}.pvd") for name in names}
-        self._files = {name: GridFiles(name) for name in names}
         self._triangles, self._lines, self._meshes = Triangles(), grids.CrackLines(), InteriorMeshes()
         self._keys = grids.KeyBlocks(problem)
-        self._beside = Beside()
         self._time = SeriesTime()
         self._pending: tuple[Cycle, float, bool] | None = None
         self._last_interior, self._segments_then = -1, 0
+        self._open(problem, Path(folder), {})
+        # Files of a run before this one in the same folder are written over.
+        self._old = self._unlisted()
+
+    def memory(self) -> dict[str, Any]:
+        self._beside.wait()
+        listed = {name: list(collection.entries) for name, collection in self._collections.items()}
+        return {"listed": listed, **{name: getattr(self, name) for name in _REMEMBERED}}
+
+    def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
+        """Goes on with the files that were listed then; later ones are deleted. Raises FilesChanged when one is missing."""
+        listed = memory["listed"]
+        vars(self).update({name: memory[name] for name in _REMEMBERED})
+        missing = [file for entries in listed.values() for _, file in entries if not (Path(folder) / file).is_file()]
+        if missing:
+            raise FilesChanged(f"{len(missing)} files of its series are missing in {folder}, the first is {missing[0]}")
+        self._open(problem, Path(folder), listed)
+        for name in self._unlisted():
+            (self._vtk / name).unlink()
+        self._old: set[str] = set()
+
+    def _open(self, problem: Problem, folder: Path, listed: dict[str, list[tuple[float, str]]]) -> None:
+        self._materials, self._world = problem.materials, world_origin(problem)
+        self._folder, self._vtk = folder, folder / "vtk"
+        self._vtk.mkdir(parents=True, exist_ok=True)
+        inside = bool(self.interior_every or listed.get("interior"))
+        names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * inside
+        for name in set(SERIES) - set(names):
+            (folder / f"{name}.pvd").unlink(missing_ok=True)
+        self._collections = {name: Collection(folder / f"{name}.pvd", listed.get(name, ())) for name in names}
+        self._files = {name: GridFiles(name) for name in names}
+        self._beside = Beside()
+
+    def _unlisted(self) -> set[str]:
+        """The files of series in ``vtk`` that no collection lists."""
+        listed = {file for collection in self._collections.values() for _, file in collection.entries}
+        there = {path.name for name in SERIES for path in self._vtk.glob(f"{name}_[0-9]*.vtu")}
+        return {name for name in there if f"vtk/{name}" not in listed}
 
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()

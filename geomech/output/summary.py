@@ -17,6 +17,9 @@ from geomech.model import Cycle, Event, Problem
 
 from .condition import energy_summary, key_block_summary, motion_summary
 
+#: What a `Summary` has counted.
+_COUNTED = ("_last", "_events", "_peak", "_load_steps", "_growth_passes", "_grown")
+
 
 class Summary:
     """Observer that counts, and at the end completes the run's ``summary`` and writes it as ``summary.json``.
@@ -27,14 +30,25 @@ class Summary:
     """
 
     def on_start(self, problem: Problem, folder: Path) -> None:
+        self._begin(problem, folder)
+        self._last: Cycle | None = None
+        self._events: list[Event] = []
+        self._peak, self._load_steps, self._growth_passes, self._grown = 0.0, 0, 0, 0.0
+
+    def _begin(self, problem: Problem, folder: Path) -> None:
         self._problem, self._path = problem, Path(folder) / "summary.json"
         self._path.parent.mkdir(parents=True, exist_ok=True)
         self._path.unlink(missing_ok=True)
         self._began = time.perf_counter()
-        self._last: Cycle | None = None
-        self._events: list[Event] = []
-        self._peak, self._load_steps, self._growth_passes, self._grown = 0.0, 0, 0, 0.0
         self._scale = normalisation(problem)
+
+    def memory(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in _COUNTED}
+
+    def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
+        self._begin(problem, folder)
+        vars(self).update(memory)
+        self._events = list(self._events)
 
     def on_cycle(self, cycle: Cycle) -> None:
         self._last = cycle

@@ -7,13 +7,13 @@ run that writes files need not import VTK.
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import struct
 import sys
-import time
 import zlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -197,6 +197,9 @@ def _put(path: Path | str, content: bytes | bytearray) -> None:
             written += os.write(handle, memoryview(content)[written:])
         if os.fstat(handle).st_size > written:
             os.ftruncate(handle, written)
+    except OSError as error:
+        error.filename = str(path)  # a full disk does not say which file it had no room for
+        raise
     finally:
         os.close(handle)
 
@@ -215,37 +218,52 @@ def _compressed(data: np.ndarray) -> bytes:
 class Collection:
     """A PVD file: a time series of .vtu files.
 
-    Times are written with ``repr`` so that they read back as the same numbers. The file is only ever replaced as a
-    whole (written beside itself, then renamed), so whoever reads it, also after a crash, finds a complete series. It is
-    renewed at most every ``interval`` s, since a run of quick steps would spend more time on that than on its files;
-    `close` brings it up to date.
+    Times are written with ``repr`` so that they read back as the same numbers. An entry and the end of the file are
+    written over the end that was there, at once: after every cycle, also the last before a crash, whoever reads the file
+    finds a complete series.
+
+    ``entries`` (time, file) are listed already: the file is made anew with them, in place of what it was.
     """
 
-    def __init__(self, path: Path, interval: float = 1.0) -> None:
-        self.path, self.interval = Path(path), interval
-        self._entries: list[str] = []
-        self._last = -math.inf
-        self._save()
+    def __init__(self, path: Path, entries: Iterable[tuple[float, str]] = ()) -> None:
+        self.path = Path(path)
+        self.entries = list(entries)
+        beside = self.path.with_name(self.path.name + ".part")
+        content = "".join([_PVD_HEAD, *(_entry(*each) for each in self.entries), _PVD_END]).encode()
+        _put(beside, content)
+        os.replace(beside, self.path)
+        self._end = len(content) - len(_PVD_END)
+        self._handle: int | None = os.open(self.path, os.O_WRONLY)
 
     def add(self, at: float, file: str) -> None:
         """List ``file`` (relative to the PVD's folder) at time ``at``, which must be later than all before it."""
-        if not at > self._last:
-            raise ValueError(f"{self.path.name}: time {at!r} does not follow {self._last!r}")
-        self._last = at
-        self._entries.append(f'<DataSet timestep="{float(at)!r}" part="0" file="{escape(file)}"/>\n')
-        if time.monotonic() - self._saved >= self.interval:
-            self._save()
+        last = self.entries[-1][0] if self.entries else -math.inf
+        if not at > last:
+            raise ValueError(f"{self.path.name}: time {at!r} does not follow {last!r}")
+        entry = _entry(at, file).encode()
+        content = entry + _PVD_END.encode()
+        written = os.pwrite(self._handle, content, self._end)
+        if written < len(content):
+            # The disk is full. What stood here before is left room for.
+            os.pwrite(self._handle, _PVD_END.encode(), self._end)
+            os.ftruncate(self._handle, self._end + len(_PVD_END))
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self.path))
+        self._end += len(entry)
+        self.entries.append((float(at), file))
 
     def close(self) -> None:
-        """Bring the file up to date."""
-        self._save()
+        """Give the file back; nothing can be added any more."""
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
 
-    def _save(self) -> None:
-        beside = self.path.with_name(self.path.name + ".part")
-        head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
-        _put(beside, "".join([head, *self._entries, "</Collection></VTKFile>\n"]).encode())
-        os.replace(beside, self.path)
-        self._saved = time.monotonic()
+
+_PVD_HEAD = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1"><Collection>\n'
+_PVD_END = "</Collection></VTKFile>\n"
+
+
+def _entry(at: float, file: str) -> str:
+    return f'<DataSet timestep="{float(at)!r}" part="0" file="{escape(file)}"/>\n'
 
 
 def read_collection(path: Path) -> list[tuple[float, Path]]:

@@ -209,7 +209,7 @@ def test_a_run_does_not_write_over_its_scene(tmp_path, capfd):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_broken_off_run_can_be_read(tmp_path, how):
-    """Ctrl-C and SIGTERM end with exit code 1 and a summary; a kill leaves all but the last cycle's files in good order."""
+    """Ctrl-C and SIGTERM end with exit code 3 and a summary; a kill leaves all but the last cycle's files in good order."""
     scene, out = tmp_path / "plate.toml", tmp_path / "out"
     scene.write_text(plate(increment=2e-5))
     process = subprocess.Popen(
@@ -223,7 +223,7 @@ def test_a_broken_off_run_can_be_read(tmp_path, how):
     _, shown = process.communicate(timeout=20)
     assert "Traceback" not in shown
     if how != signal.SIGKILL:
-        assert process.returncode == cli.FAILED and "interrupted" in shown
+        assert process.returncode == cli.INTERRUPTED and f"geomech resume {out}" in shown
         assert json.loads((out / "summary.json").read_text())["end"] == "interrupted"
     run = Run(out)
     assert len(run.history["cycle"]) >= 9 and list(run.history["cycle"]) == list(range(len(run.history["cycle"])))

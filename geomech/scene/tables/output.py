@@ -39,6 +39,11 @@ class OutputTable(Table):
         description="write the interior every n-th cycle while cracks grow, every 10 n-th while none does; at the first "
         "load, with events, before and after a block is cut and at the end always",
     )
+    checkpoint_every: Annotated[int, Field(ge=0)] | None = Field(
+        None,
+        description="store the run for `geomech resume` every n cycles, 0 never (unset: every half minute, less often where "
+        "that takes more than a fiftieth of the time); at the end and after Ctrl-C too, if not 0",
+    )
     configuration: Literal["reference", "current"] = Field(
         "reference", description='coordinates in files: "reference" with displacement, or "current"'
     )

@@ -1,0 +1,41 @@
+"""Ctrl-C and SIGTERM while a run lasts: the first lets the cycle end, the second ends the run at once."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from types import FrameType
+from typing import Any, Self
+
+_TOLD = b"\nstopping when this cycle is done; once more to stop at once\n"
+
+
+class Interruption:
+    """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do outside.
+
+    SIGTERM is taken the same way where it raises KeyboardInterrupt already, as on the command line. In other threads than
+    the main one, where signals do not arrive, nothing changes.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                if signal.getsignal(number) is signal.default_int_handler:
+                    self._before[number] = signal.signal(number, self._take)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        self._before = {}
+
+    def _take(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+        os.write(2, _TOLD)

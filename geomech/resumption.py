@@ -1,0 +1,188 @@
+"""Going on with a run from its last checkpoint."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from .output import checkpoint
+from .output.checkpoint import FilesChanged, NotResumable
+from .output.checkpointing import digests
+from .pipeline import Journey, run
+
+log = logging.getLogger(__name__)
+
+#: Keys of a scene that may be changed when a run is gone on with: none of them changes what has happened.
+ALLOWED = (
+    "title", "run.end_time_s", "run.stop_at", "output.every", "output.interior", "output.interior_every",
+    "output.checkpoint_every", "render",
+)  # fmt: skip
+#: Ends of a run that are none.
+_BROKEN_OFF = ("interrupted", "failed")
+
+
+class Finished(NotResumable):
+    """The run has come to its end."""
+
+
+def resume(
+    folder: str | Path,
+    overrides: Iterable[str] = (),
+    observers: Iterable[Any] | None = None,
+    *,
+    quiet: bool = False,
+    tell: Callable[[str], None] = log.warning,
+) -> dict[str, Any]:
+    """Go on with the run in ``folder`` and return its summary: bit for bit the files it would have left uninterrupted, on the
+    same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint are dropped.
+
+    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on). A run without a checkpoint so
+    far begins again. ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told when the run begins
+    again. Raises `Finished` when there is
+    nothing left to do, `NotResumable` when the run cannot be gone on with, SceneError on bad input.
+    """
+    folder = Path(folder)
+    _refuse_other_folders(folder)
+    header, path = next(checkpoint.whole(folder / checkpoint.FOLDER), (None, None))
+    if path is None:
+        return _begin_again(folder, list(overrides), observers, quiet, tell)
+    _refuse_other_sources(header, path)
+    scene = None if header["scene"] is None else _scene(folder, list(overrides))
+    changes = {} if scene is None else _changes(header, scene.resolved())
+    told = _told_end(folder)
+    if told is not None:
+        _refuse_finished(told, changes, header, scene)
+    stored = checkpoint.read(path)
+    coupling = stored["coupling"]
+    if scene is not None:
+        coupling.problem = replace(coupling.problem, title=scene.problem().title, run=scene.problem().run)
+    if observers is None:
+        from .output import standard_observers
+
+        observers = standard_observers(scene, quiet=quiet)
+    warnings = [f"{name} was {was!r}, is now {now!r}" for name, (was, now) in changes.items()]
+    warnings += _other_surroundings(header)
+    try:
+        return Journey(coupling.problem, folder, observers, stored).go(warnings)
+    except FilesChanged as error:
+        raise NotResumable(f"{error}: run it anew") from error
+
+
+def _refuse_other_folders(folder: Path) -> None:
+    if not folder.is_dir():
+        raise NotResumable(f"there is no run folder {folder}")
+    if not ((folder / "history.csv").is_file() or (folder / checkpoint.FOLDER).is_dir()):
+        below = sorted(str(found.parent) for found in folder.glob("*/history.csv"))
+        raise NotResumable(
+            f"{folder} holds no run: name the folder that `geomech run` wrote"
+            + (f"; runs below it: {', '.join(below)}" if below else "")
+        )
+
+
+def _refuse_other_sources(header: Mapping[str, Any], path: Path) -> None:
+    now = checkpoint.identity()
+    for name, value in now.items():
+        if header.get(name) != value:
+            what = {"format": "way of storing runs", "sources": "geomech's sources"}.get(name, name)
+            was = "" if name == "sources" else f" ({header.get(name)}, now {value})"
+            raise NotResumable(
+                f"{path} was written with another {what}{was}: go on with what wrote it, geomech {header.get('geomech')}, or "
+                "run the scene anew"
+            )
+
+
+def _scene(folder: Path, overrides: list[str]) -> Any:
+    from .scene import load_scene
+
+    return load_scene(folder / "scene.toml", overrides)
+
+
+def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """Key → (value then, value now) of all that the scene has otherwise than at the checkpoint. Raises NotResumable for what
+    would change what has happened."""
+    then, now = _flat(header["scene"]), _flat(json.loads(json.dumps(resolved)))
+    changes = {
+        key: (then.get(key), now.get(key)) for key in dict.fromkeys([*then, *now]) if then.get(key) != now.get(key)
+    }
+    forbidden = [key for key in changes if not any(key == name or key.startswith(f"{name}.") for name in ALLOWED)]
+    if forbidden:
+        told = "; ".join(f"{key} was {changes[key][0]!r}, is now {changes[key][1]!r}" for key in forbidden[:6])
+        raise NotResumable(
+            f"this would change what has happened in the run: {told}. Set it back, or run the changed scene into another "
+            f"folder. What may be changed: {', '.join(ALLOWED)}"
+        )
+    files = digests(resolved)
+    for name, digest in header["files"].items():
+        if files.get(name) != digest:
+            raise NotResumable(f"{name} is not what the run was begun with: bring it back, or run the scene anew")
+    return changes
+
+
+def _flat(node: Any, path: str = "") -> dict[str, Any]:
+    """Dotted key → value; arrays are values."""
+    if isinstance(node, Mapping):
+        return {
+            key: value
+            for name, item in node.items()
+            for key, value in _flat(item, f"{path}.{name}" if path else name).items()
+        }
+    return {path: node}
+
+
+def _told_end(folder: Path) -> str | None:
+    """Why the run ended by itself, as its summary has it; None where it did not."""
+    path = folder / "summary.json"
+    if not path.is_file():
+        return None
+    end = json.loads(path.read_text(encoding="utf-8")).get("end", "")
+    return None if end.startswith(_BROKEN_OFF) else end
+
+
+def _refuse_finished(end: str, changes: Mapping[str, Any], header: Mapping[str, Any], scene: Any) -> None:
+    """Unless what ended the run has been changed so that it goes on."""
+    if scene is None or end == "collapse":
+        raise Finished(f"the run has ended ({end}): there is nothing to go on with")
+    settings = scene.problem().run
+    if end == "end of the scene":
+        if settings.end_time > header["time_s"] * (1 + 1e-12):
+            return
+        way_out = f"--set run.end_time_s=… beyond {header['time_s']:g}"
+    else:
+        if end not in settings.stop_at:
+            return
+        kept = [kind for kind in settings.stop_at if kind != end]
+        way_out = f"--set 'run.stop_at={json.dumps(kept)}'"
+    raise Finished(f"the run has ended ({end}); to let it go on: {way_out}")
+
+
+def _begin_again(
+    folder: Path,
+    overrides: list[str],
+    observers: Iterable[Any] | None,
+    quiet: bool,
+    tell: Callable[[str], None],
+) -> dict[str, Any]:
+    end = _told_end(folder)
+    if end is not None:
+        raise Finished(f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on")
+    if not (folder / "scene.toml").is_file():
+        raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene anew")
+    tell(f"{folder} holds no checkpoint yet: the run begins again")
+    scene = _scene(folder, overrides)
+    if observers is None:
+        from .output import standard_observers
+
+        observers = standard_observers(scene, quiet=quiet)
+    return run(scene, folder, observers, again=True)
+
+
+def _other_surroundings(header: Mapping[str, Any]) -> list[str]:
+    return [
+        f"{name} was {header.get(name)!r} and is {value!r}: the last digits may differ from those of an uninterrupted run"
+        for name, value in checkpoint.surroundings().items()
+        if header.get(name) != value
+    ]

@@ -1,0 +1,499 @@
+"""Runs that are broken off and gone on with leave, byte for byte, the files of runs that were not."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geomech import cli
+from geomech.output import Checkpoints, Run, checkpoint, standard_observers
+from geomech.pipeline import run
+from geomech.resumption import Finished, NotResumable, resume
+from geomech.scene import load_scene
+
+ROOT = Path(__file__).resolve().parent.parent
+
+ROCK = """
+[materials.rock]
+youngs_modulus_pa = 17e9
+poissons_ratio = 0.21
+density_kg_m3 = 2200
+k_ic_pa_sqrt_m = 1e6
+"""
+#: A plate that is pulled until its crack has cut it in two, and whose parts then part.
+SPLIT = (
+    """
+title = "A plate that is torn"
+[geometry]
+zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
+cracks = [{ name = "flaw", points = [[-0.005, 0.0], [0.005, 0.002]] }]
+edges = [
+    { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
+    { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
+]
+"""
+    + ROCK
+    + """
+[[loads.tractions]]
+edge = "load:top"
+rate_pa_per_s = [0.0, 0.05e6]
+[[loads.tractions]]
+edge = "load:bottom"
+rate_pa_per_s = [0.0, -0.05e6]
+[dda]
+time_step_s = 10.0
+max_displacement_ratio = 1.0
+[ddm]
+elements_per_crack = 2
+elements_per_side = 2
+grading_layers = 1
+[growth]
+increment_m = 6e-3
+[run]
+end_time_s = 400.0
+stop_at = ["split"]
+[output]
+interior_every = 5
+"""
+)
+#: A block with a rough crack on a slope, under weight, shaken, in steps as long as they may be.
+SHAKEN = (
+    """
+title = "Blocks on a shaken slope"
+[[geometry.zones]]
+name = "slope"
+polygon = [[0.0, 0.0], [6.0, 0.0], [0.0, 3.0]]
+[[geometry.zones]]
+name = "lower"
+polygon = [[2.0, 2.0], [3.0, 1.5], [3.5, 2.5], [2.5, 3.0]]
+[[geometry.zones]]
+name = "upper"
+polygon = [[1.0, 2.5], [2.0, 2.0], [2.5, 3.0], [1.5, 3.5]]
+[[geometry.cracks]]
+name = "flaw"
+points = [[2.5, 2.0], [2.8, 2.4]]
+"""
+    + ROCK
+    + """
+[zones.slope]
+fixed = true
+[joints.default]
+friction_angle_deg = 24
+[joints.flaw]
+friction_angle_deg = 20
+[cracks.default]
+joint = "flaw"
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+[loads.base]
+frame = "base"
+acceleration_m_s2 = [2.0, 0.0]
+frequency_hz = 5.0
+[dda]
+time_step_s = 0.01
+automatic_time_step = true
+dynamic_factor = 1.0
+max_displacement_ratio = 0.01
+[ddm]
+elements_per_crack = 2
+elements_per_side = 2
+[run]
+end_time_s = 0.2
+stop_at = []
+"""
+)
+#: Stress in the rock, a zone that is dug out, bolts, and a base that moves.
+SUPPORTED = (
+    """
+title = "A block with supports"
+[[geometry.zones]]
+name = "base"
+rectangle = [-2.0, -1.0, 3.0, 0.0]
+[[geometry.zones]]
+name = "block"
+rectangle = [0.0, 0.0, 1.0, 1.0]
+[[geometry.zones]]
+name = "top"
+rectangle = [0.0, 1.0, 1.0, 2.0]
+[[geometry.cracks]]
+name = "flaw"
+points = [[0.4, 0.5], [0.6, 0.55]]
+"""
+    + ROCK
+    + """
+[zones.base]
+fixed = true
+[joints.default]
+friction_angle_deg = 40
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+[loads.in_situ]
+surface_m = 2.0
+unit_weight_n_per_m3 = 21582
+k0 = 0.0
+[[loads.motions]]
+zone = "base"
+velocity_m_per_s = [0.0, 1e-6]
+[[loads.bolts]]
+name = "tie"
+start = [0.5, 0.7]
+end = [0.6, 1.5]
+stiffness_n_per_m = 1e8
+pretension_n_per_m = 1e4
+[[loads.bolts]]
+name = "anchor"
+start = [0.9, 0.2]
+end = [2.0, -0.5]
+end_in_ground = true
+stiffness_n_per_m = 1e7
+start_s = 0.75
+[[loads.excavations]]
+time_s = 1.5
+zones = ["top"]
+[dda]
+time_step_s = 0.25
+max_displacement_ratio = 0.1
+[run]
+end_time_s = 4.0
+stop_at = []
+[[monitors]]
+name = "roof"
+at = [0.5, 1.0]
+zone = "block"
+"""
+)
+SCENES = {"split": SPLIT, "shaken": SHAKEN, "supported": SUPPORTED}
+
+
+@pytest.fixture
+def write(tmp_path):
+    def does(text: str) -> Path:
+        path = tmp_path / "case.toml"
+        path.write_text(text)
+        return path
+
+    return does
+
+
+class Breaks:
+    """Asks the run to stop after ``cycle``, as Ctrl-C does."""
+
+    def __init__(self, cycle: int) -> None:
+        self.cycle = cycle
+
+    def on_start(self, problem, folder) -> None:
+        pass
+
+    def on_cycle(self, cycle) -> None:
+        if cycle.number == self.cycle:
+            signal.raise_signal(signal.SIGINT)
+
+    def on_end(self, summary, error=None) -> None:
+        pass
+
+
+def broken_off(scene, folder: Path, cycle: int) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, folder, [*standard_observers(scene, quiet=True), Breaks(cycle)])
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Every file of a run, but for times of day: the log, checkpoints, and the summary's seconds."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        name = str(path.relative_to(folder))
+        if path.is_file() and name != "run.log" and path.parent.name != checkpoint.FOLDER:
+            found[name] = path.read_bytes()
+    summary = json.loads(found["summary.json"])
+    found["summary.json"] = {key: value for key, value in summary.items() if key not in ("wall_s", "seconds")}
+    return found
+
+
+def differing(a: Path, b: Path) -> list[str]:
+    one, other = files(a), files(b)
+    return [name for name in sorted({*one, *other}) if one.get(name) != other.get(name)]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_broken_off_and_resumed_leaves_the_same_bytes(name, write, tmp_path):
+    """At its start, in the middle (of growth at one load), and again some cycles later; in ``split`` also after the cut."""
+    scene = load_scene(write(SCENES[name]))
+    summary = run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))
+    last = summary["cycles"] - 1
+    assert last > 8
+    for cycle in sorted({0, last // 2, last - 2}):
+        broken_off(scene, tmp_path / "parts", cycle)
+        assert Run(tmp_path / "parts").history["cycle"][-1] == cycle
+        resume(tmp_path / "parts", quiet=True)
+        assert differing(tmp_path / "whole", tmp_path / "parts") == [], cycle
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", ["phi_0", "phi_30"])
+def test_two_cracks_broken_off_at_every_tenth(variant, tmp_path):
+    """The published specimen, through growth of all four tips and coalescence, resumed over and over in one folder."""
+    scene = load_scene(ROOT / "pipelines" / "two_cracks", ["dda.time_step_s=4"], variant)
+    last = run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))["cycles"] - 1
+    observers = standard_observers(scene, quiet=True)
+    broken_off(scene, tmp_path / "parts", last // 10)
+    for tenth in range(2, 10):
+        with pytest.raises(KeyboardInterrupt):
+            resume(tmp_path / "parts", (), [*observers, Breaks(tenth * last // 10)])
+    resume(tmp_path / "parts", quiet=True)
+    assert differing(tmp_path / "whole", tmp_path / "parts") == []
+
+
+def test_a_checkpoint_changes_nothing_of_the_run_that_writes_it(write, tmp_path):
+    often, never = (load_scene(write(SPLIT), [f"output.checkpoint_every={n}"]) for n in (1, 0))
+    for name, scene in (("often", often), ("never", never)):
+        run(scene, tmp_path / name, standard_observers(scene, quiet=True))
+    assert differing(tmp_path / "often", tmp_path / "never") == ["scene.toml"]
+    assert len(checkpoint.found(tmp_path / "often" / checkpoint.FOLDER)) == checkpoint.KEPT
+    assert not (tmp_path / "never" / checkpoint.FOLDER).exists()
+    with pytest.raises(Finished, match="no checkpoint: run the scene anew"):
+        resume(tmp_path / "never", ["run.end_time_s=500"])
+
+
+def test_what_came_after_the_checkpoint_is_dropped(write, tmp_path):
+    """Rows, listed and unlisted files and columns from after the checkpoint, as a kill leaves them."""
+    scene = load_scene(write(SPLIT), ["output.checkpoint_every=4"])
+    run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))
+    out = tmp_path / "parts"
+    broken_off(scene, out, 9)
+    # The one of cycle 8 is what a kill in cycle 10 would have left.
+    newest = checkpoint.found(out / checkpoint.FOLDER)
+    assert [checkpoint.read_header(path)["cycle"] for path in newest] == [9, 7]
+    newest[0].unlink()
+    with open(out / "history.csv", "a", encoding="utf-8") as file:
+        file.write("10,1e")
+    (out / "vtk" / "tips_000123.vtu").write_text("begun")
+    (out / "tips.pvd.part").write_text("begun")
+    resume(out, quiet=True)
+    assert differing(tmp_path / "whole", out) == []
+
+
+def test_a_finished_run_says_so_and_can_be_made_longer(write, tmp_path):
+    """What was to end earlier ends as if it had been meant to last as long from the start."""
+    path = write(SHAKEN)
+    long, short = load_scene(path, ["run.end_time_s=0.2"]), load_scene(path, ["run.end_time_s=0.1"])
+    for name, scene in (("long", long), ("short", short)):
+        run(scene, tmp_path / name, standard_observers(scene, quiet=True))
+    with pytest.raises(Finished, match=r"end of the scene.*run.end_time_s=… beyond 0.1"):
+        resume(tmp_path / "short")
+    resume(tmp_path / "short", ["run.end_time_s=0.3", "output.every=5"], quiet=True)
+    longer = Run(tmp_path / "short")
+    assert longer.history["time"][-1] == pytest.approx(0.3) and longer.scene["run"]["end_time_s"] == 0.3
+    # Steps are as long as they prove easy: but for the last one, which ended with the run, they are the same ones.
+    assert longer.history["time"][:5].tolist() == Run(tmp_path / "long").history["time"][:5].tolist()
+
+
+def test_a_run_that_stopped_goes_on_as_if_never_told_to(write, tmp_path):
+    """It stops at the coalescence, before the next pass of growth; told not to, it is the run without that key."""
+    path = write(SPLIT)
+    short = load_scene(path, ['run.stop_at=["daylighting", "split"]'])
+    whole = load_scene(path)
+    for name, scene in (("whole", whole), ("parts", short)):
+        run(scene, tmp_path / name, standard_observers(scene, quiet=True))
+    with pytest.raises(Finished, match=r"daylighting.*run.stop_at=\[\"split\"\]"):
+        resume(tmp_path / "parts")
+    resume(tmp_path / "parts", ['run.stop_at=["split"]'], quiet=True)
+    assert differing(tmp_path / "whole", tmp_path / "parts") == []
+
+
+def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
+    record = tmp_path / "push.csv"
+    record.write_text("time [s], ax [m/s2], ay [m/s2]\n0, 0, 0\n1, 2, 0\n")
+    text = SHAKEN.replace("acceleration_m_s2 = [2.0, 0.0]\nfrequency_hz = 5.0", 'file = "push.csv"')
+    scene = load_scene(write(text))
+    out = tmp_path / "out"
+    broken_off(scene, out, 2)
+    with pytest.raises(NotResumable, match=r"joints.default.friction_angle_deg was 24.0, is now 30"):
+        resume(out, ["joints.default.friction_angle_deg=30"])
+    record.write_text(record.read_text().replace("2, 0", "3, 0"))
+    with pytest.raises(NotResumable, match=r"push.csv is not what the run was begun with"):
+        resume(out)
+    record.write_text(record.read_text().replace("3, 0", "2, 0"))
+    copy = out / "scene.toml"
+    kept = copy.read_text()
+    copy.write_text(kept.replace("24.0", "25.0"))
+    with pytest.raises(NotResumable, match="was 24.0, is now 25.0"):
+        resume(out)
+    copy.write_text(kept)
+    known = checkpoint.identity()
+    for name, told in (("sources", "geomech's sources"), ("numpy", "another numpy"), ("format", "way of storing")):
+        monkeypatch.setattr(checkpoint, "identity", lambda name=name: {**known, name: "another"})
+        with pytest.raises(NotResumable, match=f"{told}.*go on with what wrote it, geomech 0"):
+            resume(out)
+    monkeypatch.setattr(checkpoint, "identity", lambda: known)
+    tips = (out / "tips.csv").read_bytes()
+    (out / "tips.csv").write_bytes(tips[:-5])
+    with pytest.raises(NotResumable, match="tips.csv ends before its row"):
+        resume(out, quiet=True)
+    (out / "tips.csv").write_bytes(tips)
+    assert resume(out, quiet=True)["end"] == "end of the scene"
+
+
+def test_what_is_no_run_is_told(write, tmp_path, capfd):
+    out = tmp_path / "out"
+    assert cli.main(["resume", str(out)]) == cli.BAD_INPUT and "there is no run folder" in capfd.readouterr().err
+    out.mkdir()
+    assert cli.main(["resume", str(out)]) == cli.BAD_INPUT and "holds no run" in capfd.readouterr().err
+    # Without a checkpoint it begins again, and finished it says so.
+    scene = load_scene(write(SUPPORTED), ["output.checkpoint_every=0", "run.end_time_s=1.0"])
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, out, [*standard_observers(scene, quiet=True), _At(3, KeyboardInterrupt())])
+    assert cli.main(["resume", str(out), "--quiet"]) == cli.DONE
+    assert "holds no checkpoint yet: the run begins again" in capfd.readouterr().err
+    assert Run(out).history["cycle"].tolist() == [0, 1, 2, 3, 4]
+    assert cli.main(["resume", str(out)]) == cli.DONE and "the run has ended" in capfd.readouterr().err
+
+
+class _At(Breaks):
+    """Fails after ``cycle``."""
+
+    def __init__(self, cycle: int, error: BaseException) -> None:
+        super().__init__(cycle)
+        self.error = error
+
+    def on_cycle(self, cycle) -> None:
+        if cycle.number == self.cycle:
+            raise self.error
+
+
+def test_a_second_interrupt_stops_at_once(write, tmp_path):
+    scene, out = load_scene(write(SUPPORTED), ["output.checkpoint_every=2"]), tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        run(
+            scene,
+            out,
+            [*standard_observers(scene, quiet=True), Breaks(5), Breaks(5), _At(5, AssertionError("too late"))],
+        )
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert checkpoint.read_header(checkpoint.found(out / checkpoint.FOLDER)[0])["cycle"] == 3
+    assert resume(out, quiet=True)["end"] == "end of the scene"
+
+
+def test_a_full_disk_is_told_and_what_was_written_is_kept(write, tmp_path, monkeypatch, capfd):
+    """As the file system says it, in the middle of a run; with room again the run goes on to the same bytes."""
+    from geomech.output import vtu
+
+    path, out, whole = write(SUPPORTED), tmp_path / "out", tmp_path / "whole"
+    run(load_scene(path), whole, standard_observers(load_scene(path), quiet=True))
+    put, count = os.write, [0]
+
+    def fills_up(handle, content):
+        count[0] += 1
+        if count[0] > 40:
+            put(handle, bytes(content)[: len(content) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return put(handle, content)
+
+    monkeypatch.setattr(vtu.os, "write", fills_up)
+    code = cli.main(["run", str(path), "--out", str(out), "--set", "output.checkpoint_every=2"])
+    shown = capfd.readouterr().err
+    assert code == cli.FAILED and "no space left on device" in shown and ".vtu" in shown
+    assert f"geomech resume {out}" in shown
+    monkeypatch.undo()
+    broken = Run(out)
+    assert len(broken.history) >= 8 and all(file.stat().st_size for _, file in broken.series("blocks"))
+    assert cli.main(["resume", str(out), "--quiet"]) == cli.DONE
+    assert differing(whole, out) == ["scene.toml"]
+
+
+def _killed(folder: Path, command: list[str], after: float) -> bool:
+    """Kill ``command`` with SIGKILL ``after`` s; whether it was still running."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "geomech", *command, "--quiet"], stderr=subprocess.PIPE, cwd=folder, text=True
+    )
+    try:
+        process.wait(timeout=after)
+    except subprocess.TimeoutExpired:
+        process.kill()
+    _, shown = process.communicate()
+    assert "Traceback" not in shown and process.returncode in (0, -signal.SIGKILL), shown
+    return process.returncode != 0
+
+
+def _killed_and_resumed(write, tmp_path, kills: int, seed: int) -> None:
+    """One folder, killed again and again at random moments; after each kill all that was written can be read."""
+    path = write(SPLIT + "checkpoint_every = 3\n")
+    scene = load_scene(path)
+    run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))
+    random, out, done = np.random.default_rng(seed), tmp_path / "out", 0
+    command = ["run", str(path), "--out", str(out)]
+    while done < kills:
+        # From before the first file to some cycles on: a start takes about a second.
+        if not _killed(tmp_path, command, random.uniform(0.4, 2.5)):
+            command = ["run", str(path), "--out", str(out)]
+            assert differing(tmp_path / "whole", out) == []
+            continue
+        done += 1
+        if not (out / "history.csv").is_file():
+            continue
+        _readable(out)
+        command = ["resume", str(out)]
+    resume(out, quiet=True)
+    assert differing(tmp_path / "whole", out) == []
+
+
+def _readable(out: Path) -> None:
+    import pyvista
+
+    broken = Run(out)
+    numbers = broken.history["cycle"].tolist()
+    assert numbers == list(range(len(numbers)))
+    listed = {name: broken.grids(name) for name in ("blocks", "cracks", "tips", "contacts", "interior")}
+    for grids in listed.values():
+        assert all(file.stat().st_size > 0 for file in grids.values())
+    # No cycle that the history has is missing in the series, but for the one that was being written.
+    assert len(numbers) - len(listed["blocks"]) <= 1 and listed["blocks"].keys() <= {*numbers, len(numbers)}
+    for grids in listed.values():
+        if grids:
+            pyvista.read(grids[max(grids)])
+    newest = next(checkpoint.whole(out / checkpoint.FOLDER), None)
+    if newest is not None:
+        assert newest[0]["cycle"] < len(numbers)
+
+
+def test_kills_lose_nothing(write, tmp_path):
+    _killed_and_resumed(write, tmp_path, 3, 1)
+
+
+@pytest.mark.slow
+def test_a_hundred_kills_lose_nothing(write, tmp_path):
+    _killed_and_resumed(write, tmp_path, 100, 2)
+
+
+def test_signals_are_left_alone_elsewhere(write, tmp_path):
+    """A run in another thread than the main one changes no handler; a run without checkpoints neither."""
+    scene = load_scene(write(SUPPORTED), ["run.end_time_s=0.5"])
+    seen = []
+
+    class Sees(Breaks):
+        def on_cycle(self, cycle) -> None:
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=run, args=(scene, tmp_path / "a", [Checkpoints(), Sees(0)]))
+    thread.start()
+    thread.join()
+    run(scene, tmp_path / "b", [Checkpoints(every=0), Sees(0)])
+    assert len(seen) == 6 and set(seen) == {signal.default_int_handler}
+
+
+def test_time_spent_goes_on(write, tmp_path):
+    scene = load_scene(write(SUPPORTED), ["run.end_time_s=1.0"])
+    broken_off(scene, tmp_path / "out", 2)
+    before = json.loads((tmp_path / "out" / "summary.json").read_text())["wall_s"]
+    began = time.perf_counter()
+    after = resume(tmp_path / "out", quiet=True)["wall_s"]
+    assert before * 0.5 < after < before + time.perf_counter() - began
