@@ -265,7 +265,8 @@ def test_crack_strain_is_the_mean_strain_that_the_rock_lacks():
 
 
 def test_kink_is_graded_and_forgotten():
-    """A kinked crack's K with two layers is within 0.5 % of that with six; three increments on, the layers are gone."""
+    """A kinked crack's K with default grading is within 0.3 % of that with four layers more; three increments on, the layers
+    (three at this turn) are gone."""
 
     def body(n, layers):
         return ddm.Body([], grown(n, aperture=math.inf), ROCK, DdmSettings(grading_layers=layers))
@@ -274,7 +275,7 @@ def test_kink_is_graded_and_forgotten():
     two, six = (body(1, layers).solve(load).tips for layers in (2, 6))
     assert np.allclose(two["k_i"], six["k_i"], rtol=3e-3) and np.allclose(two["k_ii"], six["k_ii"], atol=3e-3)
     on_first = [np.sum(body(n, 2).faces.source == 0) for n in (1, 2, 3, 4)]
-    assert on_first[0] == on_first[1] == 6 and on_first[2] == on_first[3] == 4
+    assert on_first[0] == on_first[1] == 7 and on_first[2] == on_first[3] == 4
 
 
 def test_principal_stresses_are_those_of_the_tensor():
