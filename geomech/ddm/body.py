@@ -114,12 +114,14 @@ class Body:
             self.area, self.centroid = np.inf, np.zeros(2)
         self._factored_after_all = previous is not None and previous._factored_after_all
         solver = "dense" if self._factored_after_all else settings.solver
-        many = is_iterated(solver, self.boundary.n_unknowns, bool(self.supports))
+        holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
+        holes_held = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
+        many = is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
         self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns)
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}
-        self._assemble(previous)
+        self._assemble(previous, holds, many)
 
     @property
     def nu(self) -> float:
@@ -162,13 +164,11 @@ class Body:
         vars(again).pop("tip_elements", None)
         return again
 
-    def _assemble(self, previous: Body | None) -> None:
+    def _assemble(self, previous: Body | None, holds: Holds | None, iterated: bool) -> None:
         nu, tol = self.nu, self._tol
         c, old = self.faces, previous
-        holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
-        solver = "dense" if self._factored_after_all else self.settings.solver
         before = old._outside if old else None
-        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, before, work=self.work, solver=solver)
+        system = BoundarySystem(self.mesh, nu, tol, self._extent, holds, before, work=self.work, iterated=iterated)
         self._outside = system
         self.boundary = g = system.elements
         g_old, same_boundary = system.at_old, system.unchanged
@@ -200,8 +200,8 @@ class Body:
 
         if self.compressed:
             on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
-            iterated = system.factor if system.iterated else None
-            self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol, iterated)
+            on_both = system.factor if system.iterated else None
+            self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol, on_both)
             return
         # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
         # make again, should the boundary change, than to carry along.
@@ -279,10 +279,10 @@ class Body:
             if self.settings.solver != "auto" or self.faces.n_unknowns + self.boundary.n_unknowns > FACTORABLE:
                 raise
             _log.info("%s; factored instead", failure)
-            iterated = copy(self)
+            before = copy(self)
             self.compressed, self._factored_after_all = False, True
             vars(self).pop("face_equations", None)
-            self._assemble(iterated)
+            self._assemble(before, self._outside.holds, False)
             return self._solved(load, warm, equilibrium_tolerance, history)
 
     def _solved(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .anchors import Anchors
-from .boundary_iteration import IteratedBoundary, is_iterated
+from .boundary_iteration import HeldJumps, HeldMatrix, IteratedBoundary
 from .factor import Factor
 from .hierarchical import Compressed
 from .influence import ElementSet, influence, reuse
@@ -36,7 +36,8 @@ class BoundarySystem:
     factor        of ``matrix`` with the rigid motions lifted
     unchanged     whether all is ``previous``'s; ``at_old`` (n_elements,) the elements' numbers there, −1 where new
 
-    ``solver`` as in the settings. Raises numpy.linalg.LinAlgError when the equations are singular.
+    ``iterated``: not to be factored (`boundary_iteration.is_iterated`). Raises numpy.linalg.LinAlgError when the equations are
+    singular.
     """
 
     def __init__(
@@ -49,10 +50,10 @@ class BoundarySystem:
         previous: BoundarySystem | None = None,
         *,
         work: Work,
-        solver: str = "dense",
+        iterated: bool = False,
     ):
         g = mesh.boundary
-        self.iterated = is_iterated(solver, g.n_unknowns, holds is not None)
+        self.iterated = iterated
         self._nu, self._tol, self.work = nu, tol, work
         self.at_old = at_old = g.found_in(previous.elements if previous else None)
         self.unchanged = (
@@ -71,8 +72,15 @@ class BoundarySystem:
         if self.iterated:
             self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
             self.known, self.free_motions, self.anchors = np.empty((g.n_unknowns, 0)), None, None
-            self.matrix = Compressed(g, g, nu, tol)
-            self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol)
+            self.matrix = jumps = Compressed(g, g, nu, tol)
+            if holds is not None:
+                self._hold_motions(mesh)
+                self.matrix, self.known = HeldMatrix(jumps, holds, nu, tol), HeldJumps(jumps, holds)
+
+            def between(elements):
+                return self.influence_on(g.take(elements), elements)
+
+            self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol, between)
             return
         # With holes anchored, the old matrix is not one of tractions alone.
         dense = previous is not None and previous.anchors is None and not previous.iterated

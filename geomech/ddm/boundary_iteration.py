@@ -3,50 +3,95 @@
 Unknown are displacements that enter as jumps, so A_ΓΓ is of the kind that cracks have and the same neighbourhoods
 (`iterative.Patches`) make GMRES converge: 38 products at 10 000 unknowns, 53 at 20 000, on a square as on a rough ellipse.
 The lifted rigid motions are in the neighbourhoods too; one that holds a whole small hole would be singular without them.
+Where supports hold the boundary the unknowns are reactions, line forces; these are few beside the boundary and stay dense.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from .crack_system import Rows
 from .hierarchical import Compressed
-from .influence import ElementSet
-from .iterative import Patches, gmres
+from .influence import ElementSet, line_influence
+from .iterative import Patches, gmres, scales
+from .supports import Holds
 
 #: Boundary unknowns from which "auto" and "compressed" iterate on them. Matrices and one load take 0.8 s at 4100 (factored
 #: 2.7 s) and 1.5 s at 6100 (7.1 s), processor time; another load 0.3 and 0.4 s (0.01 s), so that factors are the better for
 #: some fifteen loads at this number.
 CROSSOVER = 6000
+#: Entries of the reactions' dense columns up to which a held boundary is iterated on (a gigabyte).
+MOST_REACTIONS = 128_000_000
 
 
-def is_iterated(solver: str, n_unknowns: int, supports: bool) -> bool:
-    """Whether ``solver`` iterates on so many boundary unknowns; held displacements are factored."""
-    return solver != "dense" and n_unknowns >= CROSSOVER and not supports
+def is_iterated(solver: str, n_unknowns: int, holds: Holds | None = None, holes_held: bool = False) -> bool:
+    """Whether ``solver`` iterates on so many boundary unknowns, of which supports have those of ``holds``; where they hold a
+    hole (`anchors`) the boundary is factored."""
+    if solver == "dense" or n_unknowns < CROSSOVER or holes_held:
+        return False
+    return holds is None or n_unknowns * holds.sources.n_unknowns <= MOST_REACTIONS
+
+
+class HeldMatrix:
+    """A_ΓΓ of a boundary that is held in part: ``jumps`` on all of it as an operator, and the columns of reactions."""
+
+    def __init__(self, jumps: Compressed, holds: Holds, nu: float, tol: float):
+        self._jumps, self._holds = jumps, holds
+        self._reactions = line_influence(holds.boundary, holds.sources, nu, tol, -1.0)
+        self._nothing = np.zeros(holds.sources.n_unknowns)
+
+    def __matmul__(self, x: np.ndarray) -> np.ndarray:
+        displacement, reactions = self._holds.split(x, self._nothing)
+        return self._jumps @ displacement + self._reactions @ reactions
+
+    def transposed_times(self, v: np.ndarray) -> np.ndarray:
+        """A_ΓΓᵀ ``v``."""
+        return self._holds.joined(self._jumps.transposed_times(v), v @ self._reactions)
+
+
+class HeldJumps:
+    """Traction on the boundary from displacement of what supports hold, as an operator on its values (h_unknowns,)."""
+
+    def __init__(self, jumps: Compressed, holds: Holds):
+        self._jumps, self._places, self._n = jumps, holds.boundary.unknowns(holds.elements), holds.boundary.n_unknowns
+
+    def __matmul__(self, imposed: np.ndarray) -> np.ndarray:
+        if not imposed.any():
+            return np.zeros(self._n)
+        whole = np.zeros(self._n)
+        whole[self._places] = imposed
+        return self._jumps @ whole
 
 
 class IteratedBoundary:
     """What stands for a `Factor` of ``matrix``, A_ΓΓ of the ``elements``, with ``rigid`` (n, k) and ``weights`` (k, n) lifted
-    as `boundary` has it. ``products`` counts those with the matrix."""
+    as `boundary` has it; ``between(elements)`` is the matrix between some of them. ``products`` counts those with the
+    matrix."""
 
     def __init__(
         self,
         elements: ElementSet,
-        matrix: Compressed,
+        matrix: Compressed | HeldMatrix,
         rigid: np.ndarray,
         weights: np.ndarray,
         extent: float,
         nu: float,
         tol: float,
+        between: Callable[[np.ndarray], np.ndarray],
     ):
         self._matrix, self._rigid, self._weights, self._extent = matrix, rigid, weights, extent
         self.n, self.products = elements.n_unknowns, 0
+        # Elements at the ends of supports are shorter by far than any other's.
+        self.scale = scales(elements) if isinstance(matrix, HeldMatrix) else None
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
-        def lift(unknowns: np.ndarray) -> np.ndarray:
-            return rigid[unknowns] @ weights[:, unknowns] / extent
+        def lifted(numbers: np.ndarray) -> np.ndarray:
+            unknowns = elements.unknowns(numbers)
+            return between(numbers) + rigid[unknowns] @ weights[:, unknowns] / extent
 
-        self._patches = Patches(elements, np.zeros(elements.n, int), nu, tol, lift)
+        self._patches = Patches(elements, np.zeros(elements.n, int), nu, tol, lifted)
         zero = np.zeros(self.n)
         self._patches.change(Rows(np.zeros(self.n, bool), zero, zero, elements.per))
 
@@ -77,7 +122,13 @@ class IteratedBoundary:
             # As much of the last solution as its right-hand side is in this one: a load that comes again costs nothing.
             before, u = self._last
             first = float(before @ right) / float(before @ before) * u
-        u, n = gmres(lambda v: self.times(v, transposed), right, lambda v: self.roughly(v, transposed), first)
+        u, n = gmres(
+            lambda v: self.times(v, transposed),
+            right,
+            lambda v: self.roughly(v, transposed),
+            first,
+            scale=self.scale,
+        )
         self.products += n
         if not transposed and right.any():
             self._last = right.copy(), u

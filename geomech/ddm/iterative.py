@@ -56,11 +56,23 @@ def gmres(
     tolerance: float = TOLERANCE,
     restart: int = 250,
     limit: int = 1000,
+    scale: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """x with |right − A x| ≤ ``tolerance`` |right| and the number of products ``times``, from the guess ``first``.
+    """x with |right − A x| ≤ ``tolerance`` |right| and the number of products ``times``, from the guess ``first``; equations
+    count by their ``scale`` (n,), if it is given.
 
     Preconditioned from the right (Saad & Schultz 1986), so that it is the true residual that falls. Raises NotSolved.
     """
+    if scale is not None:
+        return gmres(
+            lambda v: scale * times(v),
+            scale * right,
+            lambda v: precondition(v / scale),
+            first,
+            tolerance,
+            restart,
+            limit,
+        )
     size = float(np.linalg.norm(right))
     if size == 0.0:
         return np.zeros_like(right), 0
@@ -123,9 +135,15 @@ def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, long
     return precondition(sum(a * u for a, u in zip(y, basis))), k
 
 
+def scales(elements: ElementSet) -> np.ndarray:
+    """(n_unknowns,) what equations have to be multiplied by where elements differ much in length: tractions go with one over
+    it, and those of the shortest alone would decide when a solution is good enough."""
+    return np.repeat(elements.length / elements.length.max(), 2 * elements.per) if elements.n else np.zeros(0)
+
+
 class Patches:
-    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element; ``lift(unknowns)`` is
-    what is added to the influence between them."""
+    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element; ``between(elements)``
+    the matrix between some of them where it is not their influence alone."""
 
     def __init__(
         self,
@@ -133,9 +151,10 @@ class Patches:
         crack: np.ndarray,
         nu: float,
         tol: float,
-        lift: Callable[[np.ndarray], np.ndarray] | None = None,
+        between: Callable[[np.ndarray], np.ndarray] | None = None,
     ):
-        self._elements, self._nu, self._tol, self._lift = elements, nu, tol, lift
+        self._elements, self._nu, self._tol = elements, nu, tol
+        self._between = self._influence if between is None else between
         tree = Tree.over(elements, PATCH)
         middle = 0.5 * (elements.start + elements.end) @ np.array([1.0, 1j])
         at = np.argsort(crack, kind="stable")
@@ -159,10 +178,7 @@ class Patches:
             known = self._factors[k]
             if known is not None and known[0] == key:
                 continue
-            part = self._elements.take(elements)
-            matrix = influence(part, part, self._nu, self._tol)
-            if self._lift is not None:
-                matrix += self._lift(unknowns)
+            matrix = self._between(elements)
             moving = np.flatnonzero(mixed)
             matrix[moving] += mixed[moving, None] * matrix[moving + rows.per]
             matrix -= np.diag(spring)
@@ -171,6 +187,10 @@ class Patches:
             free = unknowns[~held]
             kept = np.flatnonzero(np.isin(free, own))
             self._factors[k] = key, free, kept, free[kept], Factor(matrix, "cracks cut a part of the body off")
+
+    def _influence(self, elements: np.ndarray) -> np.ndarray:
+        part = self._elements.take(elements)
+        return influence(part, part, self._nu, self._tol)
 
     @property
     def rcond(self) -> float:
@@ -232,6 +252,8 @@ class Coupled:
         self._reduced, self._boundary = reduced, boundary
         self._on_boundary, self._on_cracks = on_boundary, on_cracks
         self.first = boundary.n
+        cracks = scales(reduced.cracks.targets)
+        self.scale = None if boundary.scale is None else np.concatenate([boundary.scale, cracks])
 
     def times(self, v: np.ndarray, transposed: bool = False) -> np.ndarray:
         u, w = v[: self.first], v[self.first :]
@@ -270,6 +292,7 @@ class IterativeCrackSystem:
     ):
         self.matrix, self.n, self._coupled = matrix, elements.n_unknowns, coupled
         self._first = 0 if coupled is None else coupled.first
+        self._scale = None if coupled is None else coupled.scale
         self.products = 0
         self._per = elements.per
         self._patches = Patches(elements, crack, nu, tol)
@@ -317,7 +340,7 @@ class IterativeCrackSystem:
         self._patches.change(rows)
         self._coarse.change(rows.held)
         right = np.concatenate([np.zeros(self._first), np.where(rows.held, 0.0, right)])
-        found, n = gmres(times, right, roughly, self._guess(right, rows.held))
+        found, n = gmres(times, right, roughly, self._guess(right, rows.held), scale=self._scale)
         self.products += n
         self._last = right, found
         return found[self._first :]
@@ -348,7 +371,7 @@ class IterativeCrackSystem:
         self._patches.change(rows)
         self._coarse.change(rows.held)
         right = np.concatenate([np.zeros(self._first), np.where(rows.held, 0.0, right)])
-        found, n = gmres(times, right, roughly)
+        found, n = gmres(times, right, roughly, scale=self._scale)
         self.products += n
         return found[self._first :]
 

@@ -229,6 +229,15 @@ class Holds:
         reaction /= self.sources.length[:, None, None]
         return free.ravel(), reaction.ravel()
 
+    def joined(self, displacement: np.ndarray, reactions: np.ndarray) -> np.ndarray:
+        """(n_unknowns,) the transposed of `split`: where the boundary is held from ``reactions``, else from ``displacement``."""
+        b = self.boundary
+        out = self.turned(displacement).reshape(b.n, 2, b.per)
+        own = np.einsum("hjc,hcn->hjn", self.directions, reactions.reshape(-1, 2, b.per))
+        own /= self.sources.length[:, None, None]
+        out[self.elements] = np.where(self.held[:, :, None], own, out[self.elements])
+        return out.ravel()
+
     def free_motions(self, modes: np.ndarray) -> np.ndarray:
         """(3, k) the combinations of rigid ``modes`` (n_unknowns, 3), local, that no support resists."""
         held = self.turned(modes)[self.unknowns]
