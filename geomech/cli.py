@@ -218,7 +218,12 @@ def _build(options: argparse.Namespace) -> int:
         told = write_block_system(scene, folder)
         picture = options.picture or folder / "blocks.png"
         draw_block_map(scene, told, picture)
-        print("\n".join([f"{told['title']}: {told['summary']}", *told["lines"], f"  written   {folder}, {picture}"]))
+        pictures = str(picture)
+        if told["sets"]:
+            from .render.network_statistics import draw_network_statistics
+
+            pictures += f", {draw_network_statistics(scene, told, picture.with_name('joint_statistics.png')).name}"
+        print("\n".join([f"{told['title']}: {told['summary']}", *told["lines"], f"  written   {folder}, {pictures}"]))
     return DONE
 
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from geomech.model import Blocks, Cracks, counted
-from geomech.shapes.fracture_statistics import block_sizes, set_statistics
-from geomech.shapes.parts import JOINT
+from geomech.shapes.fracture_statistics import Topology, block_sizes, passing_curve
 from geomech.shapes.rock_bridges import rock_bridges
 
+from .joint_statistics import given, joint_statistics, table
 from .summary import write_json
 from .triangulate import Triangles
 from .vtu import LINE, TRIANGLE, Grid, GridFiles, world_origin
@@ -113,38 +112,12 @@ def _write_msh(
 def _statistics(
     scene: Any, problem: Any, area: np.ndarray, bridges: np.ndarray, zones: list[str], zone: np.ndarray
 ) -> dict[str, Any]:
-    import shapely
-
     blocks, cracks, jointed = problem.blocks, problem.cracks, scene.drawing.jointed
     free = ~blocks.fixed if (~blocks.fixed).any() else np.ones(blocks.n_blocks, bool)
     spans = np.hypot(*(bridges[:, 1] - bridges[:, 0]).T) if len(bridges) else np.empty(0)
-    rock = shapely.union_all([shapely.Polygon(blocks.loops(b)[0], blocks.loops(b)[1:]) for b in np.flatnonzero(free)])
-    asked = {shape.name: shape for shape in scene.tables.geometry.joint_sets}
-    sets = []
-    for joint in jointed.joints if jointed else ():
-        shape = asked.get(joint.name.removeprefix(JOINT))
-        region = rock
-        if shape is not None and shape.region is not None:
-            region = shapely.intersection(rock, shapely.Polygon(np.array(shape.region, dtype=float).reshape(-1, 2)))
-        found = set_statistics(joint, region)
-        own = np.array([name.rpartition(" ")[0] == joint.name.removeprefix(JOINT) for name in cracks.names], bool)
-        dead = float(cracks.lengths[own[cracks.crack]].sum()) if cracks.n_segments else 0.0
-        entry = {
-            "name": joint.name.removeprefix(JOINT),
-            "traces": found.traces,
-            "p10_per_m": found.p10,
-            "p20_per_m2": found.p20,
-            "p21_per_m": found.p21,
-            "mean_length_m": found.mean_length,
-            "mean_angle_deg": math.degrees(found.mean_angle),
-            "angle_deviation_deg": math.degrees(found.angle_deviation),
-            "cracks": int(own.sum()),
-            "crack_length_m": dead,
-        }
-        if shape is not None:
-            entry["asked"] = shape.model_dump(exclude_defaults=True, exclude={"name", "region"})
-        sets.append(entry)
+    sets = joint_statistics(scene, problem, free)
     nodes = dict(jointed.cutting.nodes) if jointed else {"I": 0, "Y": 0, "X": 0}
+    topology = Topology.of(nodes)
     mends = [mend._asdict() for mend in jointed.cutting.mends] if jointed else []
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)
     sizes = block_sizes(area[free], _PASSING)
@@ -164,9 +137,19 @@ def _statistics(
             "smallest_m2": float(area.min()),
             "largest_m2": float(area.max()),
             "size_m_by_part_passing": {f"{p:g}": size for p, size in sizes.items()},
+            "d10_m": sizes[0.1],
+            "d50_m": sizes[0.5],
+            "d90_m": sizes[0.9],
+            "percent_passing_by_size_m": passing_curve(area[free]).tolist(),
         },
         "sets": sets,
         "nodes": nodes,
+        "topology": {
+            "branches": topology.branches,
+            "lines": topology.lines,
+            "connections_per_branch": given(topology.per_branch),
+            "connections_per_line": given(topology.per_line),
+        },
         "cracks": {
             "number": cracks.n_cracks,
             "ends_in_rock": len(cracks.tips),
@@ -187,19 +170,22 @@ def _statistics(
 
 def _lines(told: dict[str, Any], jointed: Any) -> list[str]:
     """The statistics for people."""
-    size = told["blocks"]["size_m_by_part_passing"]
+    size = told["blocks"]
     rows = [
-        f"  blocks    √area of 25, 50, 75 % of the rock at most {size['0.25']:.3g}, {size['0.5']:.3g}, {size['0.75']:.3g} m"
+        f"  blocks    √area of 10, 50, 90 % of the rock at most {size['d10_m']:.3g}, {size['d50_m']:.3g}, {size['d90_m']:.3g} m"
     ]
     if told["sets"]:
-        rows[0] += f"; nodes I {told['nodes']['I']}, Y {told['nodes']['Y']}, X {told['nodes']['X']}"
+        nodes, topology = told["nodes"], told["topology"]
+        text = f"  nodes     I {nodes['I']}, Y {nodes['Y']}, X {nodes['X']}"
+        if topology["connections_per_branch"] is not None:
+            text += f"; {topology['connections_per_branch']:.2f} connections a branch"
+        if topology["connections_per_line"] is not None:
+            text += f", {topology['connections_per_line']:.3g} a line"
+        rows.append(text)
+        rows += [f"  {row}" for row in table(told["sets"])]
     x, y = told["world_origin_m"]
     if x or y:
         rows.insert(0, f"  origin    ({x:.10g}, {y:.10g}) m: add it to every coordinate that is written")
-    for entry in told["sets"]:
-        text = f"{entry['name']}: {counted(entry['traces'], 'trace')} at {entry['mean_angle_deg']:.3g}°, "
-        text += f"P10 {entry['p10_per_m']:.3g}/m, P20 {entry['p20_per_m2']:.3g}/m², P21 {entry['p21_per_m']:.3g} m/m²"
-        rows.append(f"  joints    {text}")
     if told["rock_bridges"]["number"]:
         bridges = told["rock_bridges"]
         rows.append(

@@ -54,9 +54,8 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
         keys.append(Patch(facecolor=FIXED, edgecolor="#8d9199", hatch="////", label="fixed"))
 
     edges = np.stack([blocks.vertices, blocks.vertices[blocks.next_vertex]], axis=1)
-    joints = [name for name in blocks.edge_names if name.startswith(JOINT)]
-    joints += [name for name in scene.drawing.joints if name not in joints]
-    colour = {name: SETS[k % len(SETS)] for k, name in enumerate(joints)}
+    colour = joint_colours(scene)
+    joints = list(colour)
     plain = np.array([not name.startswith(JOINT) for name in blocks.edge_names])[blocks.edge_name]
     axes.add_collection(LineCollection(edges[plain], colors=INK, linewidths=max(0.6, 0.6 * thin), capstyle="round"))
     statistics = {JOINT + entry["name"]: entry for entry in told["sets"]}
@@ -108,6 +107,13 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, facecolor="white")
     return path
+
+
+def joint_colours(scene: Any) -> dict[str, str]:
+    """What colour each kind of joint of a loaded scene has, by its edge name."""
+    joints = [name for name in scene.drawing.blocks.edge_names if name.startswith(JOINT)]
+    joints += [name for name in scene.drawing.joints if name not in joints]
+    return {name: SETS[k % len(SETS)] for k, name in enumerate(joints)}
 
 
 def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size: float) -> list[Any]:

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -122,15 +123,8 @@ def within(joint: Joint, zones: Sequence[Zone]) -> Joint:
 def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.random.Generator) -> Joint:
     name = JOINT + shape.name
     region = box if shape.region is None else np.array(shape.region, dtype=float).reshape(-1, 2)
-    section = math.radians(geometry.section_azimuth_deg)
-    angle = shape.angle_deg
-    if shape.dip_deg is not None:
-        angle = math.degrees(apparent_dip(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section))
-    turn = None if angle is None else Law(math.radians(angle), math.radians(shape.angle_deviation_deg), shape.angle_law)
-    length = None if shape.length_m is None else Law(shape.length_m, shape.length_deviation_m, shape.length_law)
+    turn, spacing, length, gap = _laws(shape, geometry)
     if shape.kind == "parallel":
-        spacing = Law(shape.spacing_m, shape.spacing_deviation_m, shape.spacing_law)
-        gap = None if shape.gap_m == 0 else Law(shape.gap_m, shape.gap_deviation_m, shape.gap_law)
         return parallel_set(name, region, turn, spacing, length, gap, rng)
     if shape.kind == "poisson":
         return poisson_traces(name, region, turn, length, shape.p20_per_m2, rng)
@@ -138,17 +132,47 @@ def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.rand
         return poisson_lines(name, region, turn, shape.p21_per_m, rng)
     if shape.kind == "voronoi":
         return voronoi(name, region, shape.cell_area_m2, rng)
-    return discs(
-        name,
-        region,
-        dip=math.radians(shape.dip_deg),
-        dip_direction=math.radians(shape.dip_direction_deg),
-        fisher=shape.fisher,
-        diameter=length,
-        per_volume_area=shape.p32_per_m,
-        section=section,
-        rng=rng,
-    )
+    return discs(name, region, rng=rng, **_in_space(shape, geometry, length))
+
+
+def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
+    """What a set of the scene is expected to be like, as `geomech.shapes.expected_statistics` says it."""
+    from ..shapes import expected_statistics as expected
+
+    turn, spacing, length, gap = _laws(shape, geometry)
+    if shape.kind == "parallel":
+        return expected.of_parallel(turn, spacing, length, gap)
+    if shape.kind == "poisson":
+        return expected.of_poisson_traces(turn, length, shape.p20_per_m2)
+    if shape.kind == "lines":
+        return expected.of_poisson_lines(turn, shape.p21_per_m)
+    if shape.kind == "voronoi":
+        return expected.of_voronoi(shape.cell_area_m2)
+    return expected.of_discs(**_in_space(shape, geometry, length))
+
+
+def _laws(shape: JointSetShape, geometry: Geometry) -> tuple[Law | None, Law | None, Law | None, Law | None]:
+    """The laws of angle in the section (rad), spacing, length and gap; None for what the set does not have."""
+    angle = shape.angle_deg
+    if shape.dip_deg is not None:
+        section = math.radians(geometry.section_azimuth_deg)
+        angle = math.degrees(apparent_dip(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section))
+    turn = None if angle is None else Law(math.radians(angle), math.radians(shape.angle_deviation_deg), shape.angle_law)
+    spacing = None if shape.spacing_m is None else Law(shape.spacing_m, shape.spacing_deviation_m, shape.spacing_law)
+    length = None if shape.length_m is None else Law(shape.length_m, shape.length_deviation_m, shape.length_law)
+    gap = None if shape.gap_m == 0 else Law(shape.gap_m, shape.gap_deviation_m, shape.gap_law)
+    return turn, spacing, length, gap
+
+
+def _in_space(shape: JointSetShape, geometry: Geometry, length: Law) -> dict[str, Any]:
+    return {
+        "dip": math.radians(shape.dip_deg),
+        "dip_direction": math.radians(shape.dip_direction_deg),
+        "fisher": shape.fisher,
+        "diameter": length,
+        "per_volume_area": shape.p32_per_m,
+        "section": math.radians(geometry.section_azimuth_deg),
+    }
 
 
 def _names(blocks: Blocks, block: int) -> tuple[tuple[str, ...], ...]:

@@ -34,6 +34,29 @@ class Law:
         if self.law in ("lognormal", "exponential") and not self.mean > 0:
             raise ValueError(f"a {self.law} law needs a positive mean, got {self.mean!r}")
 
+    @property
+    def spread(self) -> float:
+        """The standard deviation that the law has."""
+        return {"constant": 0.0, "exponential": float(self.mean)}.get(self.law, self.deviation)
+
+    @property
+    def moments(self) -> tuple[float, float, float]:
+        """E[X], E[X²], E[X³]."""
+        mean, square = self.mean, self.mean**2 + self.spread**2
+        if self.law == "exponential":
+            return mean, square, 6 * mean**3
+        if self.law == "lognormal":
+            return mean, square, mean**3 * (square / mean**2) ** 3
+        return mean, square, mean**3 + 3 * mean * self.spread**2
+
+    @property
+    def mean_cosine(self) -> float:
+        """E[cos(X − mean)] of an angle by a normal or uniform law, rad."""
+        if self.law == "uniform":
+            half = math.sqrt(3) * self.deviation
+            return math.sin(half) / half if half else 1.0
+        return math.exp(-0.5 * self.spread**2)
+
     def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
         """(n,) values."""
         if self.law == "exponential":
@@ -160,7 +183,11 @@ def discs(
     n = rng.poisson(per_volume_area / mean_area * (2 * reach) ** 2 * largest)
     radii = 0.5 * diameter.lengths(rng, n)
     centre = np.column_stack([rng.uniform(-reach, reach, (n, 2)), rng.uniform(-0.5 * largest, 0.5 * largest, n)])
-    pole = _fisher(_pole(dip, dip_direction, section), fisher, n, rng)
+    pole = mean_pole(dip, dip_direction, section)
+    if fisher > 0:
+        pole = poles_about(pole, fisher, rng.random(n), rng.uniform(0, 2 * math.pi, n))
+    else:
+        pole = np.tile(pole, (n, 1))
     # The section is z = 0: a disc is cut along the line through its plane, as far as its rim reaches.
     flat = np.hypot(pole[:, 0], pole[:, 1])
     cut = (flat > 1e-12) & (np.abs(centre[:, 2]) < radii * flat)
@@ -264,18 +291,19 @@ def _touching(lines: Sequence[np.ndarray] | np.ndarray, region: np.ndarray) -> l
     return out + np.split(points, np.flatnonzero(np.diff(owner)) + 1) if len(parts) else out
 
 
-def _pole(dip: float, dip_direction: float, section: float) -> np.ndarray:
+def mean_pole(dip: float, dip_direction: float, section: float) -> np.ndarray:
     """Unit normal, upwards, in the section's axes: x along it, y up, z horizontally across."""
     to = dip_direction - section
     return np.array([math.sin(dip) * math.cos(to), math.cos(dip), math.sin(dip) * math.sin(to)])
 
 
-def _fisher(mean: np.ndarray, concentration: float, n: int, rng: np.random.Generator) -> np.ndarray:
-    """(n, 3) unit vectors about ``mean`` by Fisher's law (1953); the polar angle by inversion, as Priest (1993), 3.6."""
+def poles_about(mean: np.ndarray, concentration: float, share: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """(n, 3) unit vectors about ``mean`` by Fisher's law (1953): farther from it than the part ``share`` of all, with ``turn``
+    about it, rad; by inversion (Priest 1993, 3.6). All alike for ``concentration`` 0."""
     if concentration == 0:
-        return np.tile(mean, (n, 1))
-    cosine = 1 + np.log1p(-rng.random(n) * -math.expm1(-2 * concentration)) / concentration
-    sine, turn = np.sqrt(np.maximum(0.0, 1 - cosine**2)), rng.uniform(0, 2 * math.pi, n)
+        return np.tile(mean, (len(share), 1))
+    cosine = 1 + np.log1p(-share * -math.expm1(-2 * concentration)) / concentration
+    sine = np.sqrt(np.maximum(0.0, 1 - cosine**2))
     aside = np.cross(mean, [0.0, 0.0, 1.0] if abs(mean[2]) < 0.9 else [1.0, 0.0, 0.0])
     aside /= np.linalg.norm(aside)
     other = np.cross(mean, aside)

@@ -69,6 +69,14 @@ def test_every_file_holds_the_blocks(built):
     # One joint of 10 m in 60 m²; the second set as long as it was asked to be.
     assert bed["name"] == "bed" and bed["p21_per_m"] == pytest.approx(10 / 60, rel=1e-12)
     assert steep["asked"]["spacing_m"] == 2.5 and 0 < steep["p21_per_m"] <= 0.6 / 2.5 * 1.5
+    # Asked and got stand under the same keys, in the file and in what is printed.
+    assert set(steep["asked"]) <= set(steep) and steep["asked"]["persistence"] == pytest.approx(0.6)
+    assert steep["persistence"] == pytest.approx(0.6, abs=0.15) and steep["mean_angle_deg"] == pytest.approx(90)
+    assert "steep     asked" in said and "bed       got" in said
+    sizes, topology = told["blocks"], told["topology"]
+    assert sizes["d10_m"] <= sizes["d50_m"] <= sizes["d90_m"] and sizes["percent_passing_by_size_m"][-1][1] == 100
+    assert topology["branches"] == (told["nodes"]["I"] + 3 * told["nodes"]["Y"] + 4 * told["nodes"]["X"]) / 2
+    assert (folder / "joint_statistics.png").stat().st_size > 10_000
     assert told["cracks"]["number"] == problem.cracks.n_cracks > 0
     assert "P21" in said and (folder / "blocks.png").stat().st_size > 10_000
     import pyvista
