@@ -7,6 +7,7 @@ import numpy as np
 from .actions import bolts_of, history_of
 from .checks import carrier
 from .errors import Check
+from .held_blocks import fixed_blocks
 from .validation import nearest
 
 
@@ -84,11 +85,11 @@ def _zones(c: Check) -> None:
 
 
 def _points(c: Check) -> None:
-    fixed = {name for name, zone in (c.tables.zones or {}).items() if zone.fixed}
+    fixed = fixed_blocks(c.tables, c.drawing)
     for k, motion in enumerate(c.tables.loads.point_motions):
         place = ("loads", "point_motions", k, "at")
         block = carrier(c, place, "the point that is moved", motion.at, motion.zone)
-        if block >= 0 and c.drawing.zones[block] in fixed:
+        if block >= 0 and fixed[block]:
             c.refuse(
                 place, f"the point lies in the fixed zone {c.drawing.zones[block]!r}",
                 "move the zone itself by [[loads.motions]], or let it move",
@@ -96,7 +97,7 @@ def _points(c: Check) -> None:
 
 
 def _bolts(c: Check) -> None:
-    fixed = {name for name, zone in (c.tables.zones or {}).items() if zone.fixed}
+    fixed = fixed_blocks(c.tables, c.drawing)
     for k, table in enumerate(c.tables.loads.bolts):
         try:
             bolts = bolts_of(c, k, table)
@@ -105,7 +106,7 @@ def _bolts(c: Check) -> None:
             continue
         for bolt in bolts:
             ends = [b for b in (bolt.block, bolt.other) if b >= 0]
-            if all(c.drawing.zones[b] in fixed for b in ends):
+            if all(fixed[b] for b in ends):
                 c.refuse(
                     ("loads", "bolts", k), f"bolt {bolt.name!r} holds nothing: both its ends are fixed",
                     "put one end into a block that may move",
@@ -129,7 +130,7 @@ def _base(c: Check) -> None:
             ("loads", "base"), "the base shakes, but the run is static: inertia takes no part",
             "set dda.dynamic_factor = 1",
         )  # fmt: skip
-    if not any(zone.fixed for zone in (c.tables.zones or {}).values()):
+    if not fixed_blocks(c.tables, c.drawing).any():
         c.refuse(
             ("loads", "base"), "nothing is fixed, so there is no base to shake",
             "fix the zone that the others stand on ([zones.NAME] fixed = true)",

@@ -29,6 +29,7 @@ from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
 from .edges import contact_names, joint_names
 from .errors import Check
+from .held_blocks import fixed_blocks, held_unknowns
 from .joints import joint_law
 from .tables import SceneTables
 from .tables.rock import MaterialTable
@@ -40,8 +41,8 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
     blocks = replace(
         drawing.blocks,
         material=np.array([names.index(material_of(tables, zone)) for zone in drawing.zones]),
-        fixed=np.array([zone in tables.zones and tables.zones[zone].fixed for zone in drawing.zones]),
-        held=_held(tables, drawing),
+        fixed=fixed_blocks(tables, drawing),
+        held=held_unknowns(tables, drawing),
     )
     joints, joint_of = _joints(tables, drawing)
     edge_laws = {name: joints[law] for (other, name), law in joint_of.items() if other == ""}
@@ -92,16 +93,6 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
             for k, m in enumerate(tables.monitors)
         },
     )
-
-
-def _held(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
-    """Guided blocks keep one of (u0, v0), and their strains along the axes."""
-    across = {None: [], "x": [1, 2, 5], "y": [0, 2, 5]}
-    held = np.zeros((len(drawing.zones), 6), bool)
-    for block, zone in enumerate(drawing.zones):
-        if zone in tables.zones:
-            held[block, across[tables.zones[zone].guided]] = True
-    return held if held.any() else None
 
 
 def _set_of(crack: str) -> str:

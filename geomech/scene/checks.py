@@ -8,6 +8,7 @@ from ..model import Blocks
 from ..shapes import cutting_cracks
 from .edges import check_edges
 from .errors import Check
+from .held_blocks import check_holding, fixed_blocks
 from .joints import check_joints
 from .locator import Path
 from .tables import SceneTables
@@ -27,6 +28,7 @@ def check(c: Check) -> None:
     check_joints(c)
     if c.drawing is not None and c.drawing.blocks is not None:
         _whole(c)
+        check_holding(c)
         check_edges(c)
         _points(c)
         _toughness(c)
@@ -312,21 +314,26 @@ def _rigid(c: Check) -> None:
             )
 
 
+def _block_or_zone(t: SceneTables, zone: str) -> str:
+    return f"zone {zone!r}" if zone in t.zones and t.zones[zone].fixed else f"block of zone {zone!r}"
+
+
 def _toughness(c: Check) -> None:
     t, cracks = c.tables, c.drawing.cracks
     if t.growth is None or t.materials is None or t.zones is None:
         return
     needy: dict[str, str] = {}
+    fixed = fixed_blocks(t, c.drawing)
     for k, b in zip(cracks.crack, cracks.block):
         zone = c.drawing.zones[b]
         name = material_of(t, zone)
         if name in t.materials and t.materials[name].k_ic_pa_sqrt_m is None:
             needy.setdefault(name, cracks.names[k])
-        if zone in t.zones and t.zones[zone].fixed:
+        if fixed[b]:
             c.warn(
                 ("zones", zone, "fixed"),
-                f"crack {cracks.names[k]!r} lies in the fixed zone {zone!r}, which is not strained",
-                "let the zone move, or leave the crack out",
+                f"crack {cracks.names[k]!r} lies in the fixed {_block_or_zone(t, zone)}, which is not strained",
+                "let it move, or leave the crack out",
             )
     for name, crack in needy.items() if t.growth.enabled else ():
         c.refuse(

@@ -12,7 +12,7 @@ from .drawing import Drawing
 from .errors import Fault
 from .locator import Path
 from .tables import SceneTables
-from .tables.loads import BoltTable
+from .tables.loads import BoltTable, ForceTable
 from .tables.output import MonitorTable
 from .validation import nearest
 
@@ -36,7 +36,8 @@ def with_marks(
     if tables.loads is not None:
         bolts = work.bolts(tables.loads.bolts, came_from)
         water = work.water(tables.loads.water)
-        changes["loads"] = tables.loads.model_copy(update={"bolts": bolts, "water": water})
+        forces = work.forces(tables.loads.forces, came_from)
+        changes["loads"] = tables.loads.model_copy(update={"bolts": bolts, "water": water, "forces": forces})
     if tables.monitors is not None:
         changes["monitors"] = work.monitors(tables.monitors, came_from)
     work.tell_idle(tables)
@@ -117,7 +118,7 @@ class _Matching:
                     mark.name, f"{mark.name!r} is not straight", "a bolt goes straight from its first end to its last"
                 )
             if length > self.near:
-                ends.append((tuple(line[0].tolist()), tuple(line[-1].tolist())))
+                ends.append((_pair(line[0]), _pair(line[-1])))
         return ends
 
     def water(self, table):
@@ -151,6 +152,24 @@ class _Matching:
             return None
         return table.model_copy(update={"points": tuple(map(tuple, points.tolist())), "line": None})
 
+    def forces(self, tables: Sequence[ForceTable], came_from: dict[Path, Path]) -> tuple[ForceTable, ...]:
+        found = []
+        for k, table in enumerate(tables):
+            known = table.point in self.marks and all(len(line) == 1 for line in self.marks[table.point].lines)
+            if table.point is not None and not known:
+                self._missing(
+                    ("loads", "forces", k, "point"), f"the drawing has no point {table.point!r}", "load", table.point,
+                    'give `at`, or draw a point called "load:NAME"',
+                )  # fmt: skip
+                continue
+            points = [table.at] if table.point is None else [_pair(line[0]) for line in self.marks[table.point].lines]
+            if table.point is not None:
+                self.claimed[table.point] = k
+            for at in points:
+                came_from["loads", "forces", len(found)] = ("loads", "forces", k)
+                found.append(table.model_copy(update={"at": at, "point": None}))
+        return tuple(found)
+
     def monitors(self, tables: Sequence[MonitorTable], came_from: dict[Path, Path]) -> tuple[MonitorTable, ...]:
         drawn: dict[str, tuple[str, tuple[float, float]]] = {}
         for kind in ("monitor", "probe"):
@@ -158,7 +177,7 @@ class _Matching:
                 own, points = name.partition(":")[2] or kind, self.marks[name].lines
                 self.claimed[name] = 0
                 for k, point in enumerate(points, 1):
-                    drawn[own if len(points) == 1 else f"{own} {k}"] = name, tuple(point[0].tolist())
+                    drawn[own if len(points) == 1 else f"{own} {k}"] = name, _pair(point[0])
         found = []
         for k, table in enumerate(tables):
             name, at = drawn.pop(table.name, ("", None))
@@ -195,8 +214,18 @@ class _Matching:
                     f"the water table {name!r} is drawn and not used",
                     f'[loads.water] line = "{name}"' if other or name != "water" else "add [loads.water]",
                 )
-            elif kind not in ("bolt", "water"):
-                self._warn(name, f"the point {name!r} says nothing", 'measuring points are called "monitor:NAME"')
+            elif kind == "load" and tables.loads is not None:
+                self._warn(name, f"no force acts on the point {name!r}", f'[[loads.forces]] point = "{name}"')
+            elif kind not in ("bolt", "water", "load"):
+                self._warn(
+                    name, f"the point {name!r} says nothing",
+                    'measuring points are called "monitor:NAME", points of forces "load:NAME"',
+                )  # fmt: skip
+
+
+def _pair(point: np.ndarray) -> tuple[float, float]:
+    x, y = point.tolist()
+    return x, y
 
 
 def _joined(lines: Sequence[np.ndarray], near: float, straight_on: bool) -> list[np.ndarray]:

@@ -9,6 +9,7 @@ from ..shapes.gmsh_model import CRACK
 from ..shapes.parts import JOINT
 from .drawing import Drawing
 from .errors import Check
+from .held_blocks import holds
 from .locator import Path
 from .validation import nearest
 
@@ -86,17 +87,18 @@ def _edge_hint(c: Check, name: str, known: list[str], taken: set[str]) -> str:
 def _unused(c: Check) -> None:
     """Names that the model gives and the scene never says: a load that is missing, or a crack without its prefix."""
     t = c.tables
-    if c.drawing.model is None or t.loads is None or t.joints is None:
+    from_files = c.drawing.model is not None or (t.geometry is not None and t.geometry.traces)
+    if not from_files or t.loads is None or t.joints is None:
         return
     used = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
     used.update(() if t.loads.water is None else t.loads.water.dry_edges)
     for joint in t.joints.values():
         used.update(joint_names(joint.edges, _edge_names(c)), *joint.between)
     # Joints without a law of their own follow the default one, as is usual.
-    idle = [name for name in _edge_names(c) if name not in used and not name.startswith(JOINT)]
+    idle = [name for name in _edge_names(c) if name not in used and not name.startswith(JOINT) and not holds(name)]
     if idle:
         c.warn(
-            ("geometry", "model"),
+            ("geometry", "model" if c.drawing.model is not None else "traces"),
             f"no load and no joint names the edges {', '.join(map(repr, idle))}",
             f'they carry nothing, and follow the default joint where they touch; a crack is called "{CRACK}NAME"',
         )

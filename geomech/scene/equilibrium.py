@@ -9,6 +9,7 @@ from .action_checks import records_are_sound
 from .actions import force_history, traction_history
 from .checks import blocks_at, material_of
 from .errors import Check
+from .held_blocks import fixed_blocks
 from .tables import SceneTables
 
 
@@ -19,7 +20,7 @@ def check_loads(c: Check) -> None:
     t, blocks = c.tables, c.drawing.blocks
     if t.zones is None or t.materials is None:
         return
-    fixed = np.array([zone in t.zones and t.zones[zone].fixed for zone in c.drawing.zones])
+    fixed = fixed_blocks(t, c.drawing)
     if t.loads is not None and not records_are_sound(c):
         return
     acts = t.loads is not None and bool(

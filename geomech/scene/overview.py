@@ -11,6 +11,7 @@ from ..model import Blocks, Cracks, History, counted
 from .actions import force_history, traction_history
 from .checks import material_of
 from .drawing import Drawing
+from .held_blocks import holds
 from .tables import SceneTables
 
 #: Longer lists are cut after so many lines.
@@ -21,6 +22,11 @@ def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
     """Size, zones, materials, cracks, loads and time of a scene, a line each."""
     rows = [("size", _box(drawing.blocks.vertices) + f", {counted(len(set(drawing.zones)), 'zone')}")]
     rows += _cut("zones", _zones(tables, drawing))
+    held = [name for name in drawing.blocks.edge_names if holds(name)]
+    if held:
+        edges = np.concatenate([drawing.blocks.edges_named(name) for name in held])
+        count = counted(len(np.unique(drawing.blocks.vertex_block[edges])), "block")
+        rows.append(("held", f"{count} by edges called {', '.join(map(repr, held))}"))
     rows += _cut("materials", _materials(tables))
     rows += _cut("cracks", _cracks(drawing.cracks))
     rows += _cut("loads", _loads(tables, drawing.blocks))
@@ -127,10 +133,10 @@ def _sense(blocks: Blocks, edge_name: str, traction: np.ndarray) -> str:
         return ""
     # Outlines run counter-clockwise, so the outward normal is to the right.
     normal = (along[:, 1] * traction[0] - along[:, 0] * traction[1]) / (np.hypot(*along.T) * size)
-    for sense, holds in (
+    for sense, fits in (
         ("compression", normal < -0.999), ("tension", normal > 0.999), ("shear", np.abs(normal) < 1e-3)
     ):  # fmt: skip
-        if holds.all():
+        if fits.all():
             return sense
     return ""
 

@@ -154,7 +154,9 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
         role, name, line = named
         points = line.points
         is_point = len(points) == 1
-        if is_point and not name.startswith("monitor"):
+        if is_point and name.startswith("load:"):
+            role = "mark"
+        elif is_point and not name.startswith("monitor"):
             pointed.setdefault(name, []).append(line)
             continue
         if role != "mark" and line.shape != "line":
@@ -174,7 +176,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
                 edges.append(EdgeLine(name, tuple(a.tolist()), tuple(b.tolist())))
         else:
             full = f"{name}:{line.label}" if line.label and ":" not in name else name
-            if is_point != name.startswith("monitor"):
+            if is_point != name.startswith(("monitor", "load:")):
                 warnings.append((f"{line.place}: {full!r} is no point, and is left out", "a monitor is a point"))
                 continue
             places.setdefault(("marks", list(marks).index(full) if full in marks else len(marks)), line.place)

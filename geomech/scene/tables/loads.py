@@ -88,12 +88,19 @@ class TractionTable(Timed):
 
 
 class ForceTable(Timed):
-    at: Pair = Field(description="material point it acts on, [x, y], m")
+    at: Pair | None = Field(None, description="material point it acts on, [x, y], m")
+    point: str | None = Field(None, description='name of the drawn point it acts on, as "load:crane", in place of `at`')
     zone: str | None = Field(None, description="zone of that point, where two zones touch")
     follower: bool = Field(False, description="true: it turns with its block (unset: it keeps its direction)")
     value_n_per_m: Pair | None = Field(None, description="constant force [x, y] per metre of thickness, N/m")
     rate_n_per_m_s: Pair | None = Field(None, description="force that grows from zero, [x, y], N/m per s")
     values_n_per_m: Points | None = Field(None, description="forces [[x, y], …] at `times_s`, N/m")
+
+    @model_validator(mode="after")
+    def _somewhere(self):
+        if (self.at is None) == (self.point is None):
+            raise ValueError("a force acts `at` a place, or on a drawn `point`")
+        return self
 
     def _parts(self):
         names = ("value_n_per_m", "rate_n_per_m_s", "values_n_per_m")
