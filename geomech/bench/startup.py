@@ -14,9 +14,21 @@ import tempfile
 import time
 from pathlib import Path
 
+from . import loading
 from .figures import Measured
 
 PIPELINE = Path("pipelines/two_cracks")
+
+#: What is told by layers: a scene drawn in its file, one drawn in Gmsh, and runs of blocks alone and of cracks.
+COMMANDS = {
+    "--help": ["--help"],
+    "check, drawn in TOML": ["check", str(PIPELINE / "toml.toml")],
+    "check, drawn in Gmsh": ["check", str(PIPELINE / "scene.toml")],
+    "run, blocks alone (Gmsh)": ["run", "geometry/brick_wall.toml", "--set", "run.end_time_s=0.01"],
+    "run, cracks too (TOML)": ["run", str(PIPELINE / "toml.toml"), "--set", "run.end_time_s=2"],
+}
+#: Runs into an empty cache of kernels.
+FIRST_RUNS = {label: command for label, command in COMMANDS.items() if command[0] == "run"}
 
 
 def measure(quick: bool = False) -> Measured:
@@ -51,8 +63,11 @@ def measure(quick: bool = False) -> Measured:
             rows.append((f"specimen φ = {phi}° to coalescence, everything written", statistics.median(times)))
     width = max(len(label) for label, _ in rows)
     lines = [f"whole processes, wall time, median of {repeats} (the first run once)"]
-    text = "\n".join(lines + [f"  {label:<{width}}  {seconds:7.2f} s" for label, seconds in rows])
-    return Measured.of(text, times=dict(rows))
+    lines += [f"  {label:<{width}}  {seconds:7.2f} s" for label, seconds in rows]
+    lines += ["", *loading.table(COMMANDS)]
+    if not quick:
+        lines += ["", *loading.kernels(FIRST_RUNS, os.environ)]
+    return Measured.of("\n".join(lines), times=dict(rows))
 
 
 def _seconds(command: list[str], environment: dict[str, str] | None = None) -> float:
