@@ -35,6 +35,10 @@ FACE_ANGLE = np.radians(10.0)
 #: A face that ends within this part of its edge's length of the edge's end ends there.
 SNAP = 1e-9
 
+#: Pressures end at a multiple of this part of an edge's length. Force and moment are kept on whatever length; and the body,
+#: which knows what segments that it has met before do to it, would meet new ones every step, for faces slide by strains.
+GRID = 2.0**-12
+
 #: Contacts nearer to each other than this part of a face's length are at one place.
 SAME = 1e-6
 
@@ -254,11 +258,9 @@ def _add_face(pieces: _Pieces, blocks: Blocks, side: list[int], touches: list[_T
     for low, low_share in _ends(acting, gapes, length, -1):
         for high, high_share in _ends(acting, gapes, length, 1):
             share = low_share * high_share
-            # Round-off of the mapping must not make a new load segment every step: the body keeps what it knows of a
-            # segment. The pressure has the force and moment of the contacts on whatever length it is given.
-            first, last = max(low[0], 0.0), min(high[0], length)
-            first = 0.0 if first < SNAP * length else first
-            last = length if last > (1 - SNAP) * length else last
+            first, last = (min(max(_on_grid(place, length), 0.0), length) for place in (low[0], high[0]))
+            if first == last:
+                first, last = max(low[0], 0.0), min(high[0], length)
             found, at_first, at_last = no_pull(last - first, share * total, share * (moment - first * total))
             for a, b, p_a, p_b in found:
                 t_a, t_b = ((p * per_push[0], p * per_push[1]) for p in (p_a, p_b))
@@ -269,6 +271,10 @@ def _add_face(pieces: _Pieces, blocks: Blocks, side: list[int], touches: list[_T
             if even:
                 q = share * shear / (last - first)
                 _add_on_side(pieces, blocks, side, line, (first, last), (q * ax, q * ay), (q * ax, q * ay))
+
+
+def _on_grid(place: float, length: float) -> float:
+    return round(place / (GRID * length)) * (GRID * length)
 
 
 def _ends(acting: list, gapes: list, length: float, way: int) -> list[tuple[tuple[float, _Touch], float]]:
@@ -306,42 +312,57 @@ def _add_on_side(pieces: _Pieces, blocks: Blocks, side: list[int], line: tuple, 
 
 def _add_lone(pieces: _Pieces, blocks: Blocks, touch: _Touch, force: tuple[float, float]) -> None:
     if touch.own:
-        _add_corner_force(pieces, blocks, touch.vertex, np.array(force))
+        _add_corner_force(pieces, blocks, touch.vertex, force)
     else:
-        _add_edge_force(pieces, blocks, touch.edge, np.array(touch.point), np.array(force))
+        _add_edge_force(pieces, blocks, touch.edge, touch.point, force)
 
 
-def _add_corner_force(pieces, blocks, vertex: int, force: np.ndarray) -> None:
-    corner = blocks.vertices[vertex]
-    after = blocks.vertices[blocks.next_vertex[vertex]] - corner
-    before = corner - blocks.vertices[blocks.previous_vertex[vertex]]
-    reach = LONE_SPREAD * min(np.hypot(*after), np.hypot(*before))
-    after, before = after / np.hypot(*after), before / np.hypot(*before)
-    turn = before[0] * after[1] - before[1] * after[0]
-    if abs(turn) < np.sin(FACE_ANGLE):
+def _add_corner_force(pieces: _Pieces, blocks: Blocks, vertex: int, force: Sequence[float]) -> None:
+    (px, py), (x, y), (nx, ny) = (
+        blocks.vertices[k].tolist() for k in (blocks.previous_vertex[vertex], vertex, blocks.next_vertex[vertex])
+    )
+    bx, by, ax, ay = x - px, y - py, nx - x, ny - y
+    before, after = math.hypot(bx, by), math.hypot(ax, ay)
+    reach = LONE_SPREAD * min(before, after)
+    bx, by, ax, ay = bx / before, by / before, ax / after, ay / after
+    turn = bx * ay - by * ax
+    start, end = (x - reach * bx, y - reach * by), (x + reach * ax, y + reach * ay)
+    fx, fy = (float(part) / reach for part in force)
+    if abs(turn) < math.sin(FACE_ANGLE):
         # The corner is as good as flat: its two edges cannot resolve a force across them; treat it as one edge.
-        t = force / (2 * reach)
-        pieces.add(corner - reach * before, corner, t, t)
-        pieces.add(corner, corner + reach * after, t, t)
+        t = (fx / 2, fy / 2)
+        pieces.add(start, (x, y), t, t)
+        pieces.add((x, y), end, t, t)
         return
-    along_before, along_after = np.linalg.solve(np.column_stack([before, after]), force) / reach
-    pieces.add(corner - reach * before, corner, along_before * before, along_before * before)
-    pieces.add(corner, corner + reach * after, along_after * after, along_after * after)
+    on_before, on_after = (fx * ay - fy * ax) / turn, (bx * fy - by * fx) / turn
+    t = (on_before * bx, on_before * by)
+    pieces.add(start, (x, y), t, t)
+    t = (on_after * ax, on_after * ay)
+    pieces.add((x, y), end, t, t)
 
 
-def _add_edge_force(pieces, blocks, edge: int, point: np.ndarray, force: np.ndarray) -> None:
-    start, end = blocks.vertices[edge], blocks.vertices[blocks.next_vertex[edge]]
-    length = np.hypot(*(end - start))
-    along = (end - start) / length
-    place = float(np.clip((point - start) @ along, 0.0, length))
-    # Centred on the point, hence narrower near an end of the edge; at the very end it is a corner force.
-    half = min(LONE_SPREAD * length / 2, place, length - place)
-    if half < 1e-6 * length:
-        corner = edge if place < length / 2 else int(blocks.next_vertex[edge])
-        _add_corner_force(pieces, blocks, corner, force)
+def _add_edge_force(pieces: _Pieces, blocks: Blocks, edge: int, point: Sequence[float], force: Sequence[float]) -> None:
+    (x, y), (ex, ey) = blocks.vertices[edge].tolist(), blocks.vertices[blocks.next_vertex[edge]].tolist()
+    length = math.hypot(ex - x, ey - y)
+    ax, ay = (ex - x) / length, (ey - y) / length
+    place = min(max(_along(point, (x, y), (ax, ay)), 0.0), length)
+    # About the point, hence narrower near an end of the edge; at the very end it is a corner force.
+    if min(place, length - place) < SAME * length:
+        _add_corner_force(pieces, blocks, edge if place < length / 2 else int(blocks.next_vertex[edge]), force)
         return
-    t = force / (2 * half)
-    pieces.add(start + (place - half) * along, start + (place + half) * along, t, t)
+    middle = _on_grid(place, length)
+    middle = place if middle <= 0.0 or middle >= length else middle
+    half = min(LONE_SPREAD * length / 2, middle, length - middle)
+    tx, ty = (float(part) / (2 * half) for part in force)
+    # The push across the edge is where the point is, not in the middle.
+    tilt = 3 * (place - middle) / half * (ax * ty - ay * tx)
+    low, high = middle - half, middle + half
+    pieces.add(
+        (x + low * ax, y + low * ay),
+        (x + high * ax, y + high * ay),
+        (tx + tilt * ay, ty - tilt * ax),
+        (tx - tilt * ay, ty + tilt * ax),
+    )
 
 
 def _add_edge_piece(pieces: _Pieces, blocks: Blocks, vertices: np.ndarray, row: np.void, turn_back: np.ndarray) -> None:

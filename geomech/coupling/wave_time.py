@@ -56,10 +56,10 @@ class WaveTime:
     def _longer(self, tips: np.ndarray, blocks: Blocks, dt: float) -> list[tuple[int, float]]:
         """Rows of ``tips`` to which waves take longer than ``dt``, and how long, s."""
         speed = self._speed[blocks.material[tips["block"]]]
-        if not np.isfinite(speed).any():
-            return []
+        # No point of a block is farther from its outline than the radius of a disc of its area.
+        far = np.sqrt(blocks.areas()[tips["block"]] / np.pi)
         found = []
-        for row in range(len(tips)):
+        for row in np.flatnonzero(far > speed * dt).tolist():
             time = _from_outline(blocks, int(tips["block"][row]), tips["point"][row]) / float(speed[row])
             if time > dt:
                 found.append((row, time))
