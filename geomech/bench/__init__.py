@@ -16,6 +16,7 @@ TOPICS = {
     "coupling": "geomech.bench.coupling_cost",
     "dda": "geomech.bench.block_cost",
     "ddm": "geomech.bench.work_precision",
+    "geometry": "geomech.bench.cutting_cost",
     "kernels": "geomech.bench.kernels",
     "many": "geomech.bench.many_cracks",
     "output": "geomech.bench.output_cost",

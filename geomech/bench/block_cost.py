@@ -175,7 +175,7 @@ def _measured(name: str, blocks: Blocks, longest: float, also_iterated: bool) ->
         median("iteration"),
         median("solution"),
         median("search"),
-        _peak_memory(),
+        peak_memory(),
         counts["shares"] / max(1, counts["factorisations"]),
         _imbalance(blocks, system, result),
     )
@@ -203,7 +203,8 @@ def _imbalance(blocks: Blocks, system, result) -> float:
     return float(abs(acting + pushed) / (GRAVITY * mass[~fixed].sum()))
 
 
-def _peak_memory() -> float:
+def peak_memory() -> float:
+    """MB that the process has held at most; nan where the system does not say."""
     try:
         import resource
     except ImportError:

@@ -54,7 +54,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
             rock[zones] = shapely.union_all(polygons[np.isin(zone, zones)])
         region = rock[zones]
         if shape is not None and shape.region is not None:
-            region = shapely.intersection(region, shapely.Polygon(np.array(shape.region, dtype=float).reshape(-1, 2)))
+            region = shapely.intersection(region, shapely.Polygon(np.reshape(shape.region, (-1, 2)) - drawing.origin))
         own = crack_set == name
         entry = {
             "name": name,

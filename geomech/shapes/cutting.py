@@ -217,8 +217,8 @@ def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float
     ring = np.zeros(len(nodes), bool)
     ring[arrangement.edges[~arrangement.dead].ravel()] = True
     # Dead ends on either side of a block edge do not hang together: a node on a ring counts once for each of its edges.
-    joined = [(k, int(node)) for k, pair in enumerate(edges) for node in pair if not ring[node]]
-    rows, columns = np.array(joined, dtype=int).reshape(-1, 2).T
+    rows, side = np.nonzero(~ring[edges])
+    columns = edges[rows, side]
     incidence = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(index), len(nodes))).tocsr()
     label = connected_components(incidence @ incidence.T, directed=False)[1]
     ends = nodes[edges]
@@ -238,28 +238,31 @@ def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.nda
     ring = np.zeros(len(graph.nodes), bool)
     ring[graph.edges[~arrangement.dead].ravel()] = True
     chains: list[tuple[int, list[int], int]] = []
+    # Plain lists: walked edge by edge, arrays would take most of the time.
+    through, owner = (~ring).tolist(), block_of[arrangement.left].tolist()
     dead = dead[np.argsort(graph.source[dead], kind="stable")]
     for own in np.split(dead, np.flatnonzero(np.diff(graph.source[dead])) + 1) if len(dead) else ():
-        source = graph.source[own[0]]
+        source = int(graph.source[own[0]])
+        ends = dict(zip(own.tolist(), graph.edges[own].tolist(), strict=True))
         at: dict[int, list[int]] = {}
-        for e in own.tolist():
-            for node in graph.edges[e].tolist():
+        for e, pair in ends.items():
+            for node in pair:
                 at.setdefault(node, []).append(e)
-        left = set(own.tolist())
+        left = set(ends)
         # Ends first, so that every chain is walked from one end to the other.
-        for node in sorted(at, key=lambda k: (len(at[k]) == 2 and not ring[k], k)):
+        for node in sorted(at, key=lambda k: (len(at[k]) == 2 and through[k], k)):
             for first in at[node]:
                 if first not in left:
                     continue
                 chain, e, here = [node], first, node
                 while e is not None:
                     left.discard(e)
-                    a, b = graph.edges[e].tolist()
+                    a, b = ends[e]
                     here = b if a == here else a
                     chain.append(here)
                     onward = [o for o in at[here] if o in left]
-                    e = onward[0] if len(onward) == 1 and not ring[here] and len(at[here]) == 2 else None
-                chains.append((int(source), chain, int(block_of[arrangement.left[first]])))
+                    e = onward[0] if len(onward) == 1 and through[here] and len(at[here]) == 2 else None
+                chains.append((source, chain, owner[first]))
     if not chains:
         return Cracks.from_polylines([], names=())
     count: Counter[str] = Counter()
