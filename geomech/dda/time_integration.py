@@ -169,7 +169,10 @@ def assemble_blocks(
         if soft:
             _invert(compliance[b], crack_compliance[b], tangent[b])
         else:
-            tangent[b] = stiffness[b]
+            # By numbers: Numba takes seconds to compile the assignment of one array to another.
+            for k in range(3):
+                for m in range(3):
+                    tangent[b, k, m] = stiffness[b, k, m]
         for k in range(3):
             strain[k] = crack_strain[b, k] - crack_offset[b, k] if crack_given else 0.0
             for m in range(3):
