@@ -3,7 +3,7 @@ nothing cracks, energies and the monitors' ways against time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,8 +15,10 @@ from .look import final_cycle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-_COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#3d405b")
+#: One a curve.
+COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#8d6a9f", "#b08900", "#3d405b")
 #: Curves nearer than this part of the largest value are one on paper.
 _SAME = 0.01
 
@@ -56,7 +58,7 @@ def energies(axes: Axes, run: Run) -> None:
     """What the work of loads and gravity went into, against time: curves below a hundredth of the largest are left out."""
     history = _to_the_end(run)
     for k, (name, energy) in enumerate(_energy_curves(run).items()):
-        axes.plot(history["time"], energy, color=_COLOURS[k % len(_COLOURS)], lw=1.5, label=name)
+        axes.plot(history["time"], energy, color=COLOURS[k % len(COLOURS)], lw=1.5, label=name)
     # Beside the curves: there is no corner that one of them does not reach.
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     axes.set(xlabel="time, s", ylabel="energy, J/m", title=run.title)
@@ -79,7 +81,7 @@ def monitors(axes: Axes, run: Run) -> None:
     """How far each monitored point has moved, against time."""
     history = _to_the_end(run)
     for k, (name, way) in enumerate(_monitor_curves(run).items()):
-        axes.plot(history["time"], 1e3 * way, color=_COLOURS[k % len(_COLOURS)], lw=1.5, label=name)
+        axes.plot(history["time"], 1e3 * way, color=COLOURS[k % len(COLOURS)], lw=1.5, label=name)
     axes.legend(frameon=False, fontsize=8)
     axes.set(xlabel="time, s", ylabel="displacement, mm", title=run.title)
 
@@ -89,14 +91,14 @@ def _monitor_curves(run: Run) -> dict[str, np.ndarray]:
     names = [
         name[:-3] for name in history.dtype.names if name.endswith("_ux") and f"{name[:-3]}_uy" in history.dtype.names
     ]
-    return {name: np.hypot(history[f"{name}_ux"], history[f"{name}_uy"]) for name in names[: len(_COLOURS)]}
+    return {name: np.hypot(history[f"{name}_ux"], history[f"{name}_uy"]) for name in names[: len(COLOURS)]}
 
 
 def stress_strain(axes: Axes, run: Run) -> None:
     """The leading load against axial strain, both positive in compression (in tension, where that is what leads), with
     the run's events."""
     history, sign = _to_the_end(run), _sense(run)
-    axes.plot(sign * 1e3 * history["strain"], sign * history["load"] / 1e6, color=_COLOURS[0], lw=1.8)
+    axes.plot(sign * 1e3 * history["strain"], sign * history["load"] / 1e6, color=COLOURS[0], lw=1.8)
     _first_events(axes, run, sign * 1e3 * history["strain"])
     lengthening = ", lengthening positive" if sign < 0 else ""
     axes.set(xlabel=f"axial strain, 10⁻³{lengthening}", ylabel=_load_label(run), title=run.title)
@@ -113,7 +115,7 @@ def compared(runs: Mapping[str, Run], path: Path) -> Path | None:
     def curves(axes: Axes, _: Run) -> None:
         for k, (name, run) in enumerate(known.items()):
             history, sign = _to_the_end(run), _sense(run)
-            colour, line = _COLOURS[k % len(_COLOURS)], ("-", "--", ":")[k // len(_COLOURS) % 3]
+            colour, line = COLOURS[k % len(COLOURS)], ("-", "--", ":")[k // len(COLOURS) % 3]
             axes.plot(
                 1e3 * sign * history["strain"], sign * history["load"] / 1e6, color=colour, ls=line, lw=1.4, label=name
             )
@@ -128,7 +130,7 @@ def stress_intensity(axes: Axes, run: Run) -> None:
     with the same curves share one; the toughness is a line across."""
     curves = _tip_curves(run)
     for k, (label, load, k_i, k_ii) in enumerate(curves):
-        colour = _COLOURS[k % len(_COLOURS)]
+        colour = COLOURS[k % len(COLOURS)]
         axes.plot(load, k_i, color=colour, lw=1.4, label=label)
         axes.plot(load, k_ii, color=colour, lw=1.0, ls="--")
     axes.plot([], [], color="#555555", lw=1.6, label=r"$K_I$")
@@ -193,7 +195,7 @@ def _tip_names(run: Run, members: list[tuple[int, int]], n_tips: int) -> str:
 def crack_length(axes: Axes, run: Run) -> None:
     """The length of all cracks against load: what grows at one load is a vertical line."""
     history = _to_the_end(run)
-    axes.plot(_sense(run) * history["load"] / 1e6, 1e3 * history["crack_length"], color=_COLOURS[0], lw=1.8)
+    axes.plot(_sense(run) * history["load"] / 1e6, 1e3 * history["crack_length"], color=COLOURS[0], lw=1.8)
     _first_events(axes, run, None)
     axes.set(xlabel=_load_label(run), ylabel="crack length, mm", title=run.title)
 
@@ -228,7 +230,7 @@ def _first_events(axes: Axes, run: Run, strain: np.ndarray | None) -> None:
         near = [other for other in marks if np.all(np.abs(np.subtract(other, at)) <= 0.01 * size)]
         marks.setdefault(near[0] if near else at, []).append(kind)
     for k, ((x, load), kinds) in enumerate(marks.items()):
-        colour, label = _COLOURS[1 + k % (len(_COLOURS) - 1)], ", ".join(kinds)
+        colour, label = COLOURS[1 + k % (len(COLOURS) - 1)], ", ".join(kinds)
         if strain is None:
             axes.axvline(load, color=colour, lw=1.0, ls=":", label=label)
         else:
@@ -245,15 +247,25 @@ def _firsts(run: Run) -> list[tuple[str, float, float]]:
 
 
 def _save(curve, run: Run, path: Path) -> Path:
-    # The object interface: pyplot would keep figures and may want a display.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.6, 3.6), dpi=140, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure, save = figure_of((5.6, 3.6), path)
     axes = figure.add_subplot()
     curve(axes, run)
     axes.spines[["top", "right"]].set_visible(False)
     axes.title.set_fontsize(min(10.0, 10.0 * 72 / max(1, len(run.title))))
-    figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
-    return path
+    return save()
+
+
+def figure_of(size: tuple[float, float], path: Path) -> tuple[Figure, Callable[[], Path]]:
+    """An empty figure of ``size`` (inches), and what writes it to ``path`` when it is drawn."""
+    # The object interface: pyplot would keep figures and may want a display.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=size, dpi=140, layout="constrained")
+    FigureCanvasAgg(figure)
+
+    def save() -> Path:
+        figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
+        return path
+
+    return figure, save

@@ -13,6 +13,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from .table import is_number
+
 _KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif", ".jpg": "image/jpeg"}
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -119,7 +121,7 @@ class Page:
     def table(self, headers: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> None:
         """A row a sequence of cells: words, numbers, None. Columns of numbers are set to the right."""
         rows = [list(row) for row in rows]
-        words = [any(isinstance(row[k], str) and not _is_number(row[k]) for row in rows) for k in range(len(headers))]
+        words = [any(isinstance(row[k], str) and not is_number(row[k]) for row in rows) for k in range(len(headers))]
         long = [any(isinstance(row[k], str) and len(row[k]) > 40 for row in rows) for k in range(len(headers))]
         kinds = ["told" if lengthy else "words" if wordy else "" for lengthy, wordy in zip(long, words)]
 
@@ -198,14 +200,6 @@ def written(value: Any) -> str:
         mantissa, _, power = f"{value:.4g}".partition("e")
         return (mantissa + (f"·10{str(int(power)).translate(_RAISED)}" if power else "")).replace("-", "−")
     return str(value)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace("−", "-").replace("\u202f", ""))
-    except ValueError:
-        return text in ("", "–")
-    return True
 
 
 def _of(kind: str) -> str:

@@ -9,6 +9,8 @@ from typing import Any
 
 from ..output.reading import Run
 
+_LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
 #: Header → how a number is written.
 COLUMNS = {
     "run": "{}",
@@ -58,17 +60,32 @@ def _row(run: Run) -> dict[str, Any]:
 def as_text(rows: Sequence[dict[str, Any]]) -> str:
     """The rows as an aligned table, columns that no run fills left out."""
     headers = [name for name in COLUMNS if any(row[name] is not None for row in rows)]
-    lines = [headers] + [
-        ["-" if row[name] is None else COLUMNS[name].format(row[name]) for name in headers] for row in rows
-    ]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(headers))]
+    return aligned(
+        [headers]
+        + [["-" if row[name] is None else COLUMNS[name].format(row[name]) for name in headers] for row in rows]
+    )
 
-    def aligned(line: list[str]) -> str:
-        # Names to the left, numbers to the right.
-        cells = [text.ljust(w) if h in ("run", "end") else text.rjust(w) for h, text, w in zip(headers, line, widths)]
-        return "  ".join(cells).rstrip()
 
-    return "\n".join(aligned(line) for line in lines)
+def aligned(lines: Sequence[Sequence[str]]) -> str:
+    """The cells of ``lines``, the first of which are headers, in columns: those with words to the left, numbers to the
+    right."""
+    widths = [max(map(len, column)) for column in zip(*lines)]
+    words = [any(not is_number(cell) for cell in column[1:]) for column in zip(*lines)]
+
+    def line(cells: Sequence[str]) -> str:
+        set_ = [cell.ljust(w) if left else cell.rjust(w) for cell, w, left in zip(cells, widths, words)]
+        return "  ".join(set_).rstrip()
+
+    return "\n".join(map(line, lines))
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell is a number, or the dash of one that is not there."""
+    try:
+        float(text.replace("−", "-").replace("\u202f", "").replace("·10", "e").translate(_LOWERED))
+    except ValueError:
+        return text in ("", "-", "–")
+    return True
 
 
 def as_csv(rows: Sequence[dict[str, Any]]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from geomech.model import Cracks, Cycle, Problem
 from geomech.reference import two_cracks as published
+from geomech.report.part import Part
 
 MPA = 1e6
 
@@ -18,13 +19,16 @@ MPA = 1e6
 @dataclass
 class Watch:
     """Observer that keeps what the comparison needs: the angle between the cracks, the first cycle of growth, the last
-    cycle, all events. φ, degrees, is read off the geometry, so a variant may be called what you like."""
+    cycle, all events, and the curve of strain and load (Pa). φ, degrees, is read off the geometry, so a variant may be
+    called what you like."""
 
     phi: int = 0
     first_growth: Cycle | None = None
     last: Cycle | None = None
     events: tuple = ()
     end: str = ""
+    strains: dict[str, float] = field(default_factory=dict)  # of the first event of every kind
+    seconds: float = np.nan
 
     def on_start(self, problem: Problem, folder) -> None:
         cracks = problem.cracks
@@ -37,9 +41,11 @@ class Watch:
             self.first_growth = cycle
         self.last = cycle
         self.events += cycle.events
+        for event in cycle.events:
+            self.strains.setdefault(event.kind, float(cycle.strain))
 
     def on_end(self, summary, error=None) -> None:
-        self.end = str(summary.get("end", ""))
+        self.end, self.seconds = str(summary.get("end", "")), float(summary.get("wall_s", np.nan))
 
     def load(self, kind: str) -> float:
         """Load of the first event of ``kind``, Pa; nan when there was none."""
@@ -71,75 +77,109 @@ def coalescence_angle_deg(cracks: Cracks) -> float:
     return float(np.degrees(np.arctan(along[1] / along[0]))) if along[0] else 90.0
 
 
-def report(runs: Mapping[str, Watch]) -> str:
-    """The comparison as text; ``runs`` maps a variant's name to what was watched. Parts that the runs cannot fill are
-    left out: a fit at φ = 0 needs the run with φ = 0, and what the paper says of all four needs all four."""
-    by_phi = {run.phi: run for run in runs.values() if run.last is not None}
-    parts = [_loads(by_phi), _lines(by_phi), _intensities(by_phi)]
+def coalescence_line_deg(run: Watch) -> float:
+    """`coalescence_angle_deg` of a run as Table 3 has it: φ = 90 was published with the axes exchanged, from the vertical."""
+    angle = coalescence_angle_deg(run.last.cracks)
+    if run.phi == 90 and np.isfinite(angle):
+        angle = (90 - angle) if angle > 0 else (-90 - angle)
+    return angle
+
+
+def by_angle(runs: Mapping[str, Watch]) -> dict[int, Watch]:
+    """φ → run, of those that came to a cycle, by their angle."""
+    found = {run.phi: run for run in runs.values() if run.last is not None}
+    return dict(sorted(found.items()))
+
+
+def parts(runs: Mapping[str, Watch]) -> list[Part]:
+    """The comparison of the specimens in ``runs`` (a variant's name → what was watched). Parts that the runs cannot fill
+    are left out: a fit at φ = 0 needs the run with φ = 0, and what the paper says of all four needs all four."""
+    by_phi = by_angle(runs)
+    found = [_loads(by_phi), _lines(by_phi), _intensities(by_phi)]
     if 0 in by_phi and np.isfinite(by_phi[0].load("initiation")):
-        parts.insert(1, _toughness(by_phi))
-    started = {phi for phi, run in by_phi.items() if np.isfinite(run.load("initiation"))}
-    if set(published.PHI_DEG) <= started:
-        parts.append(_disagreements(by_phi))
-    return "\n\n".join(part for part in parts if part)
+        found.insert(1, _toughness(by_phi))
+    if all_started(by_phi):
+        found.append(_disagreements(by_phi))
+    return found
 
 
-def _loads(runs: dict[int, Watch]) -> str:
-    lines = [
-        "Loads (axial stress; σ√(πb)/K_Ic in brackets)",
-        "  φ      initiation          coalescence         how the run ended",
-    ]
+def all_started(by_phi: Mapping[int, Watch]) -> bool:
+    """Whether all four specimens are there and have grown."""
+    return set(published.PHI_DEG) <= {phi for phi, run in by_phi.items() if np.isfinite(run.load("initiation"))}
+
+
+def report(runs: Mapping[str, Watch]) -> str:
+    """The comparison as text."""
+    return "\n\n".join(part.text() for part in parts(runs))
+
+
+def _loads(runs: dict[int, Watch]) -> Part:
+    rows = []
     for phi, run in runs.items():
-        cells = []
+        row: list = [phi]
         for kind in ("initiation", "coalescence"):
             load = run.load(kind)
-            cell = "none" if np.isnan(load) else f"{load / MPA:6.1f} MPa ({published.normalised_load(load):.3f})"
-            cells.append(cell.ljust(18))
+            row += (
+                [f"{load / MPA:.2f}", f"{published.normalised_load(load):.3f}"] if np.isfinite(load) else [None, None]
+            )
+        strength = run.load("coalescence") / published.UNIAXIAL_STRENGTH
+        strains = [1e3 * run.strains[kind] if kind in run.strains else None for kind in ("initiation", "coalescence")]
         ended = f"{run.end} at {run.last.load / MPA:.1f} MPa, cracks {1e3 * run.last.cracks.lengths.sum():.1f} mm long"
-        lines.append(f"  {phi:<4d} {cells[0]}  {cells[1]}  {ended}")
+        rows.append([*row, f"{strength:.2f}" if np.isfinite(strength) else None, *strains, ended])
+    after = []
     for kind, table in (
         ("initiation", published.INITIATION_STRESS_MPA),
         ("coalescence", published.COALESCENCE_STRESS_MPA),
     ):
         ranges = "; ".join(f"{who} {low}-{high} MPa" for who, (low, high) in table.items())
-        lines.append(f"  published {kind}: {ranges}")
-    return "\n".join(lines)
+        after.append(f"Published {kind}: {ranges} (text to Figure 15).")
+    headers = ["φ", "initiation, MPa", "σ√(πb)/K_Ic", "coalescence, MPa", "σ√(πb)/K_Ic", "σ_F/σ_c"]
+    headers += ["strain then, 10⁻³", "at coalescence, 10⁻³", "how the run ended"]
+    after.append("σ_F is taken as the stress of coalescence. The paper prints no numbers with Figures 16 and 17.")
+    return Part("Loads and strains (Figures 15, 16, 17)", headers, rows, after=after)
 
 
-def _toughness(runs: dict[int, Watch]) -> str:
+def _toughness(runs: dict[int, Watch]) -> Part:
     """One toughness fitted to φ = 0, where the published initiation stress is lowest; the others follow from it,
     because open slots answer linearly."""
     base = runs[0].load("initiation")
-    lines = ["One effective toughness, fitted at φ = 0 (the low end of each published range), holds the others to"]
+    rows = []
     for who, (low, high) in published.INITIATION_STRESS_MPA.items():
-        k_ic = published.K_IC * low * MPA / base
-        loads = ", ".join(f"{phi}°: {run.load('initiation') / base * low:.2f}" for phi, run in runs.items())
-        lines.append(f"  {who}: K_Ic = {k_ic / MPA:.3f} MPa √m, initiation at {loads} MPa (published up to {high})")
-    return "\n".join(lines)
+        fit = low * MPA / base
+        rows.append([who, f"{published.K_IC * fit / MPA:.3f}"])
+        rows[-1] += [f"{run.load('initiation') * fit / MPA:.2f}" for run in runs.values()] + [f"{low}-{high}"]
+        rows[-1] += [f"{run.load('coalescence') * fit / MPA:.1f}" for run in runs.values()]
+        rows[-1].append("{}-{}".format(*published.COALESCENCE_STRESS_MPA[who]))
+    headers = ["fitted to", "K_Ic, MPa√m", *(f"init. {phi}°" for phi in runs), "published"]
+    return Part(
+        "One effective toughness",
+        [*headers, *(f"coal. {phi}°" for phi in runs), "published "],
+        rows,
+        ["Fitted at φ = 0 to the low end of each published range of initiation; all other loads, MPa, follow from it."],
+    )
 
 
-def _lines(runs: dict[int, Watch]) -> str:
+def _lines(runs: dict[int, Watch]) -> Part:
     sources = published.COALESCENCE_ANGLE_DEG
-    lines = [
-        "Line of coalescence, degrees from the horizontal (φ = 90: from the vertical), beside Table 3",
-        "  φ      computed    tip to tip    " + "    ".join(sources),
-    ]
+    rows = []
     for phi, run in runs.items():
-        angle = coalescence_angle_deg(run.last.cracks)
-        if phi == 90 and np.isfinite(angle):
-            # Published with the axes exchanged: the angle from the vertical.
-            angle = (90 - angle) if angle > 0 else (-90 - angle)
-        cell = "not joined" if np.isnan(angle) else f"{angle:10.2f}"
-        if phi in published.PHI_DEG:
-            theirs = "    ".join(f"{table[phi]:{len(who)}.2f}" for who, table in sources.items())
-            cell += f"    {published.TIP_TO_TIP_ANGLE_DEG[phi]:10.1f}    {theirs}"
-        lines.append(f"  {phi:<4d} {cell}")
-    return "\n".join(lines)
+        angle = coalescence_line_deg(run)
+        row = [phi, "not joined" if np.isnan(angle) else f"{angle:.2f}"]
+        known = phi in published.PHI_DEG
+        row += [f"{published.TIP_TO_TIP_ANGLE_DEG[phi]:.1f}" if known else None]
+        rows.append([*row, *(f"{table[phi]:.2f}" if known else None for table in sources.values())])
+    return Part(
+        "Line of coalescence (Table 3)",
+        ["φ", "computed", "tip to tip", *sources],
+        rows,
+        ["Slopes in degrees from the horizontal, φ = 90 from the vertical, as it was published."],
+    )
 
 
-def _intensities(runs: dict[int, Watch]) -> str:
+def _intensities(runs: dict[int, Watch]) -> Part:
     """Table 4 prints magnitudes at a load it does not state; one load is fitted to the values of the first specimen."""
-    lines: list[str] = []
+    rows: list = []
+    before: list[str] = []
     scale = None
     for phi, run in runs.items():
         if run.first_growth is None or phi not in published.PHI_DEG:
@@ -149,39 +189,36 @@ def _intensities(runs: dict[int, Watch]) -> str:
         theirs = np.array(published.TABLE_4_K_I[phi] + published.TABLE_4_K_II[phi])
         if scale is None:
             scale = np.abs(per_pascal) @ theirs / (per_pascal @ per_pascal)
-            lines.append(
-                f"K_I and K_II of tips 1-4, MPa √m, at the load that fits Table 4 best at φ = {phi}: {scale:.2f} MPa"
+            before.append(f"Computed at {scale:.2f} MPa, the load that fits Table 4 best at φ = {phi}.")
+        for name, part in (("K_I", slice(0, 4)), ("K_II", slice(4, 8))):
+            rows.append(
+                [phi, name, *(f"{k:.3f}" for k in scale * per_pascal[part]), *(f"{k:.3f}" for k in theirs[part])]
             )
-        for name, part in (("K_I ", slice(0, 4)), ("K_II", slice(4, 8))):
-            ours = " ".join(f"{k:7.3f}" for k in scale * per_pascal[part])
-            printed = " ".join(f"{k:6.3f}" for k in theirs[part])
-            lines.append(f"  φ = {phi:<3d} {name} computed {ours}    Table 4 {printed}")
-    return "\n".join(lines)
+    headers = ["φ", "", *(f"tip {n}" for n in range(1, 5)), *(f"Table 4, {n}" for n in range(1, 5))]
+    return Part("K_I and K_II of the first step (Table 4), MPa√m", headers, rows, before)
 
 
-def _disagreements(runs: dict[int, Watch]) -> str:
+def _disagreements(runs: dict[int, Watch]) -> Part:
     """What is printed and does not follow from what else is printed; numbers from the runs."""
     first = min(run.load("initiation") for run in runs.values()) / MPA
 
     def listed(kind: str) -> str:
         loads = {phi: run.load(kind) for phi, run in runs.items()}
-        return "  ".join(
+        return ", ".join(
             f"{phi}°: " + ("none" if np.isnan(load) else f"{published.normalised_load(load):.2f}")
             for phi, load in loads.items()
         )
 
-    return "\n".join(
-        [
-            "Where the paper and mechanics disagree",
-            f"  - With the printed toughness of {published.K_IC / MPA:g} MPa √m no slot starts to grow below {first:.1f} MPa, above",
-            f"    the strength of the intact material ({published.UNIAXIAL_STRENGTH / MPA:g} MPa): the printed initiation stresses",
-            "    of 2-5 MPa cannot follow from it. Loads scale with toughness, so compare the normalised ones.",
-            "  - The paper finds both stresses higher at φ = 30 and 60 than at 0 and 90. Coalescence agrees, initiation",
-            "    does not: crack 1 is the same in all four, and starts first.",
-            f"      initiation   {listed('initiation')}",
-            f"      coalescence  {listed('coalescence')}",
-            "  - Table 4 prints |K_I|: slots under compression have K_I < 0. Its zeros at φ = 30 and 60 belong to faces",
-            "    that touch, while its other rows are those of open slots.",
-            "  - Table 3's lines at φ = 0-60 are geometry first: the straight line from tip to tip has nearly their slopes.",
-        ]
-    )
+    words = [
+        f"With the printed toughness of {published.K_IC / MPA:g} MPa√m no slot starts to grow below {first:.1f} MPa, above the",
+        f"strength of the intact material ({published.UNIAXIAL_STRENGTH / MPA:g} MPa): the printed initiation stresses of 2-5 MPa",
+        "cannot follow from it. Loads go with toughness, so compare the normalised ones. The paper finds initiation and",
+        "coalescence stresses higher at φ = 30 and 60 than at 0 and 90. Coalescence agrees, initiation does not: crack 1 is",
+        f"the same in all four, and is what starts first (normalised, initiation {listed('initiation')}; coalescence",
+        f"{listed('coalescence')}). Table 4 prints |K_I|, but slots under compression have K_I < 0; its zeros at φ = 30",
+        "and 60 belong to faces that touch, while its other rows are those of open slots: one specimen cannot have both. φ is",
+        "told as measured from the horizontal, but the pairs φ = 0 with 90 and 30 with 60 in Table 4 and Figures 15 and 16",
+        "only stand where it counts from crack 1. Table 3's lines at φ = 0 to 60 are geometry first: the straight line from",
+        "tip to tip has nearly their slopes.",
+    ]
+    return Part("Where the paper contradicts itself", before=[" ".join(words)])

@@ -1,4 +1,4 @@
-"""The two-crack specimens for φ = 0, 30, 60, 90, and the comparison with what was published about them.
+"""The two-crack specimens for φ = 0, 30, 60, 90, and the comparison with what was published about them, on one page.
 
 `geomech run pipelines/two_cracks` calls `main`; copy the folder to make a study of your own.
 """
@@ -12,26 +12,28 @@ from geomech.pipeline import run
 from geomech.scene import load_scene
 
 sys.path.insert(0, str(Path(__file__).parent))
+from compare_settings import family
 from compare_two_cracks import Watch, report
+from page_two_cracks import write_page
+
+FEWER_FILES = ("output.every=1000000", "output.interior=false")  # of the many runs that vary a setting
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
     # All are read before the first one runs: an error in the last should not cost the time of the others.
-    names = list(variants) or load_scene(folder).variants
-    scenes = {name: load_scene(folder, overrides, variant=name) for name in names}
+    names = list(variants) or [name for name in load_scene(folder).variants if not family(name)]
+    scenes = {name: load_scene(folder, [*(FEWER_FILES if family(name) else ()), *overrides], name) for name in names}
     watched, failed = {}, 0
     for name, scene in scenes.items():
-        watch = Watch()
+        watched[name] = Watch()
         try:
-            run(scene, Path(out) / name, [*standard_observers(scene, quiet=quiet), watch])
+            run(scene, Path(out) / name, [*standard_observers(scene, quiet=quiet), watched[name]])
         except Exception:
+            del watched[name]
             failed = 1
             logging.getLogger(__name__).exception("%s failed; the others go on", name)
-        else:
-            watched[name] = watch
-    text = report(watched)
-    Path(out).mkdir(parents=True, exist_ok=True)
-    (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
+    (Path(out) / "comparison.txt").write_text(text := report(watched) + "\n", encoding="utf-8")
+    page = write_page(watched, folder, Path(out), overrides)
     if not quiet:
-        print("\n" + text)
+        print(f"\n{text}\n{page}")
     return failed

@@ -1,0 +1,79 @@
+"""Crack paths drawn over one another: a panel a specimen, a colour a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .plots import COLOURS, figure_of
+
+if TYPE_CHECKING:
+    from geomech.model import Cracks
+
+#: Rock shown around the cracks, in parts of what they span.
+_MARGIN = 0.25
+
+
+def crack_paths(panels: Mapping[str, Mapping[str, Cracks]], path: Path, columns: int = 4) -> Path:
+    """``panels``: title → (what it is called → cracks at the end of a run). Cracks that were drawn are black, what grew
+    has its run's colour; all panels have one scale. Lengths in mm."""
+    columns = min(columns, len(panels))
+    rows = -(-len(panels) // columns)
+    points = {
+        title: 1e3 * np.concatenate([cracks.nodes[np.unique(cracks.segments)] for cracks in runs.values()])
+        for title, runs in panels.items()
+    }
+    width, height = np.max([np.ptp(own, axis=0) for own in points.values()], axis=0) * (1 + _MARGIN)
+    width = max(width, 0.45 * height)
+    wide = 10.0 / max(columns, 2)
+    figure, save = figure_of((wide * columns, 0.55 + (wide * height / width + 0.45) * rows), path)
+    axes = figure.subplots(rows, columns, squeeze=False)
+    names = list(dict.fromkeys(name for runs in panels.values() for name in runs))
+    for panel, (title, runs) in zip(axes.flat, panels.items()):
+        middle = (points[title].min(axis=0) + points[title].max(axis=0)) / 2
+        for name, cracks in runs.items():
+            k = names.index(name)
+            line, wider = ("-", "--", ":")[k // len(COLOURS) % 3], 0.45 * (len(runs) - list(runs).index(name) - 1)
+            for old in (False, True):
+                lines = 1e3 * cracks.nodes[cracks.segments[(cracks.birth_cycle == 0) == old]]
+                if not len(lines):
+                    continue
+                # One broken line for all segments.
+                x, y = np.concatenate([lines, np.full((len(lines), 1, 2), np.nan)], axis=1).reshape(-1, 2).T
+                colour = "#15161a" if old else COLOURS[k % len(COLOURS)]
+                label = name if not old and len(names) > 1 else None
+                panel.plot(
+                    x,
+                    y,
+                    color=colour,
+                    lw=2.4 if old else 1.5 + wider,
+                    ls="-" if old else line,
+                    label=label,
+                    solid_capstyle="round",
+                )
+        panel.set(
+            title=title,
+            aspect="equal",
+            xlim=(middle[0] - width / 2, middle[0] + width / 2),
+            ylim=(middle[1] - height / 2, middle[1] + height / 2),
+        )
+        panel.title.set_fontsize(10)
+        panel.tick_params(labelsize=7)
+        panel.spines[["top", "right"]].set_visible(False)
+    for panel in axes.flat[len(panels) :]:
+        panel.set_axis_off()
+    axes.flat[0].set_ylabel("mm", fontsize=8)
+    if len(names) > 1:
+        handles = {label: handle for panel in axes.flat for handle, label in zip(*panel.get_legend_handles_labels())}
+        figure.legend(
+            handles.values(),
+            handles.keys(),
+            loc="outside lower center",
+            ncols=min(len(names), 4),
+            frameon=False,
+            fontsize=9,
+        )
+    return save()

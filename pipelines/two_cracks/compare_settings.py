@@ -1,0 +1,192 @@
+"""What readings, crack faces and settings change: of one step of load, and of whole runs where these were made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from compare_two_cracks import MPA, Watch, by_angle, coalescence_angle_deg
+from first_step import FACES, READINGS, SETTINGS, first_step
+
+from geomech.reference.two_cracks import PHI_DEG
+from geomech.report.part import Part
+
+#: Beginnings of variants' names that are runs of the four specimens with something else → what that is.
+FAMILIES = {
+    "closed": "closed faces, friction 30°",
+    "horizontal": "φ from the horizontal",
+    "quadratic": "the paper's elements, increments of 2 mm, fixed steps",
+    "paper": "the paper's: these and Kelvin's solution",
+}
+#: Beginnings of variants' names that vary one setting → what it is called; the setting stands behind the first "_".
+LADDERS = {"increment": "increment, mm", "order": "order of the elements", "step": "time step, s"}
+#: The ladders' rung that the study itself stands on.
+OWN_RUNG = {"increment": "1", "order": "4", "step": "1"}
+
+#: Why the ways of handing forces on differ.
+SPRINGS = """\
+The platens touch the specimen by springs at its corners. Spread over the face, their forces are the uniform stress of the
+test. Left at the corners, they reach the cracks unevenly. By Kelvin's solution (equations 2-4) about three quarters of a
+corner's force go into the rest of the infinite plane, which is not there."""
+GUESS = """\
+Were equation 4's u the motion of the boundary and not what the spring gives, forces at the loaded end would be {:.0f} times as
+large: a guess, no more, at how initiation stresses so low were found."""
+
+
+def family(name: str) -> str:
+    """The family or ladder of a variant, by its name; "" of the study's own."""
+    return next((known for known in (*FAMILIES, *LADDERS) if name.startswith(known + "_")), "")
+
+
+def own(runs: Mapping[str, Watch]) -> dict[str, Watch]:
+    """The runs that are the study itself."""
+    return {name: run for name, run in runs.items() if not family(name)}
+
+
+def of_family(runs: Mapping[str, Watch], which: str) -> dict[str, Watch]:
+    return {name: run for name, run in runs.items() if family(name) == which and run.last is not None}
+
+
+def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
+    """Initiation loads by reading, by faces and by settings, and what the settings do to K; all from one step of load."""
+    found = {}
+
+    def at(phi: int, wishes: tuple) -> object:
+        if (phi, wishes) not in found:
+            found[phi, wishes] = first_step(folder, overrides, phi, wishes)
+        return found[phi, wishes]
+
+    def loads(choices: Mapping[str, tuple]) -> list[list]:
+        return [
+            [name, *(f"{at(phi, wishes).initiation / MPA:.2f}" for phi in PHI_DEG)] for name, wishes in choices.items()
+        ]
+
+    headers = ["", *(f"φ = {phi}" for phi in PHI_DEG)]
+    cases = Part(
+        "Both readings of φ, open and closed faces",
+        headers,
+        loads(FACES) + loads({name: wishes for name, wishes in READINGS.items() if wishes}),
+        [
+            "Initiation, MPa: the load at which the first tip reaches the printed toughness, by maximum tangential stress.",
+            "Slots are open at first and stay so; closed cracks slide.",
+        ],
+    )
+    rows = []
+    for name, wishes in SETTINGS.items():
+        if not wishes:
+            continue
+        row: list = [name]
+        for phi in PHI_DEG:
+            exact, k = at(phi, ()), at(phi, wishes).k
+            off = np.abs(k / at(phi, wishes).load - exact.k / exact.load).max(axis=1)
+            row += [f"{100 * part:.2g} %" for part in off * exact.load / np.abs(exact.k).max(axis=1)]
+        rows.append(row)
+    carried = Part(
+        "What the paper's settings carry, before anything grows",
+        ["", *(f"{k}, φ = {phi}" for phi in PHI_DEG for k in ("K_I", "K_II"))],
+        rows,
+        [
+            "Largest error of K at any tip, in parts of the largest K of that mode, against this study's settings.",
+            "These are within 2·10⁻⁵ of finer elements, and K within 3·10⁻⁹ of the crack solver alone under the exact tractions.",
+        ],
+        [
+            SPRINGS,
+            GUESS.format(at(0, ()).springs),
+        ],
+    )
+    initiation = Part(
+        "Initiation by the same settings, MPa", headers, loads(SETTINGS), after=["The paper prints 2.24 to 5.23 MPa."]
+    )
+    return [cases, carried, initiation]
+
+
+def whole_runs(runs: Mapping[str, Watch]) -> list[Part]:
+    """The four specimens run to their end by other readings, faces and settings, and one setting varied at a time; []
+    where no such variant was run."""
+    base = by_angle(own(runs))
+    rows = []
+    for which, told in {"": "this study's", **FAMILIES}.items():
+        for run in (own(runs) if not which else of_family(runs, which)).values():
+            if run.last is not None:
+                rows.append([told, run.phi, *_came_to(run, base.get(run.phi))])
+    headers = ["run", "φ to crack 1", "initiation, MPa", "coalescence, MPa", "line, °", "largest way apart, mm", "end"]
+    found = []
+    if any(of_family(runs, which) for which in FAMILIES):
+        note = "Largest way apart: of any grown point from the path of this study's run with the same φ; both to where the shorter ends."
+        found.append(Part("Whole runs by other readings, faces and settings", headers, rows, after=[note]))
+    for which, told in LADDERS.items():
+        members = of_family(runs, which)
+        if members:
+            found.append(_ladder(which, told, members, base))
+    return found
+
+
+def _came_to(run: Watch, base: Watch | None) -> list:
+    """Loads, slope of the line (degrees from the horizontal), largest way from ``base``'s path, how it ended."""
+    cells: list = [f"{run.load(kind) / MPA:.2f}" if np.isfinite(run.load(kind)) else None for kind in _KINDS]
+    angle = coalescence_angle_deg(run.last.cracks)
+    away = apart(run, base) if base is not None and base is not run else np.nan
+    return [
+        *cells,
+        None if np.isnan(angle) else f"{angle:.2f}",
+        f"{1e3 * away:.2f}" if np.isfinite(away) else None,
+        run.end,
+    ]
+
+
+_KINDS = ("initiation", "coalescence")
+
+
+def apart(run: Watch, other: Watch) -> float:
+    """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of nodes that these reach in height."""
+    cracks, against = run.last.cracks, other.last.cracks
+    nodes = cracks.nodes[np.unique(cracks.segments[cracks.birth_cycle > 0])]
+    start, end = against.nodes[against.segments].transpose(1, 0, 2)
+    if not len(nodes):
+        return np.nan
+    nodes = nodes[
+        (nodes[:, 1] <= max(start[:, 1].max(), end[:, 1].max()))
+        & (nodes[:, 1] >= min(start[:, 1].min(), end[:, 1].min()))
+    ]
+    if not len(nodes):
+        return np.nan
+    along = end - start
+    part = np.einsum("nsi,si->ns", nodes[:, None] - start, along) / np.einsum("si,si->s", along, along)
+    foot = start + np.clip(part, 0.0, 1.0)[..., None] * along
+    return float(np.hypot(*(nodes[:, None] - foot).transpose(2, 0, 1)).min(axis=1).max())
+
+
+def _ladder(which: str, told: str, members: Mapping[str, Watch], base: Mapping[int, Watch]) -> Part:
+    """One setting varied: loads, and what they differ by from the finest rung of the same φ."""
+    rungs: dict[int, dict[float, Watch]] = {}
+    for name, run in members.items():
+        rungs.setdefault(run.phi, {})[float(name.split("_")[1].replace("p", "."))] = run
+    rows, after = [], []
+    for phi, of_value in rungs.items():
+        if phi in base:
+            of_value[float(OWN_RUNG[which])] = base[phi]
+        # From coarse to fine.
+        values = sorted(of_value, reverse=which != "order")
+        finest = of_value[values[-1]]
+        for value in values:
+            run = of_value[value]
+            row: list = [phi, value]
+            for kind in _KINDS:
+                load, best = run.load(kind), finest.load(kind)
+                row += [f"{load / MPA:.2f}" if np.isfinite(load) else None]
+                row += [f"{100 * (load / best - 1):+.2f}" if run is not finest and np.isfinite(load / best) else None]
+            angle = coalescence_angle_deg(run.last.cracks)
+            row += [None if np.isnan(angle) else f"{angle:.2f}", f"{run.seconds:.1f}"]
+            rows.append(row)
+    headers = [
+        "φ",
+        told,
+        "initiation, MPa",
+        "off the finest, %",
+        "coalescence, MPa",
+        "off the finest, %",
+        "line, °",
+        "computed in, s",
+    ]
+    return Part(f"Convergence: {told.split(',')[0]}", headers, rows, after=after)
