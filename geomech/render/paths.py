@@ -15,11 +15,17 @@ if TYPE_CHECKING:
 
 #: Rock shown around the cracks, in parts of what they span.
 _MARGIN = 0.25
+#: Axes of a panel, inches.
+_WIDEST, _TALLEST = 2.0, 4.6
 
 
 def crack_paths(panels: Mapping[str, Mapping[str, Cracks]], path: Path, columns: int = 4) -> Path:
     """``panels``: title → (what it is called → cracks at the end of a run). Cracks that were drawn are black, what grew
     has its run's colour; all panels have one scale. Lengths in mm."""
+    panels = {
+        title: {name: cracks for name, cracks in runs.items() if cracks.n_segments} for title, runs in panels.items()
+    }
+    panels = {title: runs for title, runs in panels.items() if runs}
     columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)
     points = {
@@ -28,8 +34,10 @@ def crack_paths(panels: Mapping[str, Mapping[str, Cracks]], path: Path, columns:
     }
     width, height = np.max([np.ptp(own, axis=0) for own in points.values()], axis=0) * (1 + _MARGIN)
     width = max(width, 0.45 * height)
-    wide = 10.0 / max(columns, 2)
-    figure, save = figure_of((wide * columns, 0.55 + (wide * height / width + 0.45) * rows), path)
+    # Inches of a panel's axes, of numbers beside and below it, of the legend.
+    wide = min(_WIDEST, _TALLEST * width / height)
+    size = ((wide + 0.45) * columns + 0.3, (wide * height / width + 0.6) * rows + 0.5)
+    figure, save = figure_of(size, path)
     axes = figure.subplots(rows, columns, squeeze=False)
     names = list(dict.fromkeys(name for runs in panels.values() for name in runs))
     for panel, (title, runs) in zip(axes.flat, panels.items()):

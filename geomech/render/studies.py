@@ -9,6 +9,8 @@ from .plots import COLOURS, figure_of
 
 #: A published range: its lower and upper end.
 Range = tuple[float, float]
+#: Curves of no more points than this have a mark at each.
+MARKED = 12
 
 
 def against(
@@ -19,20 +21,29 @@ def against(
     ranges: Mapping[str, Range] | None = None,
     log: bool = False,
 ) -> Path:
-    """``curves``: name → (x, y) with a mark at every point; ``ranges`` are bands across; ``log`` scales both axes so."""
-    figure, save = figure_of((5.6, 3.6), path)
+    """``curves``: name → (x, y); ``ranges`` are bands across; ``log`` scales both axes so."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    figure, save = figure_of((5.6, 3.6 + 0.2 * ((len(curves) + len(ranges or {})) // 2)), path)
     axes = figure.add_subplot()
     for k, (name, (xs, ys)) in enumerate(curves.items()):
-        axes.plot(xs, ys, "o-", color=COLOURS[k % len(COLOURS)], lw=1.5, ms=4.5, label=name)
+        marked = "o-" if len(xs) <= MARKED else "-"
+        axes.plot(xs, ys, marked, color=COLOURS[k % len(COLOURS)], lw=1.5, ms=4.5, label=name)
     for k, (name, (low, high)) in enumerate((ranges or {}).items(), len(curves)):
         axes.axhspan(low, high, color=COLOURS[k % len(COLOURS)], alpha=0.22, lw=0, label=name)
     if log:
         axes.set(xscale="log", yscale="log")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_major_formatter(lambda value, _: f"{value:g}")
+            axis.set_minor_locator(NullLocator())
     else:
-        axes.set_ylim(bottom=0)
+        reached = [value for _, ys in curves.values() for value in ys] + [high for _, high in (ranges or {}).values()]
+        axes.set_ylim(0, 1.06 * max(reached, default=1.0))
         if curves and all(len(xs) <= 8 for xs, _ in curves.values()):
             axes.set_xticks(sorted({float(value) for xs, _ in curves.values() for value in xs}))
     axes.set(xlabel=x, ylabel=y)
-    axes.legend(frameon=False, fontsize=8)
+    if len(curves) + len(ranges or {}) > 1:
+        figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=8)
     axes.spines[["top", "right"]].set_visible(False)
     return save()

@@ -67,7 +67,7 @@ th.words, td.words { text-align: left; }
 td.told { text-align: left; min-width: 11rem; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, var(--least, 17rem)), 1fr)); gap: 1rem; margin: 1rem 0; }
 figure { margin: 0; min-width: 0; }
-figure img { width: 100%; max-width: 40rem; height: auto; display: block; }
+figure img { max-width: 100%; height: auto; display: block; }
 figcaption { color: var(--soft); font-size: .88rem; margin-top: .3rem; }
 pre { background: var(--tint); border-radius: .35rem; padding: .7rem .9rem; overflow-x: auto; font-size: .85rem; line-height: 1.4; }
 details { margin: .8rem 0; }
@@ -152,15 +152,16 @@ class Page:
             f'<div class="wide"><table style="width:100%"><thead><tr>{head}<th></th></tr></thead><tbody>{rows}</tbody></table></div>'
         )
 
-    def figures(self, pictures: Iterable[tuple[Path, str]], least_rem: float = 17.0) -> None:
-        """(file, caption) side by side as far as each keeps ``least_rem`` of width."""
+    def figures(self, pictures: Iterable[tuple[Path, str]], least_rem: float = 17.0, whole: bool = False) -> None:
+        """(file, caption) side by side as far as each keeps ``least_rem`` of width; ``whole``: one below the other."""
+        size = "--least:100%" if whole else f"--least:{least_rem:g}rem"
         shown = [
             f'<figure><img alt="{html.escape(caption, quote=True)}" src="{_data(path)}">'
             f"<figcaption>{html.escape(caption)}</figcaption></figure>"
             for path, caption in pictures
         ]
         if shown:
-            self._body.append(f'<div class="figures" style="--least:{least_rem:g}rem">{"".join(shown)}</div>')
+            self._body.append(f'<div class="figures" style="{size}">{"".join(shown)}</div>')
 
     def code(self, text: str) -> None:
         self._body.append(f"<pre>{html.escape(text)}</pre>")
@@ -199,7 +200,8 @@ def written(value: Any) -> str:
     if isinstance(value, float):
         mantissa, _, power = f"{value:.4g}".partition("e")
         return (mantissa + (f"·10{str(int(power)).translate(_RAISED)}" if power else "")).replace("-", "−")
-    return str(value)
+    text = str(value)
+    return text.replace("-", "−") if is_number(text) and text != "-" else text
 
 
 def _of(kind: str) -> str:

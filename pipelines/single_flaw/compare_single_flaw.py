@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,21 +10,22 @@ import numpy as np
 from geomech.ddm.criteria import maximum_tangential_stress
 from geomech.model import Cycle
 from geomech.reference import single_flaw as published
+from geomech.report.part import Part
 
 MPA = 1e6
 #: Wing lengths that the report lists, in half-lengths of the flaw.
 LISTED = (0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
-#: What the report says of itself.
-LIMITS = """\
-What this does and does not say
-  - The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a
-    third of the width. They share the fall of K_I with length (stable growth), not its size; from where the
-    wings are as far from the ends as the specimen is wide, K_I rises again and they part from them.
-  - The load at which wings run to the ends belongs to ends under uniform stress: a block with one strain gives
-    its ends no resistance to bending open, as stiff platens would. LEFM then leaves a last ligament of the
-    order of an increment standing up to higher loads, so the load of daylighting depends on the increment.
-  - Published pictures (wings that turn into the load's direction) agree in kind only: no numbers are printed."""
+#: What the comparison says of itself.
+LIMITS = (
+    """The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a third of the
+    width. They share the fall of K_I with length (stable growth), not its size; from where the wings are as far from the ends
+    as the specimen is wide, K_I rises again and they part from them.""",
+    """The load at which wings run to the ends belongs to ends under uniform stress: a block with one strain gives its ends no
+    resistance to bending open, as stiff platens would. LEFM then leaves a last ligament of the order of an increment standing
+    up to higher loads, so the load of daylighting depends on the increment.""",
+    "Published pictures (wings that turn into the load's direction) agree in kind only: no numbers are printed.",
+)
 
 
 @dataclass
@@ -43,12 +45,15 @@ class Wings:
     events: tuple = ()
     height: float = np.nan
     end: str = ""
+    last: Cycle | None = None
     _open: tuple | None = None
 
     def on_start(self, problem, folder) -> None:
         self.height = float(np.ptp(problem.blocks.loops(int(problem.cracks.block[0]))[0][:, 1]))
 
     def on_cycle(self, cycle: Cycle) -> None:
+        if cycle.cracks.n_segments:  # what is cut through is an edge of blocks from then on
+            self.last = cycle
         self.curve.append((cycle.strain, cycle.load))
         self.events += cycle.events
         tips = cycle.tips[cycle.tips["end"] == 1]
@@ -105,68 +110,100 @@ class Wings:
         return float(np.polyfit(strain[before], load[before], 1)[0])
 
 
+def parts(wings: Wings) -> list[Part]:
+    """The comparison in parts."""
+    if not len(wings.load):
+        return [Part(f"No tip grew ({wings.end}); modulus {wings.tangent_modulus() / 1e9:.2f} GPa")]
+    limits = Part("What this does and does not say", before=[" ".join(words.split()) for words in LIMITS])
+    return [_first_step(wings), _growth(wings), _lengths(wings), _stiffness(wings), limits]
+
+
 def report(wings: Wings) -> str:
     """The comparison as text."""
-    if not len(wings.load):
-        return f"No tip grew ({wings.end}); modulus {wings.tangent_modulus() / 1e9:.2f} GPa."
-    return "\n\n".join([_first_step(wings), _growth(wings), _lengths(wings), _stiffness(wings), LIMITS])
+    return "\n\n".join(part.text() for part in parts(wings))
 
 
-def _first_step(wings: Wings) -> str:
+def _first_step(wings: Wings) -> Part:
     k = np.abs(wings.k[0]) / wings.load[0]
     angle, k_eq = maximum_tangential_stress(wings.k[:1, 0], wings.k[:1, 1])
     plane, factor = published.open_slot_in_plane(), published.secant_correction()
     plane_angle, _ = maximum_tangential_stress(np.array([-plane[0]]), np.array([plane[1]]))
-    plane_kink = np.degrees(abs(plane_angle[0]))
+    rows = [
+        [f"|{name}|/σ, √m", *(f"{value:.5f}" for value in (ours, theirs, p, p * factor))]
+        for name, ours, theirs, p in zip(("K_I", "K_II"), k, published.OPEN_SLOT, plane)
+    ]
+    kinks = [np.degrees(abs(angle[0])), published.KINK_DEG, np.degrees(abs(plane_angle[0]))]
+    rows.append(["kink, degrees", *(f"{kink:.2f}" for kink in kinks), None])
     predicted = published.K_IC * wings.load[0] / k_eq[0]
-    return "\n".join(
-        [
-            "Initiation (open slot: K_I < 0, the faces approach)",
-            "                 computed    this plate, order 8    infinite plane    the same × √sec(πa cos β/W)",
-            *(
-                f"  |{name}|/σ √m{' ' * (5 - len(name))} {ours:8.5f}    {theirs:19.5f}    {p:14.5f}    {p * factor:10.5f}"
-                for name, ours, theirs, p in zip(("K_I", "K_II"), k, published.OPEN_SLOT, plane)
-            ),
-            f"  kink, degrees  {np.degrees(abs(angle[0])):8.2f}    {published.KINK_DEG:19.2f}    {plane_kink:14.2f}",
-            f"  load {wings.load[0] / MPA:.2f} MPa; K_eq reaches K_Ic at {predicted / MPA:.2f} MPa",
-        ]
+    return Part(
+        "Initiation",
+        ["", "computed", "this plate, order 8", "infinite plane", "the same × √sec(πa cos β/W)"],
+        rows,
+        ["An open slot: K_I < 0, the faces approach."],
+        [f"Load {wings.load[0] / MPA:.2f} MPa; K_eq reaches K_Ic at {predicted / MPA:.2f} MPa."],
     )
 
 
-def _growth(wings: Wings) -> str:
+def _growth(wings: Wings) -> Part:
     last = wings.run_off
-    risen = wings.load[wings.stable]
     to_end = wings.height / 2 - wings.tip[last, 1]
     load, mm = wings.load[[0, last]] / MPA, np.array([wings.arrested, wings.wing[last], to_end]) * 1e3
     shear = np.abs(wings.k[1:, 1] / wings.k[1:, 0]).max() if len(wings.k) > 1 else np.nan
-    lines = [
-        "Growth",
-        f"  the first burst, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm",
-        f"  then each increment needs a higher load, {len(risen) - 1} times over",
-        f"  at {load[1]:.1f} MPa, {mm[1]:.0f} mm long and {mm[2]:.0f} mm from the specimen's ends, they run on at that load",
-        f"  direction there {wings.direction[last]:.2f} degrees from the load; |K_II|/K_I at most {shear:.3f} after the kink",
-        f"  how the run ended: {wings.end}",
+    words = [
+        f"The first burst, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm; then each increment needs a higher load,",
+        f"{len(wings.stable) - 1} times over. At {load[1]:.1f} MPa, {mm[1]:.0f} mm long and {mm[2]:.0f} mm from the specimen's",
+        f"ends, they run on at that load, {wings.direction[last]:.2f} degrees from the load's direction; |K_II|/K_I is at most",
+        f"{shear:.3f} after the kink. The run ended: {wings.end}.",
     ]
-    return "\n".join(lines)
+    return Part("Growth", before=[" ".join(words)])
 
 
-def _lengths(wings: Wings) -> str:
-    lines = [
-        "K_I/σ of the wings, √m, beside those of closed, frictionless flaws in an infinite plane",
-        "  l/a    computed    Horii & Nemat-Nasser    ratio    Ashby & Hallam    ratio",
-    ]
-    a = published.HALF_LENGTH
+def _lengths(wings: Wings) -> Part:
+    a, rows = published.HALF_LENGTH, []
     for ratio in LISTED:
         ours = wings.factor(ratio * a)
         if np.isnan(ours):
             continue
         h, s = float(published.wing_horii_nemat_nasser(ratio * a)), float(published.wing_ashby_hallam(ratio * a))
-        lines.append(f"  {ratio:<4.1f} {ours:10.4f}    {h:20.4f}    {ours / h:5.2f}    {s:14.4f}    {ours / s:5.2f}")
-    return "\n".join(lines)
-
-
-def _stiffness(wings: Wings) -> str:
-    return (
-        f"Stiffness before growth {wings.tangent_modulus() / 1e9:.2f} GPa; plane strain with one small open slot "
-        f"{published.tangent_modulus() / 1e9:.2f} GPa"
+        rows.append([f"{ratio:.1f}", f"{ours:.4f}", f"{h:.4f}", f"{ours / h:.2f}", f"{s:.4f}", f"{ours / s:.2f}"])
+    return Part(
+        "K_I/σ of the wings, √m",
+        ["l/a", "computed", "Horii & Nemat-Nasser", "ratio", "Ashby & Hallam", "ratio "],
+        rows,
+        ["Beside those of closed, frictionless flaws in an infinite plane."],
     )
+
+
+def _stiffness(wings: Wings) -> Part:
+    return Part(
+        "Stiffness before growth",
+        before=[
+            f"{wings.tangent_modulus() / 1e9:.2f} GPa; plane strain with one small open slot {published.tangent_modulus() / 1e9:.2f} GPa."
+        ],
+    )
+
+
+def settings(runs: Mapping[str, Wings]) -> Part:
+    """Several runs side by side: what settings change."""
+    rows = [
+        [
+            name,
+            f"{wings.load[0] / MPA:.2f}",
+            f"{1e3 * wings.arrested:.1f}",
+            *(f"{wings.factor(ratio * published.HALF_LENGTH):.4f}" for ratio in (1.0, 3.0)),
+            f"{wings.load[wings.run_off] / MPA:.2f}",
+            wings.end,
+        ]
+        for name, wings in runs.items()
+        if len(wings.load)
+    ]
+    headers = [
+        "run",
+        "initiation, MPa",
+        "first burst, mm",
+        "K_I/σ, l = a, √m",
+        "l = 3a",
+        "runs to the ends, MPa",
+        "end",
+    ]
+    return Part("Settings: increments, faces, the paper's", headers, rows)

@@ -55,7 +55,7 @@ def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings
     if by_phi:
         page.figures(
             [(_paths(own(runs) or runs, drawings / "paths.svg"), "Paths alone, mm: slots black, what grew in colour.")],
-            40,
+            whole=True,
         )
     told = parts(own(runs) or runs)
     for part in told:
@@ -73,11 +73,14 @@ def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings
     panels = _compared_paths(runs)
     if panels:
         page.figures(
-            [(crack_paths(panels, drawings / "compared.svg"), "Paths by other readings, faces and settings, mm.")], 40
+            [(crack_paths(panels, drawings / "compared.svg"), "Paths by other readings, faces and settings, mm.")],
+            whole=True,
         )
     ladders = _rungs(runs)
     if ladders:
-        page.figures([(crack_paths(ladders, drawings / "ladders.svg", 3), "Paths with one setting varied, mm.")], 40)
+        page.figures(
+            [(crack_paths(ladders, drawings / "ladders.svg", 3), "Paths with one setting varied, mm.")], whole=True
+        )
     if not others:
         page.section("Whole runs by other readings, faces and settings; convergence")
         page.text(
@@ -103,7 +106,8 @@ def _paths(runs: Mapping[str, Watch], path: Path) -> Path:
 
 def _figures(by_phi: Mapping[int, Watch], drawings: Path) -> list[tuple[Path, str]]:
     """Figures 15, 16 and 17: stresses, their ratio to the strength and strains against φ."""
-    phi = list(by_phi)
+    if len(by_phi) < 2:
+        return []
 
     def curve(kind: str, of) -> tuple[list[float], list[float]]:
         found = [(angle, of(run)) for angle, run in by_phi.items() if np.isfinite(run.load(kind))]
@@ -151,7 +155,7 @@ def _figures(by_phi: Mapping[int, Watch], drawings: Path) -> list[tuple[Path, st
             "Figure 17: strains at initiation and coalescence.",
         )
     )
-    return made if len(phi) > 1 else []
+    return made
 
 
 def _compared_paths(runs: Mapping[str, Watch]) -> dict[str, dict]:
@@ -173,11 +177,6 @@ def _rungs(runs: Mapping[str, Watch]) -> dict[str, dict]:
     for name, run in runs.items():
         which = family(name)
         if which in LADDERS and run.last is not None:
-            rung = f"{LADDERS[which]} {name.split('_')[1].replace('p', '.')}"
+            rung = f"{LADDERS[which].split(' (')[0]} {name.split('_')[1].replace('p', '.')}"
             panels.setdefault(f"{LADDERS[which].split(',')[0]}, φ = {run.phi}°", {})[rung] = run.last.cracks
-    base = by_angle(own(runs))
-    for title, panel in panels.items():
-        phi = int(title.rpartition(" ")[2].rstrip("°"))
-        if phi in base:
-            panel["this study's"] = base[phi].last.cracks
     return panels

@@ -54,6 +54,7 @@ def test_run_ends_as_told_and_writes_its_files(study):
     names = {path.name for path in study.out.iterdir()}
     assert names >= {
         "comparison.txt",
+        "report.html",
         "summary.json",
         "events.csv",
         "tips.csv",
@@ -63,6 +64,8 @@ def test_run_ends_as_told_and_writes_its_files(study):
     }
     text = (study.out / "comparison.txt").read_text()
     assert "Initiation" in text and "nan" not in text
+    page = (study.out / "report.html").read_text(encoding="utf-8")
+    assert "Horii &amp; Nemat-Nasser" in page and page.count("data:image/svg+xml") >= 5
     cracks = study.files.grid("cracks", int(study.files.history["cycle"][-1]))
     # The file's crack is as long as the wings that were seen: both wings, and the flaw.
     lengths = cracks.compute_cell_sizes(length=True, area=False, volume=False)["Length"].sum()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,10 +15,13 @@ import pyvista
 from geomech.cli import DONE, main
 from geomech.output import Run
 from geomech.reference import two_cracks as published
+from geomech.scene import load_scene
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "two_cracks"
 sys.path.insert(0, str(FOLDER))
+from compare_settings import FAMILIES, LADDERS, apart, family
 from compare_two_cracks import Watch, coalescence_angle_deg
+from first_step import KELVIN, QUADRATIC, first_step
 
 COARSE_STEP = 2e6  # Pa of load in the 10 s steps below; the scene's own are a tenth of it
 
@@ -120,6 +124,54 @@ def test_files_are_read_by_pyvista_and_meshio(coarse):
         assert grid.n_points == len(meshio.read(folder / reader.active_datasets[0].path).points)
     blocks = pyvista.get_reader(folder / "blocks.pvd")
     assert len(blocks.time_values) == len(coarse["phi_0"].files.history)
+
+
+def test_the_study_is_on_one_page(coarse):
+    """What was computed stands beside what is printed, pictures and drawings are in the page, and nothing is fetched."""
+    page = (coarse["phi_0"].folder.parent / "report.html").read_text(encoding="utf-8")
+    for words in (
+        "Line of coalescence (Table 3)",
+        "Table 4",
+        "Figures 15, 16, 17",
+        "Both readings of φ",
+        "--variant all",
+    ):
+        assert words in page
+    for printed in ("−69.17", "−63.72", "0.755"):
+        assert printed in page
+    assert page.count("data:image/svg+xml") >= 6
+    assert "<script" not in page and 'src="http' not in page
+    load = coarse["phi_0"].watch.load("coalescence")
+    assert f"{load / 1e6:.2f}" in page
+
+
+def test_one_step_tells_the_load_of_initiation():
+    """From K of the published open slots (1e-3: the coarse elements of the study; 2e-4 is found)."""
+    for phi in (0, 90):
+        assert first_step(FOLDER, (), phi).initiation == pytest.approx(expected_initiation(phi), rel=1e-3)
+
+
+def test_what_the_papers_settings_carry():
+    """Quadratic elements with equal nodes are off by 0.2 % in K, forces by Kelvin's solution by 70-80 %."""
+    exact = first_step(FOLDER, (), 0)
+    for wishes, low, high in ((QUADRATIC, 2e-4, 5e-3), (KELVIN, 0.7, 0.8)):
+        off = np.abs(first_step(FOLDER, (), 0, wishes).k - exact.k).max(axis=1) / np.abs(exact.k).max(axis=1)
+        assert ((off > low) & (off < high)).all()
+
+
+def test_every_variant_is_the_study_or_known_to_vary_it():
+    names = load_scene(FOLDER).variants
+    assert [name for name in names if not family(name)] == [f"phi_{phi}" for phi in published.PHI_DEG]
+    assert {family(name) for name in names} == {"", *FAMILIES, *LADDERS}
+
+
+def test_paths_lie_apart_by_what_one_is_moved(coarse):
+    watch = coarse["phi_0"].watch
+    assert apart(watch, watch) == pytest.approx(0.0, abs=1e-15)
+    moved = Watch(
+        last=replace(watch.last, cracks=replace(watch.last.cracks, nodes=watch.last.cracks.nodes + [1e-4, 0.0]))
+    )
+    assert 5e-5 < apart(moved, watch) <= 1e-4 * (1 + 1e-9)
 
 
 @pytest.mark.slow
