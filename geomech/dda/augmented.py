@@ -90,7 +90,7 @@ def settle_augmented(
         off = max(np.abs(settled.gap[pressed]).max(initial=0.0), np.abs(left[sticks]).max(initial=0.0))
         if off <= tolerance:
             return replace(settled, stretch=np.where(sticks, left, 0.0), iterations=iterations)
-        found = replace(found, state=settled.state, direction=settled.direction, bonded=settled.bonded)
+        found = replace(found, state=settled.state, direction=settled.direction, bonded=settled.bonded, tried=None)
         image = np.concatenate(
             [np.where(pressed, settled.normal_force, 0.0), np.where(drawn, settled.shear_force, 0.0)]
         )

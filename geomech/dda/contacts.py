@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -46,6 +46,7 @@ class ContactSet:
     wear, lift                 m: way slid to and fro, and how far that has forced the faces apart
     stretch                    m: motion along the edge that the multipliers of sticking contacts still have to take back
     relies_on_glue             corners have been left out that hold as long as all bonds do
+    tried                      state and direction that open–close iterations begin with, where these are others
     """
 
     vertex: np.ndarray
@@ -67,6 +68,20 @@ class ContactSet:
     lift: np.ndarray
     stretch: np.ndarray
     relies_on_glue: bool = False
+    tried: tuple[np.ndarray, np.ndarray] | None = None
+
+    def trying(self, rows: np.ndarray) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are rows of the same contacts:
+        those with which another attempt at the step has ended."""
+        if len(rows) != len(self) or not all(
+            np.array_equal(rows[name], getattr(self, name)) for name in ("vertex", "edge")
+        ):
+            return self
+        way = np.where(rows["state"] == SLIP, np.sign(rows["shear_force"]), 0.0)
+        # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not known.
+        known = (self.bonded == 0) | (rows["bonded"] == self.bonded)
+        known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
+        return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
 
     @cached_property
     def gap(self) -> np.ndarray:

@@ -145,9 +145,11 @@ class BlockSystem:
         dt: float | None = None,
         crack: CrackResponse | None = None,
         load_time: float | None = None,
+        like: StepResult | None = None,
     ) -> StepResult:
         """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme weighs
-        them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes.
+        them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the result of
+        the same step with another ``crack``, from whose contact states iterations begin.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun again
         from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
@@ -172,6 +174,8 @@ class BlockSystem:
         limit = self._limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
         found = self._finder.find(state, vertices, _WINDOW * limit)
+        if like is not None:
+            found = found.trying(like.contacts)
         reason, before = "", np.inf
         cuts = 0
         while True:
