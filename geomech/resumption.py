@@ -75,7 +75,8 @@ def resume(
 def _refuse_other_folders(folder: Path) -> None:
     if not folder.is_dir():
         raise NotResumable(f"there is no run folder {folder}")
-    if not ((folder / "history.csv").is_file() or (folder / checkpoint.FOLDER).is_dir()):
+    # The log is there before anything else of a run but the scene, which other folders hold as well.
+    if not any((folder / name).exists() for name in ("run.log", "history.csv", checkpoint.FOLDER)):
         below = sorted(str(found.parent) for found in folder.glob("*/history.csv"))
         raise NotResumable(
             f"{folder} holds no run: name the folder that `geomech run` wrote"

@@ -42,9 +42,11 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
     form."""
     output = getattr(scene, "output", None)
     resolved = None if scene is None else scene.resolved()
-    watchers: list[Observer] = [RunFolder(), RunLog()]
+    watchers: list[Observer] = []
     if resolved is not None:
+        # Before the folder is cleared: what then breaks off can begin again.
         watchers.append(SceneCopy(resolved))
+    watchers += [RunFolder(), RunLog()]
     interior_every = getattr(output, "interior_every", 5) if getattr(output, "interior", True) else 0
     return [
         *watchers,

@@ -19,7 +19,8 @@ import pickle
 import platform
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -46,8 +47,10 @@ class FilesChanged(ValueError):
     """A file of a run is not what it was at the checkpoint."""
 
 
-def identity() -> dict[str, Any]:
-    """What must be the same for a checkpoint to be of use, and for the run to go on bit for bit."""
+@cache
+def identity() -> Mapping[str, Any]:
+    """What must be the same for a checkpoint to be of use, and for the run to go on bit for bit. Sources are those of the
+    time when it was asked for first: they may be edited while a run lasts."""
     packages = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
     return {"format": FORMAT, "python": platform.python_version(), **packages, "sources": _sources()}
 

@@ -38,6 +38,8 @@ class Checkpoints:
         self.seconds = 0.0
 
     def on_start(self, problem: Problem, folder: Path) -> None:
+        if self.wanted:
+            checkpoint.identity()
         self.on_resume(problem, folder, digests(self.scene or {}))
 
     def memory(self) -> dict[str, str]:
