@@ -43,7 +43,8 @@ EDGE_CRACK_BENDING = {
 
 def three_point_bending(ratio: float, load: float, depth: float) -> float:
     """K_I of a beam of span 4W under ``load`` (N/m) in the middle, depth W, edge crack a = ``ratio``·W: stated to be
-    within 0.5 % for 0 ≤ a/W ≤ 1 (Srawley 1976)."""
+    within 0.5 % for 0 ≤ a/W ≤ 1 (Srawley 1976, Int. J. Fracture 12, 475–476; coefficients as ASTM E399 has them, quoted by
+    Dowling, Mechanical Behavior of Materials, fig. 8.13b: the paper itself was not at hand)."""
     r = ratio
     f = 3 * math.sqrt(r) * (1.99 - r * (1 - r) * (2.15 - 3.93 * r + 2.7 * r * r)) / (2 * (1 + 2 * r) * (1 - r) ** 1.5)
     return 4 * load / math.sqrt(depth) * f
