@@ -11,9 +11,9 @@ from .holes import kirsch_stress
 #: and of two, pulled across (Grandt 1975, Int. J. Fracture 11, 283–294; constants read from a public implementation).
 BOWIE_FIT = {1: (0.6762, 0.8733, 0.3245), 2: (0.9439, 0.6865, 0.2772)}
 
-#: The same for one crack as a polynomial in L/(L + R), constant term first (NASGRO reference manual, appendix C, crack case
-#: TC23, after Tweed & Rooke; read from a public implementation, which takes it for two cracks: with two it is 9 to 35 % low).
-TWEED_ROOKE = (3.364500, -7.209304, 8.230965, -3.500286, -2.923363, 4.306705, -1.562110)
+#: The same for one crack as a polynomial in L/(L + R), constant term first (NASGRO reference manual, appendix C, the first factor
+#: of crack case TC23; read from a public implementation, which says that it is for two: with two it is up to 26 % low).
+NASGRO_FIT = (3.364500, -7.209304, 8.230965, -3.500286, -2.923363, 4.306705, -1.562110)
 
 
 def bowie(ratio: float, cracks: int) -> float:
@@ -22,10 +22,10 @@ def bowie(ratio: float, cracks: int) -> float:
     return a + b / (c + ratio)
 
 
-def tweed_rooke(ratio: float) -> float:
-    """The same for one crack by `TWEED_ROOKE`."""
+def nasgro(ratio: float) -> float:
+    """The same for one crack by `NASGRO_FIT`."""
     part = ratio / (1 + ratio)
-    return sum(coefficient * part**k for k, coefficient in enumerate(TWEED_ROOKE))
+    return sum(coefficient * part**k for k, coefficient in enumerate(NASGRO_FIT))
 
 
 def factor(length: float, cracks: int, stress: np.ndarray, pressure: float = 0.0, n: int = 65) -> float:
