@@ -175,6 +175,8 @@ def line_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: flo
 
 
 def _between(targets, sources, nu, tol, side, force):
+    if not targets.n or not sources.n:
+        return np.empty((targets.n_unknowns, sources.n_unknowns), order="F")
     nodal = _to_nodal(sources.family, sources.order)
     start, end, kind, order = sources.start, sources.end, sources.kind, sources.order
     return _tractions(targets.nodes, targets.tangent, start, end, kind, order, nu, tol, side, force, nodal)

@@ -61,7 +61,7 @@ def crowding(start, end, tip, source, touching, n_edges, apart, across, chained,
 
 @_jit
 def _crowding(start, end, length, tip, source, touching, n_edges, apart, across, chained, shortest, sweep, reach):
-    n = len(start)
+    n, least_apart = len(start), min(apart, across)
     out = np.zeros(n)
     for m in range(n):
         i = sweep[m]
@@ -71,8 +71,9 @@ def _crowding(start, end, length, tip, source, touching, n_edges, apart, across,
             qx, qy = 0.5 * (start[j, 0] + end[j, 0]), 0.5 * (start[j, 1] + end[j, 1])
             if mx - qx > reach:
                 break
-            between = np.hypot(mx - qx, my - qy) - 0.5 * (length[i] + length[j])
-            if between * min(apart, across) > max(length[i], length[j]):
+            # Squared: most pairs are far apart, and a root for each would be most of the work.
+            near = 0.5 * (length[i] + length[j]) + max(length[i], length[j]) / least_apart
+            if (mx - qx) ** 2 + (my - qy) ** 2 > near * near:
                 continue
             same = source[i] == source[j] or touching[source[i], source[j]]
             allowed = apart

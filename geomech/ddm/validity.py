@@ -120,18 +120,24 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
                 elif not rock[k, e]:
                     raise ValueError(f"{name(s)}: ({x:g}, {y:g}) lies outside the rock")
         i, j = _boxes_meet(segments[new], edges, _SMALL * span)
-        one, other = segments[new[i]], edges[j]
-        for k in np.flatnonzero(_crossing(one, other)):
-            s = new[i[k]]
-            # A mouth touches its edge within round-off, which may look like a crossing.
-            near = _to_segments(segments[s], edges[j[k] : j[k] + 1])
-            if not (mouth[s] & (near <= 1e-7 * span)).any():
-                raise ValueError(f"{name(s)}: crosses the outline near {_near(segments[s])}")
-        for k in np.flatnonzero(_overlapping(one, other, span))[:1]:
-            raise ValueError(f"{name(new[i[k]])}: lies along the boundary near {_near(one[k])}")
+        if len(i):
+            _check_crossing(cracks, segments, new[i], edges[j], span, name)
         _check_mouths(cracks, new, edges, span, name)
     _check_pairs(cracks, segments, new, span, name)
     _check_folds(cracks, new, name)
+
+
+def _check_crossing(cracks: Cracks, segments: np.ndarray, at: np.ndarray, edges: np.ndarray, span: float, name) -> None:
+    """The segments ``at`` (k,), each against one of ``edges`` (k, 2, 2): it may neither cross it nor lie along it."""
+    one, mouth = segments[at], cracks.surface[cracks.segments]
+    for k in np.flatnonzero(_crossing(one, edges)):
+        s = at[k]
+        # A mouth touches its edge within round-off, which may look like a crossing.
+        near = _to_segments(segments[s], edges[k : k + 1])
+        if not (mouth[s] & (near <= 1e-7 * span)).any():
+            raise ValueError(f"{name(s)}: crosses the outline near {_near(segments[s])}")
+    for k in np.flatnonzero(_overlapping(one, edges, span))[:1]:
+        raise ValueError(f"{name(at[k])}: lies along the boundary near {_near(one[k])}")
 
 
 def _check_pairs(cracks: Cracks, segments: np.ndarray, new: np.ndarray, span: float, name) -> None:
@@ -159,7 +165,8 @@ def _check_pairs(cracks: Cracks, segments: np.ndarray, new: np.ndarray, span: fl
 
 
 def _check_mouths(cracks: Cracks, new: np.ndarray, edges: np.ndarray, span: float, name) -> None:
-    for s, e in np.argwhere(cracks.surface[cracks.segments[new]]):
+    mouths = cracks.surface[cracks.segments[new]]
+    for s, e in np.argwhere(mouths) if mouths.any() else ():
         x = cracks.nodes[cracks.segments[new[s], e]]
         way = cracks.nodes[cracks.segments[new[s], 1 - e]] - x
         here = edges[_to_pairs(np.broadcast_to(x, (len(edges), 2)), edges) <= 1e-7 * span]
