@@ -20,9 +20,6 @@ FOLDER = Path(__file__).parents[2] / "pipelines" / "single_flaw"
 sys.path.insert(0, str(FOLDER))
 from compare_single_flaw import Wings
 
-STEP = 0.4e6  # Pa of load a step below
-
-
 def run_pipeline(out: Path, *wishes: str) -> SimpleNamespace:
     """`geomech run pipelines/single_flaw`; returns what its own observer saw and its files."""
     seen = []
@@ -45,8 +42,8 @@ def run_pipeline(out: Path, *wishes: str) -> SimpleNamespace:
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """To 42 MPa, in load steps of 0.4 MPa: wings of 35 mm, which still grow stably."""
-    return run_pipeline(tmp_path_factory.mktemp("flaw"), "dda.time_step_s=2.0", "run.end_time_s=210.0")
+    """To 42 MPa: wings of 35 mm, which still grow stably."""
+    return run_pipeline(tmp_path_factory.mktemp("flaw"), "run.end_time_s=210.0")
 
 
 def test_run_ends_as_told_and_writes_its_files(study):
@@ -85,14 +82,15 @@ def test_factors_before_growth(study):
 
 
 def test_initiation_at_the_load_that_the_factors_give(study):
-    """K_eq = K_Ic, worked out by hand from the maximum tangential stress along the kink (Erdogan & Sih 1963), to one
-    load step above."""
+    """K_eq = K_Ic, worked out by hand from the maximum tangential stress along the kink (Erdogan & Sih 1963): 32.98 MPa,
+    to the three digits that elements of the scene's order keep of K."""
     k_i, k_ii = -published.OPEN_SLOT[0], published.OPEN_SLOT[1]
     theta = np.radians(np.arange(0, 180, 0.01))
     hoop = np.cos(theta / 2) * (k_i * np.cos(theta / 2) ** 2 + 1.5 * k_ii * np.sin(theta))
     expected = published.K_IC / hoop.max()
     assert np.degrees(theta[hoop.argmax()]) == pytest.approx(published.KINK_DEG, abs=0.1)
-    assert expected <= study.wings.load[0] * (1 + 1e-3) <= expected + STEP * (1 + 1e-3)
+    assert expected == pytest.approx(32.98e6, abs=0.005e6)
+    assert study.wings.load[0] == pytest.approx(expected, rel=1e-3)
 
 
 def test_wings_leave_at_the_kink_angle(study):
@@ -173,13 +171,14 @@ def test_wings_far_from_the_flaw_feel_its_corners():
 @pytest.mark.slow
 def test_to_the_ends_and_whatever_the_increment(tmp_path):
     """Wings reach both ends and cut the specimen in two; the load under which they run there must not depend on the
-    increment: 46.6 and 46.4 MPa with 2 and 1 mm (load steps of 0.2 MPa; the rest is K's error of about 1 %)."""
+    increment: 46.0 and 46.4 MPa with 2 and 1 mm (XX)."""
     loads = []
     for increment in (2e-3, 1e-3):
         ran = run_pipeline(tmp_path / f"{increment}", f"growth.increment_m={increment}")
         assert ran.files.summary["end"] == "daylighting"
         assert {"initiation", "daylighting", "split"} <= set(ran.files.summary["first"])
         loads.append(ran.wings.load[ran.wings.run_off])
+        print(f"increment {increment}: runs to the ends at {loads[-1] / 1e6:.3f} MPa")
         # The last 3 mm bend towards the end's surface as it attracts them; the very last step has no tip left to tell.
         shaft = (ran.wings.wing > 0.03) & (ran.wings.tip[:, 1] < published.HEIGHT / 2 - 3e-3)
         assert np.nanmax(np.abs(ran.wings.direction[shaft])) < 4
