@@ -23,6 +23,7 @@ from compare_settings import FAMILIES, LADDERS, apart, family
 from compare_two_cracks import Watch, coalescence_angle_deg
 from first_step import KELVIN, QUADRATIC, first_step
 
+
 def run_pipeline(out: Path, variants: list[str], *wishes: str) -> dict[str, SimpleNamespace]:
     """`geomech run pipelines/two_cracks`; for each variant what the study's observer saw, and its files."""
     seen = []
