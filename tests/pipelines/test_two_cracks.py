@@ -125,9 +125,9 @@ def test_files_are_read_by_pyvista_and_meshio(specimens):
     assert len(blocks.time_values) == len(specimens["phi_0"].files.history)
 
 
-def test_the_study_is_on_one_page(coarse):
+def test_the_study_is_on_one_page(specimens):
     """What was computed stands beside what is printed, pictures and drawings are in the page, and nothing is fetched."""
-    page = (coarse["phi_0"].folder.parent / "report.html").read_text(encoding="utf-8")
+    page = (specimens["phi_0"].folder.parent / "report.html").read_text(encoding="utf-8")
     for words in (
         "Line of coalescence (Table 3)",
         "Table 4",
@@ -140,7 +140,7 @@ def test_the_study_is_on_one_page(coarse):
         assert printed in page
     assert page.count("data:image/svg+xml") >= 6
     assert "<script" not in page and 'src="http' not in page
-    load = coarse["phi_0"].watch.load("coalescence")
+    load = specimens["phi_0"].watch.load("coalescence")
     assert f"{load / 1e6:.2f}" in page
 
 
@@ -164,8 +164,8 @@ def test_every_variant_is_the_study_or_known_to_vary_it():
     assert {family(name) for name in names} == {"", *FAMILIES, *LADDERS}
 
 
-def test_paths_lie_apart_by_what_one_is_moved(coarse):
-    watch = coarse["phi_0"].watch
+def test_paths_lie_apart_by_what_one_is_moved(specimens):
+    watch = specimens["phi_0"].watch
     assert apart(watch, watch) == pytest.approx(0.0, abs=1e-15)
     moved = Watch(
         last=replace(watch.last, cracks=replace(watch.last.cracks, nodes=watch.last.cracks.nodes + [1e-4, 0.0]))
