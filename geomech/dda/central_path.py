@@ -31,8 +31,10 @@ _START = 10.0
 _SHORT_OF = 0.99
 #: A contact is undecided while its force and its gap, in units of its stiffness, differ by less than this factor.
 _CLEAR = 3.0
-#: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere.
+#: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere, …
 _END, _STUCK = 1e-14, 1e-3
+#: … nor do so many in a row that are shorter than this.
+_BLOCKED, _SHORT = 5, 0.05
 #: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their difference.
 _LEAST_LEFT = 1e-14
 #: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. Walls of 1 000
@@ -41,7 +43,7 @@ _WITHIN = 1e-4
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _add_forces(right, block, other, order, vectors, normal, shear):
+def add_forces(right, block, other, order, vectors, normal, shear):
     """Add to ``right`` (6 n,) the forces ``normal`` and ``shear`` (n_contacts,) on the blocks."""
     for c in range(block.shape[0]):
         for side in range(2):
@@ -54,7 +56,7 @@ def _add_forces(right, block, other, order, vectors, normal, shear):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift):
+def assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift):
     """Fill ``data`` with the blocks' own part and contacts that answer a motion by dN = −``normal`` (n − κ t)·Δu and
     dS = −``shear`` t·Δu + ``slope`` dN."""
     data[:] = 0.0
@@ -93,7 +95,7 @@ def _assemble(data, matrix, stride, diagonal, upper, lower, block, other, order,
                         line[m] += my_push[a] * its_pull[m] + drag * its_across[m]
 
 
-def _solver(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """What solves with the matrix of ``data`` for one right side after the other. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is not None:
@@ -112,7 +114,7 @@ def _reach(number: np.ndarray, change: np.ndarray) -> float:
     return min(1.0, _SHORT_OF * float((-number[falling] / change[falling]).min(initial=np.inf)))
 
 
-def _acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
+def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
     """(n,) True for contacts that alone stand for their pair of corners: the line that is crossed last."""
     acting = np.ones(len(gap), bool)
     index = np.arange(len(gap))
@@ -125,7 +127,8 @@ def _acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
 class CentralPath:
     """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which hold.
 
-    Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins.
+    Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins. ``missed``: what is
+    left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their stiffness.
     """
 
     def __init__(
@@ -141,7 +144,7 @@ class CentralPath:
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
-        some = self._some = np.flatnonzero(_acting(found.partner, gap))
+        some = self._some = np.flatnonzero(acting(found.partner, gap))
         order = pattern.order
         self._at = found.block[some], found.other[some], order, np.ascontiguousarray(vectors[some])
         self._upper, self._lower = pattern.upper[some], pattern.lower[some]
@@ -168,7 +171,13 @@ class CentralPath:
         self._g, self._s = gap[some] - self._pull / self._kn, -found.shear[some] / self._ks
         self._centre(_START * self._unit)
         self._load = max(float(np.abs(right).max()), 1e-300)
-        self.missed, self.ended = 1.0, False
+        self.epsilon = _START
+        self.missed, self.ended, self._blocked = 1.0, False, 0
+
+    @property
+    def unknowns(self) -> np.ndarray:
+        """(6 n,) the motion at hand."""
+        return self._unknowns
 
     def _centre(self, epsilon: np.ndarray) -> None:
         """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""
@@ -201,24 +210,24 @@ class CentralPath:
         normal, width, (back, ahead), (above, below) = self._normal, self._width, self._slip, self._left()
         epsilon = float(self._products(normal, width, back, ahead, above, below).sum()) / float((1 + 2 * rough).sum())
         residual = (self._right - np.einsum("bij,bj->bi", self._matrix, self._unknowns.reshape(-1, 6))).ravel()
-        _add_forces(residual, *self._at, normal - self._pull, self._shear)
+        add_forces(residual, *self._at, normal - self._pull, self._shear)
         gap_missed = self._g + normal / kn - width
         slip_missed = self._s + self._shear / ks - (ahead - back)
         soft = width + normal / kn
         stiff, stiff_along = normal / soft, rough / (1.0 / ks + ahead / below + back / above)
         slope = stiff_along * mu * (back / above - ahead / below)
-        _assemble(
+        assemble(
             self._data, self._matrix, pattern.stride, pattern.diagonal, self._upper, self._lower, *self._at, stiff,
             stiff_along, slope, self._lift,
         )  # fmt: skip
-        solve = _solver(pattern, self._data)
+        solve = solution_of(pattern, self._data)
 
         def newton(to_normal, to_back, to_ahead):
             """Changes of the unknowns, of gap and motion along, of N and S, and of the six positive numbers."""
             given = (to_normal - normal * (width + gap_missed)) / soft
             given_along = stiff_along * (to_ahead / below - ahead - to_back / above + back - slip_missed)
             side = residual.copy()
-            _add_forces(side, *self._at, given, given_along + slope * given)
+            add_forces(side, *self._at, given, given_along + slope * given)
             step = solve(side)
             motion = contact_states.moved(step, *self._at)
             motion[:, 0] -= self._lift * motion[:, 1]
@@ -251,7 +260,9 @@ class CentralPath:
         self._shear = self._shear + far * d_shear
         self._slip = np.stack([back + far * changes[2], ahead + far * changes[3]])
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
-        self.ended = not (epsilon > _END and far > _STUCK)
+        self._blocked = self._blocked + 1 if far < _SHORT else 0
+        self.epsilon = epsilon
+        self.ended = not (epsilon > _END and far > _STUCK and self._blocked < _BLOCKED)
         return int(self._undecided().sum())
 
     def _products(self, normal, width, back, ahead, above, below) -> np.ndarray:

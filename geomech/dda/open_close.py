@@ -5,8 +5,8 @@ switched and the step solved again: Newton's method, which ends in two or three 
 lost for good, break only when all else is right.
 
 Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states returns,
-the `CentralPath` proposes states to go on from, unless contacts are few. If it ends without, rounds of `LaggedFriction` do,
-slowly and surely. If these end without, the sliding contacts stick
+the `CentralPath` proposes states to go on from, unless contacts are few. If it is blocked, `RoundedLaws` do, and if they fail
+too, rounds of `LaggedFriction`, slowly and surely. If these end without, the sliding contacts stick
 again and only the worst contact of each block is switched, and if a combination still returns, only the first (the
 least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
 Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
@@ -27,6 +27,7 @@ from .contact_states import check_states, contact_forces
 from .contacts import ContactSet
 from .curved_joints import CurvedJoints
 from .lagged_friction import LaggedFriction
+from .rounded_laws import RoundedLaws
 
 #: Which of the contacts that are wrong are switched: all, those of each block that are half as wrong as its worst, its
 #: worst, the first.
@@ -254,6 +255,33 @@ def _lagged(
         raise Unsettled(str(error)) from error
 
 
+def _slower(
+    equations: _Equations, answer: _Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
+) -> Iterator[tuple[_States, int]]:
+    """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (which knows of no
+    lift), and the solutions spent since the last. Raises `Unsettled`."""
+    of = equations
+    laws = RoundedLaws(
+        of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, path.unknowns,
+        float(np.sqrt(path.epsilon)),
+    )  # fmt: skip
+    told = 0
+    try:
+        for state, direction in laws.stages():
+            states = _States(state, direction, bonded)
+            if states.key not in offered:
+                offered.add(states.key)
+                yield states, laws.solutions - told
+                told = laws.solutions
+    except np.linalg.LinAlgError as error:
+        raise Unsettled(str(error)) from error
+    told = laws.solutions - told
+    if not of.springs.lift.any():
+        for states, spent in _lagged(equations, answer, bonded, offered, budget):
+            yield states, told + spent
+            told = 0
+
+
 def settle(
     pattern: assembly.Pattern,
     matrix: np.ndarray,
@@ -278,7 +306,7 @@ def settle(
     seen: set[bytes] = set()
     offered: set[bytes] = set()
     path: CentralPath | None = None
-    lagged: Iterator[tuple[_States, int]] | None = None
+    slower: Iterator[tuple[_States, int]] | None = None
     caution, fewest, tries = _ALL, np.inf, 0
     few = len(found) <= _FEW
     iteration = 0
@@ -320,7 +348,7 @@ def settle(
             seen.clear()
         elif tired or (stuck and not (few and path is None)):
             proposal = None
-            if lagged is None:
+            if slower is None:
                 if path is None or not np.array_equal(path.bonded, states.bonded):
                     path = CentralPath(
                         pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded
@@ -330,10 +358,11 @@ def settle(
                 proposal, spent = _proposed(path, states.bonded, offered, budget)
                 iteration += spent
             seen.clear()
-            if proposal is None and not springs.lift.any():
-                if lagged is None:
-                    lagged = _lagged(equations, answer, states.bonded, offered, _PATIENCE * max_iterations)
-                proposal, spent = next(lagged, (None, 0))
+            if proposal is None:
+                if slower is None:
+                    budget = _PATIENCE * max_iterations
+                    slower = _slower(equations, answer, path, states.bonded, offered, budget)
+                proposal, spent = next(slower, (None, 0))
                 # What it takes is its own affair: without it the step would be cut, and cut again.
                 iteration, max_iterations = iteration + spent, max_iterations + spent + _FINISH
             if proposal is not None:
