@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..model import Blocks, Cracks
-from ..shapes import Cutting, Joint, Trace, Zone, cut
+from ..shapes import Cutting, Joint, Mend, Trace, Zone, cut
 from ..shapes.assembly import TOLERANCE
 from ..shapes.joint_sets import (
     Law,
@@ -27,6 +26,9 @@ from ..shapes.network import crack_network
 from ..shapes.parts import JOINT, Flaw, ShapeError, extent_of, grid_decimals
 from .tables.geometry import Geometry, JointSetShape
 
+#: So many places of each kind of defect are told in full.
+_TOLD = 4
+
 
 @dataclass(frozen=True, eq=False)
 class Jointed:
@@ -38,13 +40,19 @@ class Jointed:
     cracks: Cracks
 
     def told(self) -> list[str]:
-        """What was mended, a line a kind, with the first place."""
+        """What was found and mended, a line a kind, with the first places and what meets there now."""
+        kinds: dict[str, list[Mend]] = {}
+        for mend in self.cutting.mends:
+            kinds.setdefault(mend.kind, []).append(mend)
         lines = []
-        for kind, number in Counter(mend.kind for mend in self.cutting.mends).items():
-            first = next(mend for mend in self.cutting.mends if mend.kind == kind)
-            size = max(mend.size for mend in self.cutting.mends if mend.kind == kind)
-            unit = "m²" if kind == "sliver" else "m"
-            lines.append(f"{number} × {kind}, up to {size:.3g} {unit}, first at ({first.x:.6g}, {first.y:.6g})")
+        for kind, own in kinds.items():
+            unit = "m²" if kind in ("sliver", "small block kept") else "m"
+            places = [
+                f"({mend.x:.6g}, {mend.y:.6g}){f' {mend.junction}' * bool(mend.junction)}" for mend in own[:_TOLD]
+            ]
+            more = f" and {len(own) - _TOLD} more, listed by geomech build" if len(own) > _TOLD else ""
+            size = max(mend.size for mend in own)
+            lines.append(f"{len(own)} × {kind}, up to {size:.3g} {unit}, at {', '.join(places)}{more}")
         return lines
 
 
@@ -64,6 +72,8 @@ def jointed(
         dead_ends=geometry.dead_ends,
         shortest_crack=geometry.shortest_crack_m,
         smallest_area=geometry.smallest_block_m2,
+        # Drawn joints come first, sets by their order: a small block never breaks a drawn fault.
+        lasting=len(joints) - len(geometry.joint_sets),
     )
     return Jointed(tuple(joints), cutting, _cracks(geometry, named, cutting, traces))
 

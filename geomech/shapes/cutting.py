@@ -20,6 +20,9 @@ from .assembly import TOLERANCE, block_names
 from .noding import FREE, Drawn, Graph, Mend, noded
 from .parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
 
+#: Two edges at a node go straight on when they turn by less than 5° (its cosine): so much a hand-drawn trace may bend.
+_STRAIGHT_ON = 0.9962
+
 
 @dataclass(frozen=True, eq=False)
 class Cutting:
@@ -27,7 +30,7 @@ class Cutting:
 
     zone      (n_blocks,)  the zone each block was cut from
     mends                  what was moved, joined or left out
-    nodes                  {"I": n, "Y": n, "X": n}: ends in rock, junctions of three, crossings of four joints
+    nodes                  {"I": n, "Y": n, "X": n}: ends in rock, junctions of three (T or Y), crossings of four joints
     """
 
     blocks: Blocks
@@ -45,11 +48,14 @@ def cut(
     dead_ends: str = "cracks",
     shortest_crack: float = 0.0,
     smallest_area: float = 0.0,
+    lasting: int = 0,
 ) -> Cutting:
     """Cut ``zones`` along ``joints``.
 
     Joint ends that stop in rock become cracks ("cracks") or are taken away ("trim"), those shorter than
-    ``shortest_crack`` m always. Blocks smaller than ``smallest_area`` m² join the neighbour across their longest joint.
+    ``shortest_crack`` m always. Blocks smaller than ``smallest_area`` m² join a neighbour, of those with at least half as long a common
+    side as any the one across the least important joint; ``joints`` are listed by importance, and no small block breaks one of the first ``lasting`` ones. Only
+    what is thinner than the tolerance joins across any of them.
     ``tolerance`` m, default `TOLERANCE` of the largest side. Block edges carry their zone's edge names and the joints'
     names. Raises ShapeError where a joint or zone has no length, area or number, or ``tolerance`` leaves nothing in place.
     """
@@ -68,12 +74,15 @@ def cut(
     while True:
         arrangement = arrange(graph.nodes, graph.edges)
         zone = _zones_of(arrangement, graph.source >= drawn.n_outlines, zones, origin)
-        keep = _kept(arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, mends)
+        keep, stay = _kept(
+            arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, lasting, mends
+        )
         # Faces stay what they are, but for those between which an edge goes.
         bounds = (arrangement.left != arrangement.right) & ~_outside(arrangement, zone)
         if keep[bounds].all():
             break
         graph = graph.only(keep)
+    mends += stay
     if not keep.all():
         arrangement, graph = arrangement.only(keep), graph.only(keep)
     inside = np.flatnonzero(zone >= 0)
@@ -83,7 +92,10 @@ def cut(
         blocks = blocks.with_vertices(blocks.vertices + origin)
         cracks = replace(cracks, nodes=cracks.nodes + origin)
         mends = [mend._replace(x=mend.x + origin[0], y=mend.y + origin[1]) for mend in mends]
-    return Cutting(blocks, cracks, zone[inside], tuple(mends), _node_types(graph, drawn))
+    kind = _junctions(graph, drawn)
+    mends = _with_junctions(mends, graph.nodes + origin, kind, tolerance)
+    nodes = {name: int(np.isin(kind, kinds).sum()) for name, kinds in (("I", "I"), ("Y", ("T", "Y")), ("X", "X"))}
+    return Cutting(blocks, cracks, zone[inside], tuple(mends), nodes)
 
 
 def _origin(loops: Sequence[np.ndarray]) -> np.ndarray:
@@ -157,10 +169,10 @@ def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
 
 
 def _kept(
-    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, mends
-) -> np.ndarray:
-    """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, the longest joint of
-    blocks too small."""
+    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, lasting, mends
+) -> tuple[np.ndarray, list[Mend]]:
+    """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, a joint of blocks too
+    small; and the small blocks that stay."""
     joint = graph.source >= drawn.n_outlines
     keep = ~(joint & _outside(arrangement, zone))
     dead = arrangement.dead & keep & joint
@@ -168,20 +180,23 @@ def _kept(
         shortest, told = (np.inf, []) if dead_ends == "trim" else (max(shortest, tolerance), mends)
         keep[_short_dead_ends(arrangement, dead, shortest, told)] = False
     area, rim = arrangement.areas_and_rims()
-    small = np.flatnonzero((zone >= 0) & ((area < smallest) | (2 * area < tolerance * rim)))
-    if len(small):
-        _join_small(arrangement, graph, zone, keep, joint, small, mends)
-    return keep
+    thin = 2 * area < tolerance * rim
+    small = np.flatnonzero((zone >= 0) & ((area < smallest) | thin))
+    if not len(small):
+        return keep, []
+    return keep, _join_small(
+        arrangement, graph, zone, keep, drawn.rank[graph.source], small, np.where(thin[small], 0, lasting), mends
+    )
 
 
-def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, joint, small, mends) -> None:
-    """Take the edges between each of the ``small`` faces and one neighbour out of ``keep``."""
+def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small, lasting, mends) -> list[Mend]:
+    """Take the edges between each of the ``small`` faces and one neighbour out of ``keep``; those that stay."""
     import shapely
 
     side = np.append(zone, -1)
     left, right = arrangement.left, arrangement.right
     span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
-    inner = keep & joint & (side[left] == side[right]) & (left != right)
+    inner = keep & (rank >= 0) & (side[left] == side[right]) & (left != right)
     # The edges of each small face, in order.
     number = np.full(arrangement.n_faces + 1, -1)
     number[small] = np.arange(len(small))
@@ -194,17 +209,28 @@ def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, joint, small
     edge = edge[order]
     shapes = arrangement.polygons(small)
     area = shapely.area(shapes)
+    stay: list[Mend] = []
     for k in np.argsort(area).tolist():
         own = edge[begin[k] : begin[k + 1]]
         own = own[inner[own]]
-        if not len(own):
-            continue
         other = left[own] + right[own] - small[k]
         neighbours, which = np.unique(other, return_inverse=True)
-        best = neighbours[np.argmax(np.bincount(which, weights=span[own]))]
-        keep[own[other == best]] = inner[own[other == best]] = False
+        # A neighbour is as far away as the most important joint between.
+        between = np.full(len(neighbours), rank.max() + 1)
+        np.minimum.at(between, which, rank[own])
+        length = np.bincount(which, weights=span[own], minlength=len(neighbours))
         at = shapely.point_on_surface(shapes[k])
+        may = between >= lasting[k]
+        if not may.any():
+            # A block joined to it in this round asks again in the next.
+            stay += [Mend("small block kept", at.x, at.y, float(area[k]))]
+            continue
+        # Joined across a short side, a thin block would be a needle on its neighbour.
+        may &= length >= 0.5 * length[may].max()
+        best = neighbours[np.lexsort((length, between, may))[-1]]
+        keep[own[other == best]] = inner[own[other == best]] = False
         mends.append(Mend("sliver", at.x, at.y, float(area[k])))
+    return stay
 
 
 def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float, mends: list[Mend]) -> np.ndarray:
@@ -328,7 +354,35 @@ def _blocks(
     )
 
 
-def _node_types(graph: Graph, drawn: Drawn) -> dict[str, int]:
+def _junctions(graph: Graph, drawn: Drawn) -> np.ndarray:
+    """(n_nodes,) what the joints do at each node off the outlines: "I" end, "V" bend or meeting of two ends, "T" one abuts
+    another, "Y" three part ways, "X" cross; "E" for nodes on outlines."""
     joint = graph.source >= drawn.n_outlines
-    degree = np.bincount(graph.edges[joint].ravel(), minlength=len(graph.nodes))[graph.home == FREE]
-    return {"I": int((degree == 1).sum()), "Y": int((degree == 3).sum()), "X": int((degree >= 4).sum())}
+    edges = graph.edges[joint]
+    n = len(graph.nodes)
+    degree = np.bincount(edges.ravel(), minlength=n)
+    kind = np.array(["", "I", "V", "Y", "X"])[np.minimum(degree, 4)]
+    # Of three edges, two in one line: the third abuts on these.
+    node = np.concatenate([edges[:, 0], edges[:, 1]])
+    away = graph.nodes[np.concatenate([edges[:, 1], edges[:, 0]])] - graph.nodes[node]
+    away /= np.hypot(*away.T)[:, None]
+    three = np.flatnonzero(degree[node] == 3)
+    three = three[np.argsort(node[three], kind="stable")].reshape(-1, 3)
+    a, b, c = away[three[:, 0]], away[three[:, 1]], away[three[:, 2]]
+    straight = np.min([np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))], axis=0)
+    kind[node[three[:, 0]][straight < -_STRAIGHT_ON]] = "T"
+    kind[graph.home != FREE] = "E"
+    return kind
+
+
+def _with_junctions(mends: list[Mend], nodes: np.ndarray, kind: np.ndarray, tolerance: float) -> list[Mend]:
+    """``mends`` with the junction that is now at the place where things met."""
+    met = [k for k, mend in enumerate(mends) if mend.kind in ("near miss", "near corners")]
+    if met:
+        from scipy.spatial import cKDTree
+
+        away, node = cKDTree(nodes).query([(mends[k].x, mends[k].y) for k in met])
+        for k, distance, there in zip(met, away.tolist(), node.tolist(), strict=True):
+            if distance <= tolerance:
+                mends[k] = mends[k]._replace(junction=str(kind[there]))
+    return mends

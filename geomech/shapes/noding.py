@@ -20,13 +20,22 @@ _CELLS = 256
 
 
 class Mend(NamedTuple):
-    """Something near that was made to meet: ``kind`` "near corners", "near miss", "duplicate", "dead end", "sliver" or
-    "outside"; where, m; ``size`` m (m² of a sliver)."""
+    """Something found and mended, by its ``kind``; where, m; ``size`` m (m² of blocks); the ``junction`` that is there now.
+
+    "near corners"      ends, bends or crossings nearer than the tolerance: made one, at an outline's corner where one is
+    "near miss"         an end or a crossing nearer than that to a trace: an end is moved onto it, the trace is led through
+                        a crossing
+    "duplicate"         traces on one another: the first of them stays
+    "dead end"          a trace that goes on beyond its last crossing by less than the shortest crack: taken away
+    "sliver"            a block too small: joined to a neighbour across its least important long joint
+    "small block kept"  one that only a drawn joint, or an outline, parts from its neighbours: it stays
+    """
 
     kind: str
     x: float
     y: float
     size: float
+    junction: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +46,7 @@ class Drawn:
     end: np.ndarray
     source: np.ndarray
     names: np.ndarray  # (n_sources,) of edges on each source
+    rank: np.ndarray  # (n_sources,) the place of its joint among all, −1 of outlines
     n_outlines: int
 
     @classmethod
@@ -54,7 +64,8 @@ class Drawn:
                 source.append(len(names) + np.arange(len(loop)))
                 names += own
         n_outlines = len(names)
-        for joint in joints:
+        rank = [-1] * n_outlines
+        for place, joint in enumerate(joints):
             count = np.array([len(line) for line in joint.lines], dtype=int)
             if not len(count):
                 continue
@@ -65,11 +76,14 @@ class Drawn:
             ends.append(points[1:][inside])
             source.append(len(names) + line[:-1][inside])
             names += [joint.name] * len(count)
+            rank += [place] * len(count)
         start, end, source = np.concatenate(starts), np.concatenate(ends), np.concatenate(source)
         joint = source >= n_outlines
         start[joint], end[joint] = _clipped(start[joint], end[joint], start[~joint], decimals)
         long = (start != end).any(axis=1)
-        return cls(start[long], end[long], source[long], np.array(names, dtype=object), n_outlines)
+        return cls(
+            start[long], end[long], source[long], np.array(names, dtype=object), np.array(rank, dtype=int), n_outlines
+        )
 
 
 def _clipped(start: np.ndarray, end: np.ndarray, corners: np.ndarray, decimals: int) -> tuple[np.ndarray, np.ndarray]:

@@ -126,3 +126,21 @@ def test_a_drawn_crack_stands_beside_dead_ends(tmp_path):
 def test_mistakes_are_told_at_their_place(tmp_path, change, message):
     with pytest.raises(SceneError, match=f"(?s){message}"):
         load(tmp_path, SCENE, change)
+
+
+def test_small_blocks_spare_the_drawn_fault_and_are_told(tmp_path):
+    whole = load(tmp_path)
+    coarse = load(tmp_path, SCENE, ("seed = 3", "seed = 3\nsmallest_block_m2 = 3\nshortest_crack_m = 0.4"))
+
+    def length(scene, name):
+        blocks = scene.problem().blocks
+        edges = blocks.edges_named(name)
+        return np.hypot(*(blocks.vertices[blocks.next_vertex[edges]] - blocks.vertices[edges]).T).sum()
+
+    free = ~coarse.problem().blocks.fixed
+    assert coarse.problem().blocks.n_blocks < whole.problem().blocks.n_blocks
+    assert coarse.problem().blocks.areas()[free].min() >= 3
+    assert length(coarse, "joint:fault") == pytest.approx(length(whole, "joint:fault"), rel=1e-12) == pytest.approx(20)
+    said = coarse.drawing.jointed.told()
+    number = len([mend for mend in coarse.drawing.jointed.cutting.mends if mend.kind == "sliver"])
+    assert any(text.startswith(f"{number} × sliver, up to ") and " m², at (" in text for text in said)

@@ -202,7 +202,9 @@ def test_random_networks_full_of_near_coincidences(first, offset):
 @pytest.mark.slow
 def test_a_thousand_random_networks():
     for seed in range(1000):
-        sound(cut([rock()], [Joint("joint:a", tuple(network(seed)))]), [rock()])
+        cutting = cut([rock()], [Joint("joint:a", tuple(network(seed)))])
+        sound(cutting, [rock()])
+        neighbours_agree(cutting)
 
 
 def test_euler_holds_on_random_networks():
@@ -227,3 +229,113 @@ def test_courses_of_bricks_keep_their_bricks():
         result = cut([Zone("brick", (brick @ turned,)) for brick in bricks], [])
         assert sorted(result.blocks.areas()) == pytest.approx([0.5, 0.5, 1, 1, 1], rel=1e-10)
         assert result.cracks.n_cracks == 0
+
+
+def test_a_small_block_never_breaks_a_drawn_fault():
+    """The corner between a fault and two sets joins across the set that comes last; without one it stays."""
+    fault = Joint("joint:fault", (line([4, -1], [4, 11]),))
+    first = Joint("joint:first", (line([-1, 5], [11, 5]),))
+    second = Joint("joint:second", (line([-1, 5.4], [11, 5.4]), line([4.5, -1], [4.5, 11])))
+    cutting = cut([rock()], [fault, first, second], smallest_area=0.5, lasting=1)
+    lengths = {
+        name: sum(np.hypot(*(piece[1] - piece[0])) for piece in joint_edges(cutting.blocks, name))
+        for name in ("joint:fault", "joint:first", "joint:second")
+    }
+    # The block of 0.5 × 0.4 m beside the fault goes; the fault is whole on both its sides, the first set too.
+    assert len(found(cutting, "sliver")) == 1 and not found(cutting, "small block kept")
+    assert lengths["joint:fault"] == pytest.approx(20) and lengths["joint:first"] == pytest.approx(20)
+    assert lengths["joint:second"] == pytest.approx(40 - 2 * 0.5)
+    sound(cutting, [rock()])
+    # Between faults alone nothing gives way, and that is told once.
+    faults = Joint(
+        "joint:fault", (*fault.lines, line([4.5, -1], [4.5, 11]), line([-1, 5], [11, 5]), line([-1, 5.4], [11, 5.4]))
+    )
+    cutting = cut([rock()], [faults], smallest_area=0.5, lasting=1)
+    (kept,) = found(cutting, "small block kept")
+    assert (kept.x, kept.y, kept.size) == pytest.approx((4.25, 5.2, 0.2), abs=0.1)
+    assert cutting.blocks.n_blocks == 9
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_drawn_faults_stay_whole_among_random_sets(seed):
+    """However many small blocks are joined, what the fault was without them it still is."""
+    rng = np.random.default_rng(seed)
+    fault = Joint("joint:fault", (line([rng.uniform(1, 9), -1], [rng.uniform(1, 9), 11]),))
+    sets = [Joint(f"joint:{k}", tuple(network(100 * seed + k))) for k in range(2)]
+    cutting = cut([rock()], [fault, *sets], smallest_area=1.5, lasting=1)
+    assert len(found(cutting, "sliver")) > 3
+    whole = shapely.intersection(shapely.LineString(fault.lines[0]), shapely.Polygon(SQUARE)).length
+    length = sum(np.hypot(*(piece[1] - piece[0])) for piece in joint_edges(cutting.blocks, "joint:fault"))
+    # Twice, once for each side; near-misses move it by less than the tolerance.
+    assert length == pytest.approx(2 * whole, rel=1e-5)
+    sound(cutting, [rock()])
+
+
+def joint_edges(blocks, name) -> np.ndarray:
+    """(n, 2, 2) the ends of the block edges called ``name``."""
+    edges = blocks.edges_named(name)
+    return np.stack([blocks.vertices[edges], blocks.vertices[blocks.next_vertex[edges]]], axis=1)
+
+
+def test_what_is_mended_says_what_meets_there_now():
+    """A T short of its trace, ends that nearly make a bend, a trace that nearly passes through a crossing, a Y."""
+    joints = [
+        Joint("joint:a", (line([1, 2], [9, 2]), line([1, 6], [4, 6]), line([1, 8], [9, 8]), line([3, 7], [5, 9]))),
+        Joint("joint:b", (line([5, 2 + 4e-6], [5, 4]), line([4, 6 + 4e-6], [6, 7]), line([5, 7], [3 - 4e-6, 9]))),
+        Joint("joint:c", (line([8, 4], [8 + 4e-6, 5]), line([8, 4 - 4e-6], [7.3, 3.5]), line([8, 4], [8.7, 3.5]))),
+    ]
+    cutting = cut([rock()], joints)
+    there = {(round(m.x), round(m.y)): (m.kind, m.junction) for m in cutting.mends}
+    assert there[5, 2] == ("near miss", "T") and there[4, 6] == ("near corners", "V")
+    assert there[4, 8][1] == "X" and there[8, 4] == ("near corners", "Y")
+    assert cutting.nodes["Y"] == 2 and cutting.nodes["X"] == 1
+    assert all(1e-6 < m.size < 1e-5 for m in cutting.mends)
+
+
+def fine_network(seed: int) -> tuple[np.ndarray, ...]:
+    """Long traces at angles down to 1e-6° to one another, gaps of 1e-9 to 1e-6 m beside them and before them."""
+    rng = np.random.default_rng(seed)
+    lines = []
+    for _ in range(6):
+        turn, start = rng.uniform(0, np.pi), rng.uniform(1, 9, 2)
+        along = np.array([np.cos(turn), np.sin(turn)])
+        lines.append(np.array([start - 12 * along, start + 12 * along]))
+        for exponent in rng.uniform(-6, -1, 2):
+            by = np.radians(10.0**exponent)
+            other = np.array([np.cos(turn + by), np.sin(turn + by)])
+            lines.append(np.array([start - 12 * other, start + rng.uniform(1, 12) * other]))
+        gap = 10.0 ** rng.uniform(-9, -6) * np.array([-along[1], along[0]])
+        lines.append(np.array([start + gap, start + gap + rng.uniform(0.5, 5) * along]))
+        end = start + 10.0 ** rng.uniform(-9, -6) * along
+        lines.append(np.array([end, end + rng.uniform(0.5, 5) * np.array([along[1], -along[0]])]))
+    return tuple(lines)
+
+
+def neighbours_agree(cutting) -> None:
+    """Every piece of a joint between two blocks is an edge of both, under one name."""
+    blocks = cutting.blocks
+    known = [name for name in blocks.edge_names if name.startswith("joint:") and len(blocks.edges_named(name))]
+    for name in known:
+        pieces = joint_edges(blocks, name)
+        along = pieces[:, 1] - pieces[:, 0]
+        # One side's edges and the other's, which run the other way, add up to nothing all along the joint.
+        total = np.abs(along).sum()
+        assert np.abs(along.sum(axis=0)).max() <= 1e-9 * max(1.0, total)
+    index = np.concatenate([np.empty(0, int), *(blocks.edges_named(name) for name in known)])
+    edges = np.stack([blocks.vertices[index], blocks.vertices[blocks.next_vertex[index]]], axis=1)
+    owner, label = blocks.vertex_block[index], blocks.edge_name[index]
+    middle = shapely.points(edges.mean(axis=1))
+    i, j = shapely.STRtree(shapely.linestrings(edges)).query(middle, predicate="dwithin", distance=1e-9)
+    across = (owner[i] != owner[j]) & (label[i] == label[j])
+    assert np.isin(np.arange(len(index)), i[across]).all()
+
+
+@pytest.mark.parametrize("first", [0, pytest.param(10, marks=pytest.mark.slow)])
+def test_the_finest_angles_and_gaps_leave_sound_blocks(first):
+    for seed in range(first, 10 if first == 0 else 300):
+        traces = fine_network(seed)
+        joints = [Joint("joint:a", traces[::2]), Joint("joint:b", traces[1::2])]
+        for tolerance in (None, 1e-9):
+            cutting = cut([rock()], joints, tolerance=tolerance)
+            sound(cutting, [rock()])
+            neighbours_agree(cutting)

@@ -174,7 +174,10 @@ class Geometry(Table):
         "cracks", description='joints that stop in rock: "cracks" before a rock bridge, or "trim" them off'
     )
     shortest_crack_m: NotNegative = Field(0.0, description="dead ends shorter than this are trimmed, m")
-    smallest_block_m2: NotNegative = Field(0.0, description="smaller blocks join a neighbour, m²")
+    smallest_block_m2: NotNegative = Field(
+        0.0,
+        description="smaller blocks join a neighbour across the joint set that comes last, never across a drawn joint, m²",
+    )
     tolerance_m: Positive | None = Field(
         None, description="nearer than this, crack ends touch outlines and cracks, m (unset: 1e-6 of the largest side)"
     )
