@@ -7,7 +7,8 @@
 // using the last part of each name. Metres; the origin is the toe of the lowest bench; the slope faces left.
 //
 // What geomech reads: physical surfaces are zones ("rock", "base"); physical curves called "joint:…" inside them part the
-// rock; "slope", "crest" and the sides name edges. Joint sets come from the scene, [[geometry.joint_sets]].
+// rock; "slope", "crest" and the sides name edges; the line called "water" is the water table where the scene has [loads.water],
+// points called "monitor:…" are recorded. Joint sets come from the scene, [[geometry.joint_sets]].
 
 DefineConstant[
   benches = {3, Min 1, Max 12, Step 1, Name "Parameters/1Slope/benches", Label "Number of benches"},
@@ -19,7 +20,10 @@ DefineConstant[
   base_m = {6, Min 0.1, Max 1000, Step 1, Name "Parameters/2Rock/base_m", Label "Thickness of the base [m]"},
   fault = {1, Choices{0="none", 1="through the toe"}, Name "Parameters/3Fault/fault", Label "Fault"},
   fault_dip_deg = {32, Min 5, Max 80, Step 1, Name "Parameters/3Fault/fault_dip_deg", Label "Its dip out of the slope [deg]",
-                   Visible fault}
+                   Visible fault},
+  water = {1, Choices{0="none", 1="drawn"}, Name "Parameters/4Water/water", Label "Water table"},
+  water_share = {0.35, Min 0, Max 1, Step 0.05, Name "Parameters/4Water/water_share",
+                 Label "Its level at the back, of the height", Visible water}
 ];
 
 run = bench_height_m / Tan(face_angle_deg * Pi / 180);
@@ -81,3 +85,22 @@ If (fault)
   Line(121) = {1, 121};
   Physical Curve("joint:fault") = {121};
 EndIf
+
+If (water)
+  // It leaves the rock at the toe and rises to the back as the free surface of a drained slope does, with the square root
+  h = water_share * top;
+  wet[] = {};
+  Point(131) = {-floor_width_m, 0, 0, size};
+  For i In {0:8}
+    Point(132 + i) = {i / 8 * (back + base_m), h * Sqrt(i / 8), 0, size};
+    Line(131 + i) = {131 + i, 132 + i};
+    wet[] += {131 + i};
+  EndFor
+  Physical Curve("water") = {wet[]};
+EndIf
+
+// Points to record: behind the brink of each bench
+For i In {1:benches}
+  Point(150 + i) = {(i - 1) * (run + berm_width_m) + run + 0.1 * berm_width_m, i * bench_height_m - 0.02 * bench_height_m, 0, size};
+  Physical Point(Sprintf("monitor:bench %g", i)) = {150 + i};
+EndFor

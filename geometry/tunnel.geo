@@ -4,7 +4,8 @@
 // middle of the tunnel's floor-to-roof line at springing height (the centre of its roof).
 //
 // What geomech reads: "rock" (with the tunnel as a hole) and "frame" are zones; "tunnel:roof", "tunnel:wall",
-// "tunnel:floor" name the tunnel's edges; "joint:fault" parts the rock. Joint sets come from the scene.
+// "tunnel:floor" name the tunnel's edges; "joint:fault" parts the rock; lines called "bolt:roof" are bolts, whose properties
+// the scene gives ([[loads.bolts]]), and points called "monitor:…" are recorded. Joint sets come from the scene.
 
 DefineConstant[
   shape = {1, Choices{0="circle", 1="horseshoe"}, Name "Parameters/1Tunnel/shape", Label "Shape"},
@@ -16,7 +17,11 @@ DefineConstant[
   fault_angle_deg = {-58, Min -90, Max 90, Step 1, Name "Parameters/3Fault/fault_angle_deg",
                      Label "From the horizontal [deg]", Visible fault},
   fault_offset_m = {4.3, Min -100, Max 100, Step 0.5, Name "Parameters/3Fault/fault_offset_m",
-                    Label "Distance from the centre [m]", Visible fault}
+                    Label "Distance from the centre [m]", Visible fault},
+  bolts = {7, Min 0, Max 99, Step 1, Name "Parameters/4Support/bolts", Label "Bolts in the roof"},
+  bolt_m = {4, Min 0.1, Max 100, Step 0.5, Name "Parameters/4Support/bolt_m", Label "Their length [m]", Visible bolts},
+  bolt_spread_deg = {150, Min 1, Max 180, Step 5, Name "Parameters/4Support/bolt_spread_deg",
+                     Label "Angle that they span [deg]", Visible bolts}
 ];
 
 r = width_m / 2;
@@ -96,3 +101,26 @@ If (fault)
   Line(31) = {31, 32};
   Physical Curve("joint:fault") = {31};
 EndIf
+
+// Bolts, radially about the crown; they cut nothing
+If (bolts > 0)
+  bar[] = {};
+  gap = 0;
+  If (bolts > 1)
+    gap = bolt_spread_deg * Pi / 180 / (bolts - 1);
+  EndIf
+  For i In {1:bolts}
+    a = Pi / 2 + (i - (bolts + 1) / 2) * gap;
+    Point(100 + 2 * i) = {r * Cos(a), r * Sin(a), 0, size};
+    Point(101 + 2 * i) = {(r + bolt_m) * Cos(a), (r + bolt_m) * Sin(a), 0, size};
+    Line(100 + i) = {100 + 2 * i, 101 + 2 * i};
+    bar[] += {100 + i};
+  EndFor
+  Physical Curve("bolt:roof") = {bar[]};
+EndIf
+
+// Points to record, just inside the rock
+Point(41) = {0.02 * r, 1.05 * r, 0, size};
+Physical Point("monitor:crown") = {41};
+Point(42) = {1.05 * r, -0.02 * r, 0, size};
+Physical Point("monitor:springing") = {42};

@@ -1,7 +1,7 @@
 """Plain arrays that the solvers share: blocks, cracks, materials, joint laws, loads, the state of a run."""
 
 from .blocks import Blocks
-from .bolt import BOLT, GROUND, Bolt, grouted_bolt
+from .bolt import BOLT, GROUND, Bolt, CrossesNoJoint, grouted_bolt
 from .cracks import Cracks
 from .damping import rayleigh_coefficients
 from .history import History, Wave, baseline_corrected, read_record
@@ -29,6 +29,7 @@ __all__ = [
     "Bolt",
     "CrackFaces",
     "Cracks",
+    "CrossesNoJoint",
     "Cycle",
     "DdaSettings",
     "DdmSettings",

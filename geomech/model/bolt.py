@@ -83,6 +83,10 @@ class Bolt:
             raise ValueError(f"bolt {self.name!r}: both ends are in one block, which it cannot hold")
 
 
+class CrossesNoJoint(ValueError):
+    """A grouted bar in one block alone, where it can do nothing."""
+
+
 def grouted_bolt(
     blocks: Blocks,
     start: tuple[float, float],
@@ -99,7 +103,7 @@ def grouted_bolt(
     (m, of the order of a few diameters to half a metre; local reinforcement, Lorig 1985): each crossing becomes a `Bolt` of
     stiffness ``axial_stiffness`` (EA, N per metre of thickness) over ``active_length``, its ends half that length into the two
     blocks (less where a block is thinner). ``properties`` as for `Bolt`; it takes compression too unless told otherwise.
-    Raises ValueError when the bar crosses no joint.
+    Raises CrossesNoJoint when the bar does not.
     """
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.hypot(*(b - a)))
@@ -121,7 +125,7 @@ def grouted_bolt(
             )
         )
     if not bolts:
-        raise ValueError(f"bolt {name!r} crosses no joint on its way from {tuple(start)} to {tuple(end)}")
+        raise CrossesNoJoint(f"bolt {name!r} crosses no joint on its way from {tuple(start)} to {tuple(end)}")
     return tuple(bolts)
 
 

@@ -12,6 +12,7 @@ from ..model import (
     BaseMotion,
     BlockMotion,
     Bolt,
+    CrossesNoJoint,
     Excavation,
     History,
     InSituStress,
@@ -149,10 +150,17 @@ def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:
         **compression,
     }
     if table.axial_stiffness_n is not None:
-        return grouted_bolt(
-            check.drawing.blocks, table.start, table.end, axial_stiffness=table.axial_stiffness_n,
-            active_length=table.active_length_m, **properties,
-        )  # fmt: skip
+        try:
+            return grouted_bolt(
+                check.drawing.blocks, table.start, table.end, axial_stiffness=table.axial_stiffness_n,
+                active_length=table.active_length_m, **properties,
+            )  # fmt: skip
+        except CrossesNoJoint as error:
+            if not table.lines:
+                raise
+            # Of a drawn row of bars some miss the joints, which may come by statistics.
+            check.warn(("loads", "bolts", number), str(error), "it does nothing; a longer one might")
+            return ()
     place = ("loads", "bolts", number)
     block = carrier(check, (*place, "start"), "the bolt's end", table.start, table.zone)
     other = GROUND

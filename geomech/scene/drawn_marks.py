@@ -103,7 +103,9 @@ class _Matching:
                     for m, (start, end) in enumerate(ends, 1):
                         came_from["loads", "bolts", len(found)] = ("loads", "bolts", k, "lines")
                         called = own if len(ends) == 1 else f"{own} {m}"
-                        found.append(table.model_copy(update={"lines": (), "start": start, "end": end, "name": called}))
+                        found.append(
+                            table.model_copy(update={"lines": (name,), "start": start, "end": end, "name": called})
+                        )
         return tuple(found)
 
     def _straight(self, mark: Mark) -> list[tuple[tuple[float, float], tuple[float, float]]]:

@@ -273,3 +273,11 @@ def test_a_monitor_table_may_place_a_drawn_point(scene):
     assert "lies where blocks" in fault.message
     text = DRAWN + '[[monitors]]\nname = "crest"\nat = [2.0, 1.5]\n'
     assert scene(text, model=on_a_joint).problem().monitors["crest"][1] == (2.0, 1.5)
+
+
+def test_a_drawn_bar_that_misses_all_joints_is_left_out(scene):
+    short = MODEL.replace("Point(27)={5.5,0.2,0,1}", "Point(27)={5.1,1.5,0,1}")
+    found = scene(model=short)
+    assert [bolt.name for bolt in found.problem().loads.bolts] == ["crown", "row 1/1"]
+    (warning,) = found.warnings
+    assert "bolt 'row 2' crosses no joint" in warning.message and "loads.bolts[1].lines" in warning.place

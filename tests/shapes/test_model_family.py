@@ -53,6 +53,8 @@ def test_a_model_builds_and_loses_no_rock(model):
         ("toppling_slope", {"columns": 4, "crest_column": 2}),
         ("tunnel", {"shape": "circle", "fault_angle_deg": 90}),
         ("tunnel", {"fault": "none"}),
+        ("tunnel", {"bolts": 1, "bolt_m": 6}),
+        ("benched_slope", {"benches": 2, "water": "none"}),
         ("masonry_arch", {"half_angle_deg": 60, "voussoirs": 31}),
         ("brick_wall", {"courses": 1, "bricks": 1}),
         ("brazilian_disc", {"crack_ratio": 0, "flat_angle_deg": 30}),
@@ -84,6 +86,44 @@ def test_what_the_models_draw_is_what_their_sources_say():
     brink, far = 30 / math.tan(math.radians(60)), 30 / math.tan(math.radians(60)) + 6
     wedge = 0.5 * brink * 30 + 6 * 30 - 0.5 * far**2 * math.tan(math.radians(35))
     assert np.abs(cutting.blocks.areas() - wedge).min() < 1e-9 * wedge
+
+
+def test_bolts_water_and_monitors_are_drawn():
+    tunnel = load_scene(GEOMETRY / "tunnel.toml", ["geometry.parameters.bolts=5"])
+    bars = np.array([(bolt.start, bolt.end) for bolt in tunnel.tables.loads.bolts])
+    # Radial bars of 4 m over 150° of a roof of 3 m.
+    assert np.hypot(*bars[:, 0].T) == pytest.approx(3) and np.hypot(*bars[:, 1].T) == pytest.approx(7)
+    angles = np.degrees(np.arctan2(bars[:, 1, 1], bars[:, 1, 0]))
+    assert angles == pytest.approx([15, 52.5, 90, 127.5, 165])
+    slope = load_scene(GEOMETRY / "benched_slope.toml")
+    assert list(slope.problem().monitors) == ["bench 1", "bench 2", "bench 3"]
+    water = np.array(slope.tables.loads.water.points)
+    # It rises with the square root to 0.35 of 30 m.
+    assert water[1:, 1] == pytest.approx(0.35 * 30 * np.sqrt(water[1:, 0] / water[-1, 0]))
+
+
+def test_the_traced_slope_is_cut_as_it_is_drawn():
+    pytest.importorskip("ezdxf")
+    scene = load_scene(GEOMETRY / "traced_slope.toml")
+    assert scene.origin == (512330.0, 0.0)
+    # Corners of the outline as they stand in the drawing.
+    rock = np.array([(0, 0), (45, 0), (45, 31.2), (36.5, 30.1), (28.2, 29), (19.6, 26.8), (10.6, 24.1), (9.3, 20.4),
+                     (8.4, 16.6), (7.1, 12.35), (4.2, 12), (3.1, 8.7), (1.3, 4.1)])  # fmt: skip
+    x, y = rock.T
+    area = 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+    zones = np.array(scene.drawing.zones)
+    assert scene.blocks.areas()[zones == "rock"].sum() == pytest.approx(area, rel=ROUNDOFF)
+    assert (zones == "base").sum() == 1 and set(scene.drawing.joints) == {
+        "joint:bedding",
+        "joint:cross",
+        "joint:fault",
+    }
+    problem = scene.problem()
+    assert list(problem.monitors) == ["crest", "berm"] and len(scene.tables.loads.bolts) == 3
+    start, end = (np.array(point) for point in (scene.tables.loads.bolts[0].start, scene.tables.loads.bolts[0].end))
+    # The block of the drawing holds a bar of 13.5 m; it is put there turned by -14°.
+    assert end - start == pytest.approx(13.5 * np.array([np.cos(np.radians(14)), -np.sin(np.radians(14))]))
+    assert "hidden layers are left out: 'TITLE'" in scene.warnings[-1].message
 
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SCENES])
