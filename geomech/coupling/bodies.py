@@ -41,13 +41,16 @@ def elastic_bodies(
     for b, segments in zip(cracked.tolist(), segments_of):
         nodes_of[b] = np.unique(cracks.segments[segments])
         own, material, old = cracks.take(segments), problem.materials[blocks.material[b]], kept.get(b)
-        bodies[b] = None if old is None else old.found_again(blocks.loops(b), own, material)
-        if bodies[b] is not None:
-            old.work.bodies_kept += 1
-            continue
         if old is None:
             works.append(Work())
-        to_make.append((b, own, material, old, works[-1] if old is None else old.work))
+        work = works[-1] if old is None else old.work
+        if not problem.run.skip:
+            old = None
+        bodies[b] = None if old is None else old.found_again(blocks.loops(b), own, material)
+        if bodies[b] is not None:
+            work.bodies_kept += 1
+            continue
+        to_make.append((b, own, material, old, work))
 
     def made(of: tuple) -> Body:
         b, own, material, old, work = of
@@ -114,11 +117,17 @@ def beside_acting(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
 
 
 def solve_bodies(
-    bodies: dict, loads: dict[int, BoundaryLoad], warm: dict, history: dict, solved_from: dict | None = None
+    bodies: dict,
+    loads: dict[int, BoundaryLoad],
+    warm: dict,
+    history: dict,
+    solved_from: dict | None = None,
+    skip: bool = True,
 ) -> dict:
     """block → solution of its body, side by side; ``warm``: earlier solutions, whose face states are the first guess;
     ``history``: what crack faces with friction remember of the load step before. An earlier solution of the same geometry
-    under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same, too."""
+    under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same, too, and nothing is to be worked
+    out anew (``skip``)."""
     from .. import ddm
 
     solved_from = {} if solved_from is None else solved_from
@@ -126,7 +135,8 @@ def solve_bodies(
     def solved(b: int):
         body, known, load = bodies[b], warm.get(b), loads[b]
         asked = {name: getattr(load, name) for name in _ASKED}
-        if known is not None and _same_question(body, known, asked) and history.get(b) is solved_from.get(b):
+        same = skip and known is not None and _same_question(body, known, asked)
+        if same and history.get(b) is solved_from.get(b):
             body.work.solutions_kept += 1
             return known
         return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))

@@ -76,7 +76,7 @@ class CrackedBlocks:
     def solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
         """block → solution of its body under its load, with the memory of crack faces at the start of the step."""
         with self.timed("ddm solve"):
-            return solve_bodies(bodies, loads, warm, self.history, self.solved_from)
+            return solve_bodies(bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip)
 
     # -- changes of the blocks -----------------------------------------------------------------------------------------
 

@@ -71,6 +71,7 @@ class Summary:
             seconds.update({phase: round(value, 4) for phase, value in last.seconds.items()})
         if last is not None and last.work:
             summary["crack_solver"] = last.work
+            summary["skipped"] = skipped(last.work, last.seconds)
         first: dict[str, dict[str, Any]] = {}
         counts: dict[str, int] = {}
         for event in self._events:
@@ -111,6 +112,22 @@ class Summary:
         if event.detail:
             told["detail"] = event.detail
         return told
+
+
+def skipped(work: dict[str, int], seconds: dict[str, float]) -> dict[str, dict[str, float]]:
+    """What a run did not do since nothing had changed: how often, and about how long it would have taken, by the mean of those
+    that were done (s): elastic bodies of unchanged geometry, solutions under the very same load, compliances."""
+    each = {
+        "bodies": ("bodies", "ddm assembly"),
+        "solutions": ("solutions", "ddm solve"),
+    }
+    told: dict[str, dict[str, float]] = {}
+    for name, (done, phase) in each.items():
+        count = work[f"{name}_kept"]
+        mean = seconds.get(phase, 0.0) / work[done] if work[done] else 0.0
+        told[name] = {"count": count, "saved_s": round(count * mean, 4)}
+    told["compliances"] = {"count": work["compliances_kept"]}
+    return told
 
 
 def normalisation(problem: Problem) -> tuple[float, float] | None:

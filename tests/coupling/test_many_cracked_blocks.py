@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -98,6 +99,21 @@ def test_leaving_out_what_has_not_changed_changes_nothing(monkeypatch, friction)
     for a, b in zip(kept, done):
         # Round-off: loads that come again are scaled from unit loads, new ones are solved for.
         assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max()
+
+
+@pytest.mark.parametrize("friction", [False, True])
+def test_the_switch_of_a_scene_changes_nothing_but_the_work(friction):
+    """``run.skip = false``: every body and every answer anew, and the same results to round-off (loads that come again are
+    scaled from unit loads, new ones are solved for; factors grow with cracks, or are made whole)."""
+    given = plates(friction)
+    kept, work, events = results(given)
+    done, all_work, all_events = results(replace(given, run=replace(given.run, skip=False)))
+    assert work["bodies_kept"] > 0 and work["solutions_kept"] > 0
+    assert all_work["bodies_kept"] == all_work["solutions_kept"] == all_work["compliances_kept"] == 0
+    assert all_work["boundary_factorisations"] > 2 * work["boundary_factorisations"]
+    assert events == all_events and "split" in events
+    for a, b in zip(kept, done):
+        assert np.abs(a - b).max() <= 1e-8 * np.abs(b).max()
 
 
 def test_the_first_of_several_failures_is_told():

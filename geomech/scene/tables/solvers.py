@@ -173,3 +173,8 @@ class RunTable(Table):
         description='how contact forces load cracked blocks: "contacts", linear over each face; "springs", as point forces '
         'where they are; "kelvin-springs", as those of the infinite plane (for comparison: most of a force is then lost)',
     )
+    skip: bool = Field(
+        True,
+        description="what has not changed since the last pass is not worked out again (false: it is, for comparison; the results "
+        "are the same)",
+    )
