@@ -123,7 +123,7 @@ def _statistics(
     sizes = block_sizes(area[free], _PASSING)
     told = {
         "title": problem.title,
-        "summary": f"{problem.inventory}, {counted(len(bridges), 'rock bridge')}",
+        "summary": ", ".join([problem.inventory, *([counted(len(bridges), "rock bridge")] if len(bridges) else [])]),
         "box_m": [low.tolist(), high.tolist()],
         "world_origin_m": list(problem.origin),
         "area_m2": float(area.sum()),

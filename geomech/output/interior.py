@@ -26,11 +26,10 @@ _SHARP = math.radians(20)
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """The mesh of a block with ``cracks`` (``key``): ``points`` (n, 2) where its nodes are looked at, ``areas`` (n,) of
+    """The mesh of a block with its cracks: ``points`` (n, 2) where its nodes are looked at, ``areas`` (n,) of
     the rock about them. Below, nodes where stress is singular: ``centres`` (k, 2) of the triangles about them and the
     node of each, ``owner`` (k,)."""
 
-    key: bytes
     mesh: Any
     points: np.ndarray
     areas: np.ndarray
@@ -39,7 +38,8 @@ class _Kept:
 
 
 class InteriorMeshes:
-    """Meshes of the cracked blocks, kept while their geometry stands, and the fields of a cycle on them.
+    """Meshes of the cracked blocks, kept while their geometry stands (whatever number a block has by then: where one is
+    split, all after it get others), and the fields of a cycle on them.
 
     ``n_triangles`` is about how many triangles an uncracked block gets; crack tips are meshed ``tip_ratio`` times
     finer than the rest. Blocks without cracks, but of a material that has been seen to crack, are there as well (what a
@@ -48,7 +48,7 @@ class InteriorMeshes:
 
     def __init__(self, n_triangles: int = 2000, tip_ratio: float = 15.0) -> None:
         self.n_triangles, self.tip_ratio = n_triangles, tip_ratio
-        self._kept: dict[int, _Kept] = {}
+        self._kept: dict[bytes, _Kept] = {}
         self._cracked_materials: set[int] = set()
         self._triangles = Triangles()
 
@@ -58,9 +58,9 @@ class InteriorMeshes:
         self._cracked_materials |= {int(blocks.material[b]) for b in cycle.bodies}
         whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
         whole[[*cycle.bodies]] = False
-        parts = [self._block(cycle, b, body, motion) for b, body in sorted(cycle.bodies.items())]
+        before, self._kept = self._kept, {}
+        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.bodies.items())]
         parts += [self._whole_blocks(cycle, whole)] if whole.any() else []
-        self._kept = {b: kept for b, kept in self._kept.items() if b in cycle.bodies}
         first = np.cumsum([0, *(len(p["points"]) for p in parts)])
 
         def joined(name: str, tail: tuple[int, ...] = (), kind: type = float) -> np.ndarray:
@@ -86,8 +86,10 @@ class InteriorMeshes:
             cell_data={"block_id": owner_of_point[cells[:, 0]] if len(cells) else np.empty(0, int)},
         )
 
-    def _block(self, cycle: Cycle, b: int, body: Any, motion: Motion) -> dict[str, np.ndarray]:
-        kept = self._mesh(cycle, b)
+    def _block(
+        self, cycle: Cycle, b: int, body: Any, motion: Motion, before: dict[bytes, _Kept]
+    ) -> dict[str, np.ndarray]:
+        kept = self._mesh(cycle, b, before)
         gradient = motion.gradient[b]
         turn = float(rotation(gradient))
         n = len(kept.points)
@@ -123,17 +125,18 @@ class InteriorMeshes:
             "stress": state.stress[blocks.vertex_block[corners]],
         }
 
-    def _mesh(self, cycle: Cycle, b: int) -> _Kept:
+    def _mesh(self, cycle: Cycle, b: int, before: dict[bytes, _Kept]) -> _Kept:
         loops, cracks = cycle.blocks.loops(b), cycle.cracks.in_block(b)
         key = b"|".join([*(loop.tobytes() for loop in loops), cracks.nodes.tobytes(), cracks.segments.tobytes()])
-        kept = self._kept.get(b)
-        if kept is None or kept.key != key:
+        kept = before.get(key)
+        if kept is None:
             from geomech.shapes.meshing import mesh_interior
 
             size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self.n_triangles))
             mesh = mesh_interior(loops, cracks, size, size / self.tip_ratio)
             look_from = mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side
-            kept = self._kept[b] = _Kept(key, mesh, look_from, _node_areas(mesh), *_about_singular(mesh, cracks))
+            kept = _Kept(mesh, look_from, _node_areas(mesh), *_about_singular(mesh, cracks))
+        self._kept[key] = kept
         return kept
 
 

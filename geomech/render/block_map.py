@@ -144,8 +144,8 @@ def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size
     ]
     for name, mark in zip(named, ("#6a994e", "#bc6c25", "#9d4edd", "#118ab2", "#ad2831", "#3d405b")):
         for edge in edges[blocks.edges_named(name)]:
-            axes.plot(*edge.T, color=mark, lw=7, alpha=0.35, solid_capstyle="butt", zorder=0.5)
-        keys.append(Line2D([], [], color=mark, lw=7, alpha=0.35, label=f'edges "{name}"'))
+            axes.plot(*edge.T, color=mark, lw=7, alpha=0.55, solid_capstyle="butt", zorder=0.5)
+        keys.append(Line2D([], [], color=mark, lw=7, alpha=0.55, label=f'edges "{name}"'))
     # A grouted bar works at the joints alone, and is as long as it is.
     bolts = scene.tables.loads.bolts
     for bolt in bolts:

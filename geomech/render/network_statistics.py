@@ -51,7 +51,7 @@ def _block_sizes(axes: Any, told: dict[str, Any]) -> None:
     curve = np.array(blocks["percent_passing_by_size_m"])
     _dressed(axes, "Block sizes", "block size √area, m", "% of the rock in blocks not larger")
     axes.step(np.append(curve[0, 0], curve[:, 0]), np.append(0, curve[:, 1]), where="post", color=INK, lw=1.8)
-    if curve[-1, 0] > 3 * curve[0, 0]:
+    if curve[-1, 0] > 30 * curve[0, 0]:
         from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
         axes.set_xscale("log")
@@ -110,7 +110,7 @@ def _lengths(axes: Any, told: dict[str, Any], lines: dict[str, list[np.ndarray]]
             axes.axvline(wanted, color=colour[name], lw=1.0, ls=(0, (4, 3)), label=f"mean asked, {wanted:.3g} m")
     axes.set_ylim(0, 102)
     axes.set_xlim(left=0)
-    axes.legend(frameon=False, fontsize=8, labelcolor=INK, loc="lower right")
+    axes.legend(frameon=False, fontsize=8, labelcolor=INK, loc="best")
 
 
 def _triangle(axes: Any, told: dict[str, Any]) -> None:
