@@ -15,6 +15,7 @@ from .joint_statistics import given, joint_statistics, table
 from .summary import write_json
 from .triangulate import Triangles
 from .vtu import LINE, TRIANGLE, Grid, GridFiles, world_origin
+from .world_map import write_world_map
 
 #: Parts of the rock, by area, that the block-size curve is given at.
 _PASSING = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
@@ -22,7 +23,7 @@ _PASSING = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 
 def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
     """Write ``block_system.vtu``, ``joint_lines.vtu``, ``block_system.msh`` and ``block_system.json`` of a loaded scene into
-    ``folder``; what the JSON holds."""
+    ``folder``, and where it has traces of the field or an origin ``block_system.geojson`` in world coordinates; what the JSON holds."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     problem = scene.problem()
@@ -68,6 +69,8 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
         origin,
     )
     _write_msh(folder / "block_system.msh", blocks, cracks, cells, owner, names, zone)
+    if scene.tables.geometry.traces or any(problem.origin):
+        write_world_map(problem, zones, folder / "block_system.geojson")
     told = _statistics(scene, problem, area, bridges, names, zone)
     write_json(folder / "block_system.json", told)
     return told

@@ -94,34 +94,37 @@ def _read_csv(path: Path) -> FieldFile:
                 f"{path.name}:{line}: {len(cells)} values under {len(names)} columns",
                 f"each row has {', '.join(names)}",
             )
-        for k, at in enumerate(column):
-            values[row, k] = _number(cells[at], mark, f"{path.name}:{line}: {wanted[k]}")
+        try:
+            values[row] = [float(cells[at]) for at in column]
+        except ValueError:
+            for k, at in enumerate(column):
+                values[row, k] = _number(cells[at], mark, f"{path.name}:{line}: {wanted[k]}")
         sets.append((cells[set_at] if set_at is not None else "") or path.stem)
         ids.append(cells[id_at] if id_at is not None else "")
     numbers = [line for line, _ in rows[1:]]
+    wrong = np.argwhere(~np.isfinite(values))
+    if len(wrong):
+        row, k = wrong[0]
+        raise FieldFileError(f"{path.name}:{numbers[row]}: {wanted[k]} is {values[row, k]}", "give a finite number")
     return FieldFile(tuple((_ended if wanted is _ENDS else _strung)(path, numbers, sets, ids, values)))
 
 
 def _number(text: str, mark: str, what: str) -> float:
     try:
-        value = float(text.replace(",", ".") if mark != "," and text.count(",") == 1 else text)
+        return float(text.replace(",", ".") if mark != "," and text.count(",") == 1 else text)
     except ValueError:
         raise FieldFileError(f"{what} is {text!r}, no number", "write metres, with a decimal point") from None
-    if not np.isfinite(value):
-        raise FieldFileError(f"{what} is {text!r}", "give a finite number")
-    return value
 
 
 def _ended(
     path: Path, numbers: Sequence[int], sets: Sequence[str], ids: Sequence[str], values: np.ndarray
 ) -> list[FieldLine]:
     """A trace a row; one whose ends are the same is a point."""
-    lines = []
-    for number, layer, label, value in zip(numbers, sets, ids, values):
-        points = value.reshape(2, 2)
-        points = points[:1] if (points[0] == points[1]).all() else points
-        lines.append(FieldLine(layer, points, f"{path.name}:{number}", label=label))
-    return lines
+    same = (values[:, :2] == values[:, 2:]).all(axis=1).tolist()
+    return [
+        FieldLine(layer, points[:1] if one else points, f"{path.name}:{number}", label=label)
+        for number, layer, label, points, one in zip(numbers, sets, ids, values.reshape(-1, 2, 2), same)
+    ]
 
 
 def _strung(

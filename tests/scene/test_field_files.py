@@ -146,6 +146,19 @@ def test_a_resolved_scene_gives_the_same_again(tmp_path):
     assert load_scene(again).origin == scene.origin
 
 
+def test_what_is_built_goes_back_to_the_world(tmp_path):
+    scene = load_scene(scene_of(tmp_path, "csv", EAST, NORTH, f"origin = [{EAST}, {NORTH}]"))
+    write_block_system(scene, tmp_path)
+    path = tmp_path / "again.toml"
+    text = f'[geometry]\norigin = [{EAST}, {NORTH}]\n[[geometry.traces]]\nfile = "block_system.geojson"\n'
+    path.write_text(text + REST, encoding="utf-8")
+    again = load_scene(path)
+    assert again.drawing.zones == scene.drawing.zones and again.cracks.names == scene.cracks.names
+    assert again.blocks.areas() == pytest.approx(scene.blocks.areas(), rel=1e-8)
+    nodes = [np.array(sorted(found.cracks.nodes.tolist())) for found in (again, scene)]
+    assert np.abs(nodes[0] - nodes[1]).max() < 1e-8
+
+
 def test_places_are_all_moved():
     """Every pair of metres among the keys is a place, but for those that are no positions."""
     vectors = {

@@ -80,7 +80,7 @@ def test_units_scale_and_metres_are_left_as_they_are(tmp_path):
         ("# nothing\n", "a.csv", "holds no rows"),
         (ENDS + "J1,1,2,3\n", "a.csv", r"a\.csv:5: 4 values under 5 columns"),
         (ENDS + "J1,1,2,3,four\n", "a.csv", r"a\.csv:5: y2 is 'four', no number"),
-        (ENDS + "J1,1,2,3,inf\n", "a.csv", r"a\.csv:5: y2 is 'inf'"),
+        (ENDS + "J1,1,2,3,inf\n", "a.csv", r"a\.csv:5: y2 is inf"),
         ("x1,y1,x2,y2,x1\n", "a.csv", r"a\.csv:1: there are two columns 'x1'"),
         (VERTICES + "a,J2,9,9\n", "a.csv", r"a\.csv:8: trace 'a' is in set 'J2' and, at line 2, in set 'J1'"),
         (b"\xff\xfe\x00", "a.csv", "not UTF-8"),
