@@ -102,7 +102,10 @@ class DdmTable(Table):
     grading_ratio: Annotated[float, Field(gt=0, lt=1)] = Field(
         0.3, description="ratio of neighbouring elements at kinks, junctions and mouths"
     )
-    grading_layers: Annotated[int, Field(ge=0)] = Field(2, description="layers of that grading")
+    grading_layers: Annotated[int, Field(ge=0)] = Field(
+        2,
+        description="layers of that grading; kinks get more, by their angle: with 2 they leave 5e-4 in K, with every one more half",
+    )
     solver: Literal["auto", "dense", "compressed"] = Field(
         "auto", description="how the equations of cracks and sides are solved: factored, or iterated when they are many"
     )
