@@ -29,6 +29,9 @@ _REMEMBERED = (
     "_triangles", "_lines", "_meshes", "_keys", "_time", "_pending", "_last_interior", "_segments_then", "seconds",
 )  # fmt: skip
 
+#: Grids with more bytes of fields than these take longer to pack (some 20 ms a MB) than to hand over to another thread.
+LARGE = 1 << 19
+
 
 class Series:
     """Observer that writes ``blocks``, ``cracks``, ``tips``, ``contacts`` and ``interior``.
@@ -85,7 +88,7 @@ class Series:
             (folder / f"{name}.pvd").unlink(missing_ok=True)
         self._collections = {name: Collection(folder / f"{name}.pvd", listed.get(name, ())) for name in names}
         self._files = {name: GridFiles(name) for name in names}
-        self._beside = Beside()
+        self._beside, self._large = Beside(), set[str]()
 
     def _unlisted(self) -> set[str]:
         """The files of series in ``vtk`` that no collection lists."""
@@ -155,9 +158,18 @@ class Series:
 
     def _interior(self, cycle: Cycle, at: float) -> None:
         grid = self._meshes.grid(cycle, self._materials, cycle.motion, self.configuration)
-        self._save("interior", cycle, at, grid)
+        self._put("interior", cycle, at, grid)
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
+        """Small grids at once; large ones beside the run, which need not wait until they are packed. A series that has been
+        large stays beside, so that its files are listed in their order."""
+        if name in self._large or _size(grid) > LARGE:
+            self._large.add(name)
+            self._beside.do(self._put, name, cycle, at, grid)
+        else:
+            self._put(name, cycle, at, grid)
+
+    def _put(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
         file = f"{name}_{cycle.number:06d}.vtu"
         numbers = {
             "CYCLE": cycle.number,
@@ -169,6 +181,11 @@ class Series:
         self._files[name].write(f"{self._vtk}/{file}", grid, numbers)
         self._old.discard(file)
         self._collections[name].add(at, f"vtk/{file}")
+
+
+def _size(grid: Grid) -> int:
+    """Bytes of its fields."""
+    return sum(array.nbytes for fields in (grid.point_data, grid.cell_data) for array in fields.values())
 
 
 class SeriesTime:

@@ -431,3 +431,15 @@ def written_alone(folder: Path, cycle, **options) -> None:
     series.on_start(made.problem(), folder)
     series.on_cycle(cycle)
     series.on_end({})
+
+
+@pytest.mark.parametrize("large", [0, 3000])
+def test_large_grids_are_written_beside_the_run_to_the_same_bytes(tmp_path, monkeypatch, large):
+    made.write(tmp_path / "at_once", [Series(interior_every=0)], steps=12, passes=2)
+    # Below 3000 some series become large on the way, as their cracks grow.
+    monkeypatch.setattr("geomech.output.series.LARGE", large)
+    made.write(tmp_path / "beside", [Series(interior_every=0)], steps=12, passes=2)
+    files = sorted(p.relative_to(tmp_path / "at_once") for p in (tmp_path / "at_once").rglob("*.[pv][vt][du]"))
+    assert len(files) > 40
+    for file in files:
+        assert (tmp_path / "beside" / file).read_bytes() == (tmp_path / "at_once" / file).read_bytes(), file
