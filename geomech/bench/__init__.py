@@ -23,6 +23,7 @@ TOPICS = {
     "schemes": "geomech.bench.block_schemes",
     "stability": "geomech.bench.stability",
     "startup": "geomech.bench.startup",
+    "steps": "geomech.bench.load_steps",
 }
 
 

@@ -1,0 +1,75 @@
+"""Fixed load steps against steps from event to event: the two-crack specimen to coalescence, its loads and their cost.
+
+Fixed steps find an event at the end of the step in which it comes about, so that loads are right to a step; steps to events
+find the load itself, whatever the longest step.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+from .figures import Measured
+
+#: Where the numbers go, below the working folder.
+FOLDER = Path("outputs/bench_steps")
+SCENE = Path("pipelines/two_cracks/scene.toml")
+VARIANT = "phi_0"
+#: Fixed steps, s (0.2 MPa each); longest steps from event to event, s (None: as long as blocks may move in one).
+FIXED, LONGEST = (16.0, 8.0, 4.0, 2.0, 1.0), (None, 20.0, 5.0)
+
+
+def of_run(overrides: list[str], repeats: int) -> dict:
+    """Loads of the events (Pa), number of cycles and of solutions of cracked blocks, shortest time of ``repeats`` (s)."""
+    from ..pipeline import cycles
+    from ..scene import load_scene
+
+    scene = load_scene(SCENE, overrides, variant=VARIANT)
+    seconds, seen = [], []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        seen = list(cycles(scene))
+        seconds.append(time.perf_counter() - began)
+    first: dict[str, float] = {}
+    for cycle in seen:
+        for event in cycle.events:
+            first.setdefault(event.kind, event.load)
+    return {"cycles": len(seen), "solutions": seen[-1].work["solutions"], "seconds": min(seconds), "loads": first}
+
+
+def measure(quick: bool = False) -> Measured:
+    """The table; leaves ``steps.json`` in `FOLDER`. ``quick``: two fixed steps, once each."""
+    if not SCENE.exists():
+        return Measured.of(f"Load steps: {SCENE} is not below this folder")
+    repeats = 1 if quick else 3
+    events = 'run.stepping="events"'
+    of_run([events], 1)  # what is compiled, or loaded, is not counted
+    rows = {
+        "events" if longest is None else f"events, at most {longest:g} s": of_run(
+            [events] + ([] if longest is None else [f"run.longest_step_s={longest}"]), repeats
+        )
+        for longest in (LONGEST[:1] if quick else LONGEST)
+    }
+    rows |= {
+        f"fixed, {dt:g} s": of_run(['run.stepping="fixed"', f"dda.time_step_s={dt}"], repeats)
+        for dt in (FIXED[:2] if quick else FIXED)
+    }
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    (FOLDER / "steps.json").write_text(json.dumps({"rows": rows, "quick": quick}, indent=1), encoding="utf-8")
+    exact = rows["events"]["loads"]
+    lines = [
+        f"Load steps, two-crack specimen {VARIANT} to coalescence, warm; a second is 0.2 MPa",
+        f"{'steps':<22}{'cycles':>8}{'solutions':>11}{'s':>8}"
+        + "".join(f"{kind + ' MPa':>18}{'off':>10}" for kind in ("initiation", "coalescence")),
+    ]
+    errors = {}
+    for name, row in rows.items():
+        text = f"{name:<22}{row['cycles']:8d}{row['solutions']:11d}{row['seconds']:8.2f}"
+        for kind in ("initiation", "coalescence"):
+            off = row["loads"][kind] / exact[kind] - 1
+            text += f"{row['loads'][kind] / 1e6:18.4f}" + (f"{off:10.1e}" if name != "events" else " " * 10)
+            if name.startswith("fixed"):
+                errors[f"{kind}, {name}"] = abs(off)
+        lines.append(text.rstrip())
+    return Measured.of("\n".join(lines), errors=errors, times={name: row["seconds"] for name, row in rows.items()})
