@@ -15,19 +15,40 @@ LISTED = 200
 
 def page_of_benchmark(folder: Path) -> Page:
     """The page of the JSON files and pictures in ``folder``. Raises ValueError naming a file that is no JSON."""
-    page = Page(f"Benchmark {folder.name.removeprefix('bench_')}", f"from {folder}")
-    pictures = sorted(p for kind in ("*.png", "*.svg") for p in folder.glob(kind))
-    if pictures:
+    page = Page("Benchmark " + folder.name.removeprefix("bench").lstrip("_"), f"from {folder}")
+    if _pictures(folder):
         page.section("Plots")
-        page.figures([(path, path.stem.replace("_", " ")) for path in pictures], least_rem=30)
+        page.figures(_pictures(folder), whole=True)
     for path in sorted(folder.glob("*.json")):
         try:
             found = json.loads(path.read_text(encoding="utf-8"))
         except ValueError as error:
             raise ValueError(f"{path} is no JSON: {error}") from None
-        page.section(path.stem.replace("_", " "))
-        _add(page, found, "")
+        if isinstance(found, Mapping) and isinstance(found.get("topics"), Mapping):
+            _add_topics(page, found, folder)
+        else:
+            page.section(path.stem.replace("_", " "))
+            _add(page, found, "")
     return page
+
+
+def _pictures(folder: Path) -> list[tuple[Path, str]]:
+    found = sorted(path for kind in ("*.png", "*.svg") for path in folder.glob(kind))
+    return [(path, path.stem.replace("_", " ")) for path in found]
+
+
+def _add_topics(page: Page, found: Mapping[str, Any], folder: Path) -> None:
+    """The figures of `geomech bench`, topic by topic with the pictures that each has left beside, then the machine."""
+    for topic, figures in found["topics"].items():
+        page.section(topic)
+        page.figures(_pictures(folder.parent / f"bench_{topic}"), whole=True)
+        for kind, values in figures.items():
+            if isinstance(values, Mapping) and values:
+                page.table(["", kind], list(values.items()))
+    page.section("Machine")
+    for name, value in found.items():
+        if name != "topics":
+            _add(page, {name: value} if _plain(value) else value, "")
 
 
 def _add(page: Page, value: Any, name: str) -> None:

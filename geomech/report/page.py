@@ -84,7 +84,7 @@ td.bar span { display: block; height: .7rem; border-radius: .15rem; background: 
   figure, tr, .facts div { break-inside: avoid; }
   .wide { overflow: visible; }
   table { font-size: 8.5pt; }
-  .figures { grid-template-columns: repeat(2, 1fr); }
+  .figures { grid-template-columns: repeat(auto-fit, minmax(calc(.7 * var(--least, 17rem)), 1fr)); }
   pre { white-space: pre-wrap; }
 }"""
 

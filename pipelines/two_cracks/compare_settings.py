@@ -26,6 +26,8 @@ LADDERS = {
     "step": "time step, s (0: to the events themselves)",
 }
 
+#: Lengths, m, of what has grown at which ladders' loads are compared: before any two wings meet.
+LENGTHS = (8e-3, 16e-3)
 #: Why the ways of handing forces on differ.
 SPRINGS = """\
 The platens touch the specimen by springs at its corners. Spread over the face, their forces are the uniform stress of the
@@ -160,7 +162,7 @@ def apart(run: Watch, other: Watch) -> float:
 
 
 def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
-    """One setting varied: loads, and what they differ by from the finest rung of the same φ."""
+    """One setting varied: loads, what they differ by from the finest rung of the same φ, and how far paths lie apart."""
     rungs: dict[int, dict[float, Watch]] = {}
     for name, run in members.items():
         rungs.setdefault(run.phi, {})[float(name.split("_")[1].replace("p", "."))] = run
@@ -172,21 +174,18 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
         for value in values:
             run = of_value[value]
             row: list = [phi, value]
-            for kind in _KINDS:
-                load, best = run.load(kind), finest.load(kind)
+            pairs = [(one.load("initiation"), *map(one.load_at, LENGTHS)) for one in (run, finest)]
+            for load, best in zip(*pairs):
+                off = 100 * (load / best - 1)
                 row += [f"{load / MPA:.2f}" if np.isfinite(load) else None]
-                row += [f"{100 * (load / best - 1):+.2f}" if run is not finest and np.isfinite(load / best) else None]
-            angle = coalescence_angle_deg(run.last.cracks)
-            row += [None if np.isnan(angle) else f"{angle:.2f}", f"{run.seconds:.1f}"]
-            rows.append(row)
-    headers = [
-        "φ",
-        told,
-        "initiation, MPa",
-        "off the finest, %",
-        "coalescence, MPa",
-        "off the finest, %",
-        "line, °",
-        "computed in, s",
-    ]
-    return Part(f"Convergence: {told.split(',')[0]}", headers, rows)
+                row += [f"{off:+.2f}" if run is not finest and np.isfinite(off) else None]
+            away = apart(run, finest) if run is not finest else np.nan
+            row += [f"{1e3 * away:.3f}" if np.isfinite(away) else None]
+            joined = run.load("coalescence")
+            rows.append([*row, f"{joined / MPA:.2f}" if np.isfinite(joined) else None, f"{run.seconds:.1f}"])
+    headers = ["φ", told, "initiation, MPa", "off, %"]
+    for length in LENGTHS:
+        headers += [f"{1e3 * length:.0f} mm grown, MPa", "off, %"]
+    headers += ["paths apart, mm", "joined, MPa", "computed in, s"]
+    note = "Off: from the finest of the same φ. Loads under which so much has grown, over all tips, up to 200 MPa."
+    return Part(f"Convergence: {told.split(',')[0].split(' (')[0]}", headers, rows, [note])
