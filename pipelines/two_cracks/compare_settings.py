@@ -26,8 +26,8 @@ LADDERS = {
     "step": "time step, s (0: to the events themselves)",
 }
 
-#: Lengths, m, of what has grown at which ladders' loads are compared: before any two wings meet.
-LENGTHS = (8e-3, 16e-3)
+#: Lengths, m, of a wing at which ladders' loads are compared: before any two wings meet.
+LENGTHS = (2e-3, 3e-3, 4e-3)
 #: Why the ways of handing forces on differ.
 SPRINGS = """\
 The platens touch the specimen by springs at its corners. Spread over the face, their forces are the uniform stress of the
@@ -117,7 +117,7 @@ def whole_runs(runs: Mapping[str, Watch]) -> list[Part]:
     headers = ["run", "φ to crack 1", "initiation, MPa", "coalescence, MPa", "line, °", "largest way apart, mm", "end"]
     found = []
     if any(of_family(runs, which) for which in FAMILIES):
-        note = "Largest way apart: of any grown point from the path of this study's run with the same φ; both to where the shorter ends."
+        note = "Largest way apart: of any grown point from the path of this study's run with the same φ; what lies beyond a tip is left out."
         found.append(Part("Whole runs by other readings, faces and settings", headers, rows, after=[note]))
     for which, told in LADDERS.items():
         members = of_family(runs, which)
@@ -143,22 +143,25 @@ _KINDS = ("initiation", "coalescence")
 
 
 def apart(run: Watch, other: Watch) -> float:
-    """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of nodes that these reach in height."""
+    """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of those that lie beside them: what is
+    beyond a tip is longer, not elsewhere. nan where there are none."""
     cracks, against = run.last.cracks, other.last.cracks
     nodes = cracks.nodes[np.unique(cracks.segments[cracks.birth_cycle > 0])]
-    start, end = against.nodes[against.segments].transpose(1, 0, 2)
     if not len(nodes):
         return np.nan
-    nodes = nodes[
-        (nodes[:, 1] <= max(start[:, 1].max(), end[:, 1].max()))
-        & (nodes[:, 1] >= min(start[:, 1].min(), end[:, 1].min()))
-    ]
-    if not len(nodes):
-        return np.nan
-    along = end - start
-    part = np.einsum("nsi,si->ns", nodes[:, None] - start, along) / np.einsum("si,si->s", along, along)
-    foot = start + np.clip(part, 0.0, 1.0)[..., None] * along
-    return float(np.hypot(*(nodes[:, None] - foot).transpose(2, 0, 1)).min(axis=1).max())
+    ends = against.nodes[against.segments]
+    along = ends[:, 1] - ends[:, 0]
+    part = np.clip(
+        np.einsum("nsi,si->ns", nodes[:, None] - ends[:, 0], along) / np.einsum("si,si->s", along, along), 0.0, 1.0
+    )
+    away = np.hypot(*(nodes[:, None] - ends[:, 0] - part[..., None] * along).transpose(2, 0, 1))
+    nearest = away.argmin(axis=1)
+    rows = np.arange(len(nodes))
+    is_tip = np.bincount(against.segments.ravel(), minlength=len(against.nodes)) == 1
+    foot = part[rows, nearest]
+    beyond = ((foot == 0) & is_tip[against.segments[nearest, 0]]) | ((foot == 1) & is_tip[against.segments[nearest, 1]])
+    away = away[rows, nearest]
+    return float(away[~beyond].max()) if not beyond.all() else np.nan
 
 
 def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
@@ -166,7 +169,7 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
     rungs: dict[int, dict[float, Watch]] = {}
     for name, run in members.items():
         rungs.setdefault(run.phi, {})[float(name.split("_")[1].replace("p", "."))] = run
-    rows = []
+    rows: list[list] = []
     for phi, of_value in rungs.items():
         # From coarse to fine.
         values = sorted(of_value, reverse=which != "order")
@@ -178,14 +181,17 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
             for load, best in zip(*pairs):
                 off = 100 * (load / best - 1)
                 row += [f"{load / MPA:.2f}" if np.isfinite(load) else None]
-                row += [f"{off:+.2f}" if run is not finest and np.isfinite(off) else None]
+                row += [f"{off:+.2f}".replace("-0.00", "0.00") if run is not finest and np.isfinite(off) else None]
             away = apart(run, finest) if run is not finest else np.nan
             row += [f"{1e3 * away:.3f}" if np.isfinite(away) else None]
             joined = run.load("coalescence")
             rows.append([*row, f"{joined / MPA:.2f}" if np.isfinite(joined) else None, f"{run.seconds:.1f}"])
     headers = ["φ", told, "initiation, MPa", "off, %"]
     for length in LENGTHS:
-        headers += [f"{1e3 * length:.0f} mm grown, MPa", "off, %"]
+        headers += [f"{1e3 * length:.0f} mm long, MPa", "off, %"]
     headers += ["paths apart, mm", "joined, MPa", "computed in, s"]
-    note = "Off: from the finest of the same φ. Loads under which so much has grown, over all tips, up to 200 MPa."
+    note = (
+        "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is so long; runs"
+        " to 200 MPa. Paths apart: largest distance of a grown point from the finest one's cracks."
+    )
     return Part(f"Convergence: {told.split(',')[0].split(' (')[0]}", headers, rows, [note])

@@ -29,7 +29,11 @@ class Watch:
     end: str = ""
     strains: dict[str, float] = field(default_factory=dict)  # of the first event of every kind
     seconds: float = np.nan
-    growth: list[tuple[float, float]] = field(default_factory=list)  # load (Pa), length of what has grown (m)
+    growth: list[tuple[float, float]] = field(
+        default_factory=list
+    )  # of the upper wing, before it grew: load, Pa, length, m
+
+    _grown: float = 0.0
 
     def on_start(self, problem: Problem, folder) -> None:
         cracks = problem.cracks
@@ -42,9 +46,10 @@ class Watch:
             self.first_growth = cycle
         self.last = cycle
         self.events += cycle.events
-        grown = float(cycle.cracks.lengths[cycle.cracks.birth_cycle > 0].sum())
-        if not self.growth or grown > self.growth[-1][1]:
-            self.growth.append((cycle.load, grown))
+        upper = cycle.tips[(cycle.tips["crack"] == 0) & (cycle.tips["end"] == 1)]
+        if len(upper) and upper["grown"][0] > 0:
+            self.growth.append((cycle.load, self._grown))
+            self._grown += float(upper["grown"][0])
         for event in cycle.events:
             self.strains.setdefault(event.kind, float(cycle.strain))
 
@@ -56,8 +61,12 @@ class Watch:
         return next((event.load for event in self.events if event.kind == kind), np.nan)
 
     def load_at(self, length: float) -> float:
-        """Load, Pa, under which what has grown first was ``length`` m long; nan when it never was."""
-        return next((load for load, grown in self.growth if grown >= length), np.nan)
+        """Load, Pa, that it takes for the wing from crack 1's upper end to grow on from ``length`` m, the largest so far,
+        between increments linearly; nan beyond the last of them."""
+        if not self.growth:
+            return np.nan
+        load, grown = np.array(self.growth).T
+        return float(np.interp(length, grown, np.maximum.accumulate(load), right=np.nan))
 
 
 def coalescence_angle_deg(cracks: Cracks) -> float:
@@ -160,7 +169,8 @@ def _toughness(runs: dict[int, Watch]) -> Part:
         fit = low * MPA / base
         rows.append([who, f"{published.K_IC * fit / MPA:.3f}"])
         rows[-1] += [f"{run.load('initiation') * fit / MPA:.2f}" for run in runs.values()] + [f"{low}-{high}"]
-        rows[-1] += [f"{run.load('coalescence') * fit / MPA:.1f}" for run in runs.values()]
+        joined = [run.load("coalescence") * fit / MPA for run in runs.values()]
+        rows[-1] += [f"{load:.1f}" if np.isfinite(load) else None for load in joined]
         rows[-1].append("{}-{}".format(*published.COALESCENCE_STRESS_MPA[who]))
     headers = ["fitted to", "K_Ic, MPa√m", *(f"init. {phi}°" for phi in runs), "published"]
     return Part(

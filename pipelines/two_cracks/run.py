@@ -12,7 +12,7 @@ from geomech.pipeline import run
 from geomech.scene import load_scene
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_settings import family
+from compare_settings import family, own
 from compare_two_cracks import Watch, report
 from page_two_cracks import write_page
 
@@ -32,7 +32,7 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
             del watched[name]
             failed = 1
             logging.getLogger(__name__).exception("%s failed; the others go on", name)
-    (Path(out) / "comparison.txt").write_text(text := report(watched) + "\n", encoding="utf-8")
+    (Path(out) / "comparison.txt").write_text(text := report(own(watched) or watched) + "\n", encoding="utf-8")
     page = write_page(watched, folder, Path(out), overrides)
     if not quiet:
         print(f"\n{text}\n{page}")
