@@ -204,7 +204,7 @@ def _whole(c: Check) -> None:
     """What drawn cracks enclose is a block of its own, and must be drawn as one."""
     for crack, block in cutting_cracks(c.drawing.blocks, c.drawing.cracks):
         c.refuse(
-            ("geometry", "cracks", crack) if c.tables.geometry.model is None else ("geometry", "model"),
+            c.drawing.path_of_crack(c.drawing.cracks.names[crack]),
             f"crack {c.drawing.cracks.names[crack]!r} cuts a piece off zone {c.drawing.zones[block]!r}, alone or with "
             "the cracks before it",
             "draw the pieces as zones of their own: blocks part along their outlines",

@@ -31,7 +31,7 @@ class Drawing:
     model, as used, ``choices`` the names of their values where they have such, ``model`` its file, ``joints`` what edges along
     joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock. ``blocks`` is None
     where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing, ``mark_places`` (path in the scene,
-    where in the file) of each by name; ``origin`` m, world coordinates of what is (0, 0) in all these."""
+    where in the file) of each by name, ``crack_paths`` the paths of the drawn cracks; ``origin`` m, world coordinates of what is (0, 0) in all these."""
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
@@ -45,6 +45,12 @@ class Drawing:
     marks: tuple[Mark, ...] = ()
     mark_places: dict[str, tuple[Path, str]] = field(default_factory=dict)
     origin: tuple[float, float] = (0.0, 0.0)
+    crack_paths: dict[str, Path] = field(default_factory=dict)
+
+    def path_of_crack(self, name: str) -> Path:
+        """Where in the scene the crack ``name`` is drawn, or what made it."""
+        whole = ("geometry",) if self.model is None else ("geometry", "model")
+        return self.crack_paths.get(name) or self.crack_paths.get(name.rpartition(" ")[0], whole)
 
     def choices_with_edge(self, name: str) -> str:
         """The choices of one parameter with which the model has edges called ``name``, as a scene says them; empty
@@ -233,6 +239,10 @@ def _assembled(
         marks=tuple(parts.marks),
         mark_places={name: source for (part, name), source in parts.sources.items() if part == "marks"},
         origin=tuple(origin.tolist()),
+        crack_paths={
+            trace.name: parts.sources.get(("cracks", k), (("geometry", "cracks", k), ""))[0]
+            for k, trace in enumerate(parts.traces)
+        },
     )
     drawn = drawing.cracks_drawn
     try:

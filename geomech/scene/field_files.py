@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path as FilePath
 
-from ..shapes.field_lines import FieldDrawing, FieldFileError, Named, drawing_of_lines, named_lines
+from ..shapes.field_lines import UNFINISHED, FieldDrawing, FieldFileError, Named, drawing_of_lines, named_lines
 from ..shapes.traces import read_field_file
 from .errors import Fault
 from .locator import Path
@@ -41,6 +41,15 @@ def read_traces(
         warnings += [Fault(place(source), message, way_out) for message, way_out in file.warnings]
         named, idle, left = named_lines(file, entry.layers, entry.name, entry.kind)
         present = list(dict.fromkeys(line.layer for line in file.lines))
+        for pattern, said in entry.layers.items():
+            if said.strip().lower() in UNFINISHED:
+                faults.append(
+                    Fault(
+                        place(("geometry", "traces", k, "layers", pattern)),
+                        f"{said!r} wants a name after it",
+                        f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to leave it to the name of the layer',
+                    )
+                )
         for pattern in idle:
             faults.append(
                 Fault(

@@ -66,7 +66,7 @@ def _near_misses(c: Check) -> None:
         if gap < NEAR_MISS * length[crack]:
             x, y = cracks.nodes[tip]
             c.warn(
-                ("geometry", "cracks", crack) if c.drawing.model is None else ("geometry", "model"),
+                c.drawing.path_of_crack(cracks.names[crack]),
                 f"crack {cracks.names[crack]!r} ends at ({x:g}, {y:g}), {gap:.2g} m from the outline of "
                 f"{blocks.names[block]!r}, without touching it",
                 "end it on the outline if it reaches the surface; the bridge left is very thin",

@@ -23,6 +23,8 @@ _ROLE = re.compile(
     r"(?P<role>joint|crack|zone|hole|edge|load|fixed|guided|bolt|water|monitor|probe)(?:[:_\- ]+(?P<own>.+))?",
     re.IGNORECASE,
 )
+#: Words that want a name after them where they stand for a layer.
+UNFINISHED = ("joint", "crack", "edge", "load", "guided")
 #: Roles that say all without a name after them. A set may be called "joint" or "crack" itself.
 _ALONE = ("zone", "hole", "fixed", "water", "bolt", "monitor", "probe")
 #: A plain layer of outlines.
@@ -40,7 +42,7 @@ class FieldFileError(ValueError):
 @dataclass(frozen=True, eq=False)
 class FieldLine:
     """One line of a file: ``points`` (n, 2), one alone for a point; ``layer`` the layer or set it is in, ``label`` a name of
-    its own or ""; ``place`` says where it stands in the file. ``shape`` is "line", "closed" (its first point not repeated),
+    its own (of a monitor) or ""; ``place`` says where it stands in the file. ``shape`` is "line", "closed" (its first point not repeated),
     "area" (a closed line that is meant as an area) or "hole" (of the area before it)."""
 
     layer: str
@@ -175,7 +177,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
                 places["edges", len(edges)] = line.place
                 edges.append(EdgeLine(name, tuple(a.tolist()), tuple(b.tolist())))
         else:
-            full = f"{name}:{line.label}" if line.label and ":" not in name else name
+            full = f"{name}:{line.label}" if line.label and name == "monitor" else name
             if is_point != name.startswith(("monitor", "load:")):
                 warnings.append((f"{line.place}: {full!r} is no point, and is left out", "a monitor is a point"))
                 continue

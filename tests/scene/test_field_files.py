@@ -196,6 +196,7 @@ def test_nested_places_and_levels_are_moved(tmp_path):
     [
         ("", 'layers = { "zone*" = "" , "K9" = "" }', "has no layer 'K9'", "there is"),
         ("", 'layers = { "J1" = "" }', "no rock: none of the layers is a zone", '"zone:rock"'),
+        ("", 'layers = { "zone*" = "", "J1" = "crack" }', "'crack' wants a name after it", "crack:NAME"),
         ('unit = "parsec"', "", "is not one of", "unit"),
         ("", 'kind = "fault"', "is not one of", ""),
     ],
@@ -231,6 +232,14 @@ def test_traces_in_another_unit_cut_nothing_and_that_is_said(tmp_path):
     path = scene_of(tmp_path, "csv", keys="origin = [0.0, 0.0]", entry='[[geometry.traces]]\nfile = "more.csv"')
     (warning, *_) = [w for w in load_scene(path).warnings if "cuts nothing" in w.message]
     assert "more.csv:2" in warning.message and "geometry.traces[1].file" in warning.place
+
+
+def test_a_mapped_crack_that_just_misses_is_told_with_its_file(tmp_path):
+    extra = tmp_path / "more.csv"
+    extra.write_text("set,x1,y1,x2,y2\ncrack:near,38,1,39.999,1\n")
+    scene = load_scene(scene_of(tmp_path, "csv", entry='[[geometry.traces]]\nfile = "more.csv"'))
+    (warning,) = scene.warnings
+    assert "crack 'near' ends at (39.999, 1)" in warning.message and "geometry.traces[1].file" in warning.place
 
 
 def test_traces_may_cut_some_zones_only(tmp_path):

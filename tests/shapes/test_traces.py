@@ -226,7 +226,7 @@ def test_closed_joints_bolts_water_and_edges():
     lines = [
         of("J1", LENS, "closed"),
         of("bolt-roof", [[0, 0], [1, 1]]),
-        of("water", [[0, 1], [4, 2]]),
+        of("water", [[0, 1], [4, 2]], label="17"),
         of("load-top", [[0, 4], [2, 4], [4, 4]]),
     ]
     drawing = drawn(FieldFile(tuple(lines)))

@@ -182,7 +182,8 @@ class Geometry(Table):
         None, description="nearer than this, crack ends touch outlines and cracks, m (unset: 1e-6 of the largest side)"
     )
     chord_tolerance_m: Positive | None = Field(
-        None, description="curved edges of a model become chords this near to it, m (unset: 1e-4 of the largest side)"
+        None,
+        description="curves of a model or DXF become chords this near to them, m (unset: 1e-4 of the largest side)",
     )
 
     @model_validator(mode="after")
