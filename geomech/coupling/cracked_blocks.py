@@ -11,6 +11,7 @@ from ..ddm.work import Work
 from ..model import Blocks, Cracks, Motion, Problem, State
 from ..model.polygon import winding_number
 from .bodies import elastic_bodies, inherited, solve_bodies
+from .crack_energy import CrackEnergy
 from .inherited_loads import on_children, on_moved
 from .phases import Phases
 from .tractions import BoundaryLoad
@@ -43,7 +44,7 @@ class CrackedBlocks:
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
         self.solved_from: dict[int, object] = {}
-        self.budget = dda.EnergyBudget()
+        self.budget, self.crack_energy = dda.EnergyBudget(), CrackEnergy()
         self.acted: dict[str, float] = {}
         self.removed: np.ndarray | None = None
         self._motion: tuple[State, Motion] | None = None
@@ -120,6 +121,7 @@ class CrackedBlocks:
         self.history = inherited(self.history, split.parent, split.cracks)
         self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
         self.budget = self.budget.cut()
+        self.crack_energy.parts()
         self._take_blocks(split.parent)
 
     def take_out(self) -> list[int]:

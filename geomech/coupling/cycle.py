@@ -174,6 +174,11 @@ class Coupling:
             dug = result.state.removed is not now.state.removed
             budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
+            if now.bodies:
+                now.crack_energy.passed(tips, now.blocks, now.problem.materials)
+                if growth is None or self.follows:
+                    now.crack_energy.after(now.state, result.state, now.blocks, solutions)
+                statistics |= now.crack_energy.statistics()
             if self.tips is not None and len(tips):
                 statistics["fastest_tip"] = self.tips.speed.fastest(result.dt)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)

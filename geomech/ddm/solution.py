@@ -158,6 +158,16 @@ class Solution:
         return self.body.strain_weights @ self.jumps
 
     @cached_property
+    def crack_energy(self) -> float:
+        """J/m by which the body's elastic energy is larger than without jumps at its cracks: ½ ∫ (t₀ − t)·[u] ds (Clapeyron),
+        t₀ the traction that the loads bring to closed faces, t that on the faces."""
+        body, c = self.body, self.body.faces
+        if not self.jumps.size:
+            return 0.0
+        change = (body.crack_system.matrix @ self.jumps * self.jumps).reshape(c.n, 2, c.per).sum(axis=1)
+        return -0.5 * float(np.sum(c.quadrature * change)) / (2 * body.material.shear_modulus)
+
+    @cached_property
     def residual(self) -> float:
         """Largest traction left over at the collocation nodes, relative to the largest applied there. Mostly what loads,
         discretised, lack in equilibrium; logs a warning above 1e-3."""
