@@ -61,7 +61,6 @@ def _zones(c: Check) -> None:
                 f"the geometry has no zone {motion.zone!r}",
                 nearest(motion.zone, known),
             )
-    centres = np.array([c.drawing.blocks.area_moments(b)[1] for b in range(c.drawing.blocks.n_blocks)])
     for k, excavation in enumerate(c.tables.loads.excavations):
         for n, zone in enumerate(excavation.zones):
             if zone not in known:
@@ -70,6 +69,8 @@ def _zones(c: Check) -> None:
         if excavation.polygon is not None and not excavation.zones:
             import shapely
 
+            blocks = c.drawing.blocks
+            centres = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])
             inside = shapely.contains_xy(shapely.Polygon(excavation.polygon), centres[:, 0], centres[:, 1])
             if not inside.any():
                 c.refuse(

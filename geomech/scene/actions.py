@@ -62,7 +62,9 @@ def profile_of(table: TractionTable) -> LinearProfile | None:
 def actions_of(tables: SceneTables, check: Check) -> dict[str, Any]:
     """The parts of `Loads` that are no forces, by their names there."""
     loads, zones = tables.loads, check.drawing.zones
-    in_zone = {name: [b for b, zone in enumerate(zones) if zone == name] for name in zones}
+    in_zone: dict[str, list[int]] = {}
+    for b, name in enumerate(zones):
+        in_zone.setdefault(name, []).append(b)
     motions = tuple(_block_motion(motion, b) for motion in loads.motions for b in in_zone.get(motion.zone, ()))
     points = []
     for k, motion in enumerate(loads.point_motions):
