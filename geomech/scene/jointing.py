@@ -13,6 +13,7 @@ from ..model import Blocks, Cracks
 from ..shapes import Cutting, Joint, Mend, Trace, Zone, cut
 from ..shapes.assembly import TOLERANCE
 from ..shapes.joint_sets import (
+    FisherAngle,
     Law,
     apparent_dip,
     discs,
@@ -161,13 +162,18 @@ def asked(shape: JointSetShape, geometry: Geometry) -> dict[str, float]:
     return expected.of_discs(**_in_space(shape, geometry, length))
 
 
-def _laws(shape: JointSetShape, geometry: Geometry) -> tuple[Law | None, Law | None, Law | None, Law | None]:
+def _laws(
+    shape: JointSetShape, geometry: Geometry
+) -> tuple[Law | FisherAngle | None, Law | None, Law | None, Law | None]:
     """The laws of angle in the section (rad), spacing, length and gap; None for what the set does not have."""
-    angle = shape.angle_deg
+    angle, section = shape.angle_deg, math.radians(geometry.section_azimuth_deg)
     if shape.dip_deg is not None:
-        section = math.radians(geometry.section_azimuth_deg)
         angle = math.degrees(apparent_dip(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section))
-    turn = None if angle is None else Law(math.radians(angle), math.radians(shape.angle_deviation_deg), shape.angle_law)
+    turn: Law | FisherAngle | None = None
+    if angle is not None:
+        turn = Law(math.radians(angle), math.radians(shape.angle_deviation_deg), shape.angle_law)
+    if shape.fisher > 0 and shape.dip_deg is not None:
+        turn = FisherAngle(math.radians(shape.dip_deg), math.radians(shape.dip_direction_deg), section, shape.fisher)
     spacing = None if shape.spacing_m is None else Law(shape.spacing_m, shape.spacing_deviation_m, shape.spacing_law)
     length = None if shape.length_m is None else Law(shape.length_m, shape.length_deviation_m, shape.length_law)
     gap = None if shape.gap_m == 0 else Law(shape.gap_m, shape.gap_deviation_m, shape.gap_law)

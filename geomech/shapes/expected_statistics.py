@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from .joint_sets import Law, mean_pole, poles_about
+from .joint_sets import FisherAngle, Law, fisher_rule, mean_pole, poles_about
 
 
-def of_parallel(angle: Law, spacing: Law, length: Law | None, gap: Law | None) -> dict[str, float]:
+def of_parallel(angle: Law | FisherAngle, spacing: Law, length: Law | None, gap: Law | None) -> dict[str, float]:
     """Lines ``spacing`` apart, of which length / (length + gap) is joint."""
     share = 1.0 if length is None or gap is None or gap.mean == 0 else length.mean / (length.mean + gap.mean)
     out = {
@@ -34,7 +34,7 @@ def of_parallel(angle: Law, spacing: Law, length: Law | None, gap: Law | None) -
     return out
 
 
-def of_poisson_traces(angle: Law, length: Law, per_area: float) -> dict[str, float]:
+def of_poisson_traces(angle: Law | FisherAngle, length: Law, per_area: float) -> dict[str, float]:
     p21 = per_area * length.mean
     return {
         "p20_per_m2": per_area,
@@ -46,7 +46,7 @@ def of_poisson_traces(angle: Law, length: Law, per_area: float) -> dict[str, flo
     }
 
 
-def of_poisson_lines(angle: Law | None, per_area_length: float) -> dict[str, float]:
+def of_poisson_lines(angle: Law | FisherAngle | None, per_area_length: float) -> dict[str, float]:
     """Without ``angle`` all directions are alike: a scan-line meets 2/π of the length (Miles 1964)."""
     if angle is None:
         return {"p21_per_m": per_area_length, **_scanned(2 / math.pi * per_area_length)}
@@ -65,10 +65,7 @@ def of_discs(
     """Discs cut by the section: P21 = P32 E[sin θ] with θ between pole and the section's normal, traces of mean
     π/4 E[D²]/E[D] and mean square 2/3 E[D³]/E[D] (Warburton 1980)."""
     mean = mean_pole(dip, dip_direction, section)
-    # Fisher's law by a rule: equal parts of the probability, each with as many turns about the mean.
-    share, turn = (np.arange(400) + 0.5) / 400, (np.arange(64) + 0.5) / 64 * 2 * math.pi
-    share, turn = (grid.ravel() for grid in np.meshgrid(share, turn))
-    pole = poles_about(mean, fisher, share, turn)
+    pole = poles_about(mean, fisher, *fisher_rule())
     flat = np.hypot(pole[:, 0], pole[:, 1])
     p21 = per_volume_area * float(flat.mean())
     first, second, third = diameter.moments
@@ -90,7 +87,7 @@ def of_discs(
     }
 
 
-def _angles(angle: Law) -> dict[str, float]:
+def _angles(angle: Law | FisherAngle) -> dict[str, float]:
     return {"mean_angle_deg": math.degrees(angle.mean), "angle_deviation_deg": math.degrees(angle.spread)}
 
 

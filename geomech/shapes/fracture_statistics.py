@@ -101,7 +101,7 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics
 def line_statistics(joint: Joint, region) -> LineStatistics:
     """Of the lines that the straight traces of a parallel set lie on inside ``region``, (n, 2) or a shapely polygon.
 
-    Lines without any trace in the region are not seen. Spacings are taken where the lines pass the region's middle.
+    Lines without any trace in the region are not seen. Spacings are taken where the lines pass beside the region's middle.
     """
     import shapely
 
@@ -128,7 +128,10 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
     step *= (size / np.hypot(*step.T))[:, None]
     start = ends[longest].mean(axis=1)
     chords = shapely.intersection(shapely.linestrings(np.stack([start - step, start + step], axis=1)), area)
-    between = np.diff(np.sort(at[longest]))
+    place = np.sort(at[longest])
+    # Beyond the region's own width some lines miss it: their neighbours would seem too far apart.
+    seen = shapely.contains_xy(area, *(middle + place[:, None] * across).T)
+    between = np.diff(place[seen] if seen.sum() > 1 else place)
     return LineStatistics(
         len(longest), _mean(between), _deviation(between), float(length.sum() / shapely.length(chords).sum())
     )

@@ -95,10 +95,54 @@ def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
     return math.atan(-math.tan(dip) * math.cos(dip_direction - section))
 
 
+@dataclass(frozen=True)
+class FisherAngle:
+    """Angles of the traces of planes whose poles are spread in space by Fisher's law of constant ``concentration`` about
+    those of the mean ``dip`` and ``dip_direction``; in a section with its x axis to azimuth ``section``. In rad; stands in
+    place of a `Law` of the angle."""
+
+    dip: float
+    dip_direction: float
+    section: float
+    concentration: float
+
+    @property
+    def mean(self) -> float:
+        return apparent_dip(self.dip, self.dip_direction, self.section)
+
+    def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
+        """(n,) angles within 90° of the mean."""
+        return self.mean + self._off(rng.random(n), rng.uniform(0, 2 * math.pi, n))
+
+    @property
+    def spread(self) -> float:
+        """The standard deviation of the angles."""
+        return float(self._off(*fisher_rule()).std())
+
+    @property
+    def mean_cosine(self) -> float:
+        """E[cos(angle − mean)]."""
+        return float(np.cos(self._off(*fisher_rule())).mean())
+
+    def _off(self, share: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        mean = mean_pole(self.dip, self.dip_direction, self.section)
+        pole = poles_about(mean, self.concentration, share, turn)
+        angle = np.arctan2(pole[:, 1], pole[:, 0]) + 0.5 * math.pi - self.mean
+        return 0.5 * np.angle(np.exp(2j * angle))
+
+
+def fisher_rule() -> tuple[np.ndarray, np.ndarray]:
+    """``share`` and ``turn`` of `poles_about` for means over Fisher's law: equal parts of the probability, each with as many
+    turns about the mean."""
+    share, turn = (np.arange(400) + 0.5) / 400, (np.arange(64) + 0.5) / 64 * 2 * math.pi
+    share, turn = np.meshgrid(share, turn)
+    return share.ravel(), turn.ravel()
+
+
 def parallel_set(
     name: str,
     region: np.ndarray,
-    angle: Law,
+    angle: Law | FisherAngle,
     spacing: Law,
     length: Law | None,
     gap: Law | None,
@@ -149,7 +193,7 @@ def _intervals(
 
 
 def poisson_traces(
-    name: str, region: np.ndarray, angle: Law, length: Law, per_area: float, rng: np.random.Generator
+    name: str, region: np.ndarray, angle: Law | FisherAngle, length: Law, per_area: float, rng: np.random.Generator
 ) -> Joint:
     """Traces whose centres fall anywhere, ``per_area`` (P20, 1/m²) of them, each with its own angle and length."""
     middle, radius = _circle(region)
@@ -201,7 +245,7 @@ def discs(
 
 
 def poisson_lines(
-    name: str, region: np.ndarray, angle: Law | None, per_area_length: float, rng: np.random.Generator
+    name: str, region: np.ndarray, angle: Law | FisherAngle | None, per_area_length: float, rng: np.random.Generator
 ) -> Joint:
     """Endless lines, ``per_area_length`` (P21, m/m²) of them, of ``angle`` or, without it, of all directions alike (Miles
     1964): those that meet a circle of radius R are Poisson with mean 2 R P21, their distances from its middle uniform."""

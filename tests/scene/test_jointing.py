@@ -121,6 +121,7 @@ def test_a_drawn_crack_stands_beside_dead_ends(tmp_path):
         ),
         (("points = [[5, 0], [5, 10]]", "points = [[5, 0], [5, 0]]"), r"geometry.joints\[0\].*without length"),
         (("angle_deg = 10", "dip_deg = 10"), "both `dip_deg` and `dip_direction_deg`"),
+        (("angle_deg = 10", "angle_deg = 10\nfisher = 20"), "`fisher` spreads poles in space: it needs `dip_deg`"),
     ],
 )
 def test_mistakes_are_told_at_their_place(tmp_path, change, message):
@@ -144,3 +145,16 @@ def test_small_blocks_spare_the_drawn_fault_and_are_told(tmp_path):
     said = coarse.drawing.jointed.told()
     number = len([mend for mend in coarse.drawing.jointed.cutting.mends if mend.kind == "sliver"])
     assert any(text.startswith(f"{number} × sliver, up to ") and " m², at (" in text for text in said)
+
+
+def test_poles_spread_by_fishers_law_turn_the_traces_of_any_set(tmp_path):
+    """Beds that dip along the section: their traces spread by 1/√κ."""
+    spread = "dip_deg = 10\ndip_direction_deg = 90\nfisher = 400"
+    scene = load(tmp_path, SCENE, ("angle_deg = 10", spread), ("spacing_m = 2", "spacing_m = 0.1"))
+    (beds,) = (joint for joint in scene.drawing.jointed.joints if joint.name == "joint:beds")
+    ends = np.array([line[[0, -1]] for line in beds.lines])
+    along = ends[:, 1] - ends[:, 0]
+    angle = np.degrees(np.arctan(along[:, 1] / along[:, 0]))
+    error = 4 / math.sqrt(len(angle))
+    assert angle.mean() == pytest.approx(-10, abs=error * math.degrees(1 / 20))
+    assert angle.std() == pytest.approx(math.degrees(1 / 20), rel=error)

@@ -26,6 +26,7 @@ from geomech.shapes.fracture_statistics import (
     set_statistics,
 )
 from geomech.shapes.joint_sets import (
+    FisherAngle,
     Law,
     discs,
     mean_pole,
@@ -56,6 +57,23 @@ def test_poles_have_fishers_mean_resultant(concentration):
     law = kstest(along, lambda c: (np.exp(k * (c - 1)) - math.exp(-2 * k)) / -math.expm1(-2 * k))
     assert law.pvalue > SIGNIFICANT
     assert np.linalg.norm(resultant - (resultant @ mean) * mean) < 4 * math.sqrt(1 / n)
+
+
+def test_traces_of_planes_spread_by_fishers_law():
+    """Poles in the section: angles by von Mises' law, for large κ normal with 1/√κ; aside, as much as the tilt turns them."""
+    rng = np.random.default_rng(12)
+    beside = FisherAngle(math.radians(60), 0.3, 0.3, 400.0)
+    angles = beside.sample(rng, 20_000)
+    assert beside.mean == pytest.approx(-math.radians(60)) and beside.spread == pytest.approx(1 / 20, rel=0.01)
+    assert angles.mean() == pytest.approx(beside.mean, abs=4 * 0.05 / math.sqrt(20_000))
+    assert kstest((angles - beside.mean) * 20, "norm").pvalue > SIGNIFICANT
+    assert beside.mean_cosine == pytest.approx(math.exp(-0.5 / 400), rel=1e-4)
+    # Seen along the dip direction turned by 60°, a pole nearer to the section's normal turns its trace more.
+    aside = FisherAngle(math.radians(60), 0.3, 0.3 + math.radians(60), 400.0)
+    flat = np.hypot(*mean_pole(aside.dip, aside.dip_direction, aside.section)[:2])
+    assert aside.spread == pytest.approx(1 / 20 / flat, rel=0.02) and aside.sample(rng, 20_000).std() == pytest.approx(
+        aside.spread, rel=4 / math.sqrt(40_000)
+    )
 
 
 def whole_traces(joint: Joint, margin: float) -> np.ndarray:
@@ -152,11 +170,11 @@ def test_lines_of_a_parallel_set_have_the_spacing_and_persistence_asked_for(law)
     assert found.persistence == pytest.approx(wanted["persistence"], abs=4 * 0.2 / math.sqrt(len(joint.lines)))
     # Lengths below a hundredth of the mean are drawn again, which makes an exponential law longer by as much.
     longer = 1.01 if law == "exponential" else 1.0
-    # A line without a trace in a corner of the region is not seen: one or two of three hundred.
+    # Spacings are taken at right angles to the mean direction found, which is off by some hundredths of a degree.
     assert found.mean_spacing == pytest.approx(
-        longer * wanted["spacing_m"], abs=4 * wanted["spacing_deviation_m"] / math.sqrt(n) + 0.02
+        longer * wanted["spacing_m"], abs=4 * wanted["spacing_deviation_m"] / math.sqrt(n) + 0.002
     )
-    assert found.spacing_deviation == pytest.approx(wanted["spacing_deviation_m"], rel=0.35, abs=0.2)
+    assert found.spacing_deviation == pytest.approx(wanted["spacing_deviation_m"], rel=0.3, abs=0.01)
     whole = set_statistics(joint, region)
     assert whole.mean_length == pytest.approx(9.0, abs=4 * 2.0 / math.sqrt(whole.traces) + 0.02)
     assert math.degrees(whole.angle_deviation) == pytest.approx(1.0, rel=0.25)

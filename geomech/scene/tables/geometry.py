@@ -71,7 +71,9 @@ class JointSetShape(Table):
         None, description="dip of the joints in space, with `dip_direction_deg` in place of `angle_deg`, degrees"
     )
     dip_direction_deg: Finite | None = Field(None, description="azimuth of the dip, clockwise from north, degrees")
-    fisher: NotNegative = Field(0.0, description='Fisher\'s constant of the poles of "discs" (0: all alike)')
+    fisher: NotNegative = Field(
+        0.0, description="Fisher's constant of the poles in space about dip and dip direction (0: all alike)"
+    )
     spacing_m: Positive | None = Field(None, description='distance between the lines of a "parallel" set, m')
     spacing_deviation_m: NotNegative = Field(0.0, description="its standard deviation, m")
     spacing_law: DistributionLaw = Field("normal", description="its law")
@@ -108,6 +110,10 @@ class JointSetShape(Table):
         dips = self.dip_deg is not None, self.dip_direction_deg is not None
         if any(dips) and (not all(dips) or self.angle_deg is not None):
             raise ValueError("give either `angle_deg`, or both `dip_deg` and `dip_direction_deg`")
+        if self.fisher > 0 and not all(dips):
+            raise ValueError("`fisher` spreads poles in space: it needs `dip_deg` and `dip_direction_deg`")
+        if self.fisher > 0 and self.angle_deviation_deg > 0:
+            raise ValueError("angles spread by `fisher` or by `angle_deviation_deg`, not by both")
         if self.kind == "discs" and not all(dips):
             raise ValueError('a set of kind "discs" needs `dip_deg` and `dip_direction_deg`')
         if self.kind in ("parallel", "poisson") and not all(dips) and self.angle_deg is None:
