@@ -52,12 +52,15 @@ def run_problem(
     problem: Problem, folder: Path, observers: Iterable[Any], warnings: Iterable[str] = ()
 ) -> dict[str, Any]:
     """The same for a problem built in Python; ``warnings`` about it are logged once the run's log is open."""
-    return Journey(problem, folder, observers).go(warnings)
+    return CoupledRun(problem, folder, observers).go(warnings)
 
 
-class Journey:
-    """A run under way: the coupled problem and its observers, from its start, or from the ``stored`` content of a checkpoint
-    with ``problem`` as it is to be from then on."""
+class CoupledRun:
+    """A coupled problem on its way to the end, watched by observers and stored by the first `Checkpoints` among them.
+
+    It begins at the start of ``problem``, or where ``stored``, the content of a checkpoint, was written (it is used up), with
+    the title and the settings of the run that ``problem`` has now. A first interrupt ends it between two cycles.
+    """
 
     def __init__(
         self, problem: Problem, folder: Path, observers: Iterable[Any], stored: dict[str, Any] | None = None
@@ -84,7 +87,7 @@ class Journey:
             if self.stored is None:
                 self.group.on_start(self.problem, self.folder)
             else:
-                self.group.on_resume(self.problem, self.folder, self.stored["observers"])
+                self.group.on_resume(self.problem, self.folder, self.stored.pop("observers"))
             for warning in warnings:
                 log.warning("%s", warning)
             with self.interruption if self._stores else nullcontext():
@@ -109,9 +112,13 @@ class Journey:
     def _cycles(self) -> None:
         from .coupling import Coupling
 
-        coupling = Coupling(self.problem) if self.stored is None else self.stored["coupling"]
-        begun = coupling.cycles() if self.stored is None else coupling.load_steps()
-        self.stored = None  # what the run has left behind need not be kept
+        if self.stored is None:
+            coupling = Coupling(self.problem)
+            begun = coupling.cycles()
+        else:
+            coupling = self.stored.pop("coupling")
+            coupling.take_run(self.problem)
+            begun = coupling.load_steps()
         if self._stores:
             coupling.between = lambda: self._between(coupling)
         if self.ended:

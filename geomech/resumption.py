@@ -12,7 +12,7 @@ from typing import Any
 from .output import checkpoint
 from .output.checkpoint import FilesChanged, NotResumable
 from .output.checkpointing import digests
-from .pipeline import Journey, run
+from .pipeline import CoupledRun, run
 
 log = logging.getLogger(__name__)
 
@@ -57,9 +57,10 @@ def resume(
     if told is not None:
         _refuse_finished(told, changes, header, scene)
     stored = checkpoint.read(path)
-    coupling = stored["coupling"]
+    problem = stored["coupling"].problem
     if scene is not None:
-        coupling.problem = replace(coupling.problem, title=scene.problem().title, run=scene.problem().run)
+        wanted = scene.problem()
+        problem = replace(problem, title=wanted.title, run=wanted.run)
     if observers is None:
         from .output import standard_observers
 
@@ -67,7 +68,7 @@ def resume(
     warnings = [f"{name} was {was!r}, is now {now!r}" for name, (was, now) in changes.items()]
     warnings += _other_surroundings(header)
     try:
-        return Journey(coupling.problem, folder, observers, stored).go(warnings)
+        return CoupledRun(problem, folder, observers, stored).go(warnings)
     except FilesChanged as error:
         raise NotResumable(f"{error}: run it anew") from error
 

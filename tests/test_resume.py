@@ -10,14 +10,27 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from geomech import cli
-from geomech.output import Checkpoints, Run, checkpoint, standard_observers
-from geomech.pipeline import run
+from geomech.bench.coupling_cost import wall
+from geomech.model import RunSettings
+from geomech.output import (
+    Checkpoints,
+    Histories,
+    JointHistories,
+    Run,
+    RunLog,
+    Series,
+    Summary,
+    checkpoint,
+    standard_observers,
+)
+from geomech.pipeline import run, run_problem
 from geomech.resumption import Finished, NotResumable, resume
 from geomech.scene import load_scene
 
@@ -272,10 +285,10 @@ def test_a_run_broken_off_and_resumed_leaves_the_same_bytes(name, write, tmp_pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("variant", ["phi_0", "phi_30"])
-def test_two_cracks_broken_off_at_every_tenth(variant, tmp_path):
+@pytest.mark.parametrize("how", ["dda.time_step_s=4", 'run.stepping="events"'])
+def test_two_cracks_broken_off_at_every_tenth(how, tmp_path):
     """The published specimen, through growth of all four tips and coalescence, resumed over and over in one folder."""
-    scene = load_scene(ROOT / "pipelines" / "two_cracks", ["dda.time_step_s=4"], variant)
+    scene = load_scene(ROOT / "pipelines" / "two_cracks", [how], "phi_30")
     last = run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))["cycles"] - 1
     observers = standard_observers(scene, quiet=True)
     broken_off(scene, tmp_path / "parts", last // 10)
@@ -283,6 +296,21 @@ def test_two_cracks_broken_off_at_every_tenth(variant, tmp_path):
         with pytest.raises(KeyboardInterrupt):
             resume(tmp_path / "parts", (), [*observers, Breaks(tenth * last // 10)])
     resume(tmp_path / "parts", quiet=True)
+    assert differing(tmp_path / "whole", tmp_path / "parts") == []
+
+
+@pytest.mark.slow
+def test_a_problem_made_in_python_is_resumed_as_well(tmp_path):
+    """A wall of 300 bricks, five of them cracked, without a scene: the blocks' kept factors, and no file to read it from."""
+    problem = replace(wall(300, 5), run=RunSettings(end_time=0.2))
+
+    def observers(*more) -> list:
+        return [RunLog(), Histories(), JointHistories(), Series(), Checkpoints(every=4), Summary(), *more]
+
+    run_problem(problem, tmp_path / "whole", observers())
+    with pytest.raises(KeyboardInterrupt):
+        run_problem(problem, tmp_path / "parts", observers(Breaks(9)))
+    resume(tmp_path / "parts", (), observers())
     assert differing(tmp_path / "whole", tmp_path / "parts") == []
 
 

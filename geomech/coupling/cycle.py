@@ -85,6 +85,12 @@ class Coupling:
     def __setstate__(self, stored: dict[str, Any]) -> None:
         vars(self).update(stored, between=_go_on)
 
+    def take_run(self, problem: Problem) -> None:
+        """Go on with the title and the end, and what else may stop the run, that ``problem`` has."""
+        self.problem, self.now.problem = (
+            replace(each, title=problem.title, run=problem.run) for each in (self.problem, self.now.problem)
+        )
+
     @property
     def stops_next(self) -> bool:
         """Whether the next pass is the last one, because of what has happened."""
