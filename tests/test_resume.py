@@ -254,13 +254,15 @@ def broken_off(scene, folder: Path, cycle: int) -> None:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Every file of a run, but for times of day: the log, checkpoints, and the summary's seconds."""
+    """Every file of a run, but for how long it took: the log, checkpoints, and the summary's seconds."""
     found = {}
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
         if path.is_file() and name != "run.log" and path.parent.name != checkpoint.FOLDER:
             found[name] = path.read_bytes()
     summary = json.loads(found["summary.json"])
+    for told in summary.get("skipped", {}).values():
+        told.pop("saved_s", None)
     found["summary.json"] = {key: value for key, value in summary.items() if key not in ("wall_s", "seconds")}
     return found
 
