@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,6 +21,9 @@ CHORD = 1e-4
 
 #: Physical curves whose name starts so are cracks; every other name belongs to edges of blocks.
 CRACK = "crack:"
+
+#: Words in the rest of a faulty line.
+_LONGEST_REST = 1000
 
 #: Files of shapes that say their unit.
 STEP = (".step", ".stp")
@@ -155,6 +159,7 @@ def _open(gmsh, path: Path) -> dict[str, Parameter]:
     gmsh.logger.stop()
     if error or errors:
         text = (errors or [error])[0].replace(f"'{path}', ", "")
+        _forget_rest(gmsh)
         raise GmshModelError(f"Gmsh cannot read {path}: {text}", "open it in Gmsh and correct it there")
     found = {}
     for name in gmsh.onelab.getNames():
@@ -172,6 +177,24 @@ def _open(gmsh, path: Path) -> dict[str, Parameter]:
         short = name.rsplit("/", 1)[-1]
         found[name if short in found else short] = entry
     return found
+
+
+def _forget_rest(gmsh) -> None:
+    """Gmsh's parser keeps what follows a fault in its line, and reads that before the next file: give it empty ones, which
+    take a word each, until nothing is left."""
+    with tempfile.TemporaryDirectory() as folder:
+        empty = Path(folder) / "empty.geo"
+        empty.write_text("\n")
+        for _ in range(_LONGEST_REST):
+            gmsh.logger.start()
+            try:
+                gmsh.merge(str(empty))
+                left = any(line.startswith("Error") for line in gmsh.logger.get())
+            except Exception:  # noqa: BLE001 (Gmsh raises nothing narrower)
+                left = True
+            gmsh.logger.stop()
+            if not left:
+                return
 
 
 def _with_parameters(

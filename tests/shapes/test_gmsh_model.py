@@ -275,3 +275,13 @@ def test_reading_works_in_a_thread():
         "t.start(); t.join()\nsys.exit(0 if len(found[0].zones) == 3 else 1)"
     )
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_a_faulty_model_leaves_nothing_for_the_next(tmp_path):
+    bad, good = tmp_path / "bad.geo", tmp_path / "good.geo"
+    bad.write_text("a = 1;\nb = 0 / 0 + 4 * (7 - Cos(3)) * a;\nc = 2;\n")
+    good.write_text('SetFactory("OpenCASCADE");Rectangle(1)={0,0,0,2,1};Physical Surface("rock")={1};\n')
+    for _ in range(2):
+        with pytest.raises(GmshModelError, match="line 2: Division by zero"):
+            read_gmsh_model(bad)
+        assert read_gmsh_model(good).zones[0].name == "rock"
