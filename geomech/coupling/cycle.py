@@ -161,7 +161,7 @@ class Coupling:
             events, stops = pending, stops or self._stops(pending)
             growth = None
             if may_grow and not stops:
-                longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, result.dt)
+                longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, result.dt, now.loads)
                 growth = growth_of_tips(now, tips, enough, together, longest)
             if growth is None and may_grow and not stops and growing.initiation:
                 growth, born = births(now, solutions, result.state, enough)
@@ -198,7 +198,7 @@ class Coupling:
                 self.under_way = None
                 self.length.after(result, dt, now.system.allowed_ratio)
                 if self.tips is not None:
-                    self.tips.end(tips, now.blocks, result.dt)
+                    self.tips.end(tips, now.blocks, result.dt, now.loads)
                 now.state, now.budget = result.state, budget
                 now.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
                 if growth is not None:

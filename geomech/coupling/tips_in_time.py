@@ -3,10 +3,13 @@ than waves do."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..model import Blocks, Problem
 from .tip_speed import TipSpeed
+from .tractions import BoundaryLoad
 from .wave_time import WaveTime
 
 
@@ -17,18 +20,18 @@ class TipsInTime:
         self.speed, self.waves = TipSpeed(problem), WaveTime(problem)
         self._k_ic = np.array([m.k_ic for m in problem.materials])
 
-    def may_go(self, tips: np.ndarray, blocks: Blocks, dt: float) -> np.ndarray:
+    def may_go(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
         """(n_tips,) m, how far ``tips`` may still go in the present step of ``dt`` s."""
-        return np.where(self._driven(tips, blocks, dt), self.speed.left(tips, blocks, dt), 0.0)
+        return np.where(self._driven(tips, blocks, dt, loads), self.speed.left(tips, blocks, dt), 0.0)
 
     def went(self, tips: np.ndarray) -> None:
         """``tips`` have ``grown`` in a pass of the present step."""
         self.speed.went(tips)
 
-    def end(self, tips: np.ndarray, blocks: Blocks, dt: float) -> None:
+    def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> None:
         """The step of ``dt`` s has ended with ``tips``."""
-        self.speed.end(tips, blocks, dt, self._driven(tips, blocks, dt))
-        self.waves.end(tips, blocks, dt)
+        self.speed.end(tips, blocks, dt, self._driven(tips, blocks, dt, loads))
+        self.waves.end(tips, blocks, dt, loads)
 
-    def _driven(self, tips: np.ndarray, blocks: Blocks, dt: float) -> np.ndarray:
-        return self.waves.drive(tips, blocks, dt) >= self._k_ic[blocks.material[tips["block"]]]
+    def _driven(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
+        return self.waves.drive(tips, blocks, dt, loads) >= self._k_ic[blocks.material[tips["block"]]]

@@ -9,10 +9,15 @@ criterion (1/τ) ∫ K dt ≥ K_Ic over the last τ of Petrov & Morozov (1994), 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from ..model import Blocks, Problem
+from .tractions import BoundaryLoad
 
+_NONE: Mapping[int, BoundaryLoad] = MappingProxyType({})
 _Key = tuple[int, int]
 
 
@@ -24,10 +29,13 @@ class WaveTime:
         #: (dt, K_eq) of the steps before, the last one first, as far as they count.
         self._past: dict[_Key, list[tuple[float, float]]] = {}
 
-    def drive(self, tips: np.ndarray, blocks: Blocks, dt: float) -> np.ndarray:
-        """(n_tips,) the lesser of K_eq in the present step of ``dt`` s and of its mean over the time of a wave, Pa √m."""
+    def drive(
+        self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad] = _NONE
+    ) -> np.ndarray:
+        """(n_tips,) the lesser of K_eq in the present step of ``dt`` s and of its mean over the time of a wave, Pa √m, from what
+        is loaded of its block's boundary (block → `BoundaryLoad`), or any of it where nothing is."""
         driven = tips["k_eq"].copy()
-        for row, time in self._longer(tips, blocks, dt):
+        for row, time in self._longer(tips, blocks, dt, loads):
             tip = tips[row]
             total, rest = float(tip["k_eq"]) * dt, time - dt
             for step, k_eq in self._past.get((int(tip["crack"]), int(tip["end"])), ()):
@@ -38,10 +46,10 @@ class WaveTime:
             driven[row] = min(driven[row], total / time)
         return driven
 
-    def end(self, tips: np.ndarray, blocks: Blocks, dt: float) -> None:
+    def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad] = _NONE) -> None:
         """The step of ``dt`` s has ended with ``tips``."""
         past = {}
-        for row, time in self._longer(tips, blocks, dt):
+        for row, time in self._longer(tips, blocks, dt, loads):
             tip = tips[row]
             key = (int(tip["crack"]), int(tip["end"]))
             kept, length = [(dt, float(tip["k_eq"]))], dt
@@ -53,24 +61,33 @@ class WaveTime:
             past[key] = kept
         self._past = past
 
-    def _longer(self, tips: np.ndarray, blocks: Blocks, dt: float) -> list[tuple[int, float]]:
+    def _longer(
+        self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]
+    ) -> list[tuple[int, float]]:
         """Rows of ``tips`` to which waves take longer than ``dt``, and how long, s."""
         speed = self._speed[blocks.material[tips["block"]]]
-        # No point of a block is farther from its outline than the radius of a disc of its area.
-        far = np.sqrt(blocks.areas()[tips["block"]] / np.pi)
+        size = np.array([np.ptp(blocks.loops(b)[0], axis=0).max() for b in np.unique(tips["block"]).tolist()])
+        if not len(tips) or not (np.sqrt(2.0) * size.max() > speed.min() * dt):
+            return []
         found = []
-        for row in np.flatnonzero(far > speed * dt).tolist():
-            time = _from_outline(blocks, int(tips["block"][row]), tips["point"][row]) / float(speed[row])
+        for row in range(len(tips)):
+            block = int(tips["block"][row])
+            load = loads.get(block)
+            lines = load.segments if load is not None and len(load.segments) else _outline(blocks, block)
+            time = _distance(tips["point"][row], lines) / float(speed[row])
             if time > dt:
                 found.append((row, time))
         return found
 
 
-def _from_outline(blocks: Blocks, block: int, point: np.ndarray) -> float:
-    """m, distance of ``point`` (2,) from the boundary of ``block``, reference coordinates."""
+def _outline(blocks: Blocks, block: int) -> np.ndarray:
+    """(n, 2, 2) m, all edges of ``block``, reference coordinates."""
     own = np.arange(blocks.vertex_start[block], blocks.vertex_start[block + 1])
-    start = blocks.vertices[own]
-    along = blocks.vertices[blocks.next_vertex[own]] - start
-    arm = point - start
+    return np.stack([blocks.vertices[own], blocks.vertices[blocks.next_vertex[own]]], axis=1)
+
+
+def _distance(point: np.ndarray, lines: np.ndarray) -> float:
+    """m, from ``point`` (2,) to the nearest of ``lines`` (n, 2, 2)."""
+    along, arm = lines[:, 1] - lines[:, 0], point - lines[:, 0]
     place = np.clip(np.sum(arm * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
     return float(np.hypot(*(arm - place[:, None] * along).T).min())

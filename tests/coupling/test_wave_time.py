@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from geomech.coupling import cycles
+from geomech.coupling.tractions import BoundaryLoad
 from geomech.coupling.wave_time import WaveTime
 from geomech.model import (
     TIP,
@@ -80,3 +83,43 @@ def test_mean_over_the_time_of_a_wave(parts):
         waves.end(tips, given.blocks, dt)
     assert waves.drive(one_tip(0.0), given.blocks, dt)[0] == 0.0
     assert waves.drive(one_tip(1e5), given.blocks, 2 * time)[0] == 1e5
+
+
+def test_waves_come_from_where_the_block_is_loaded():
+    """A tip 0.1 m from a free side and 0.5 m from the loaded base: the base's waves count."""
+    given = dropped(0.0, 1e-5, 1.0)
+    base = BoundaryLoad(
+        np.array([[[-0.5, 0.0], [0.5, 0.0]]]), np.ones((1, 2, 2)), np.zeros(2), np.zeros((2, 2)), np.zeros(2), 0.0
+    )
+    tips = one_tip(1e5)
+    tips["point"] = (0.4, 0.5)
+    dt = 0.1 / ROCK.pressure_wave_speed
+    waves = WaveTime(given)
+    assert waves.drive(tips, given.blocks, dt * 1.001)[0] == 1e5
+    assert waves.drive(tips, given.blocks, dt, {0: base})[0] == pytest.approx(1e5 / 5, rel=1e-9)
+
+
+def test_slow_shaking_is_its_quasi_static_limit():
+    """A block that stands on a rough base, an open slot in its middle, under gravity that swings by 0.3 g at 5 Hz (its own
+    vibration: 900 Hz, so that inertia adds 1e-4): at the first peak K is that of statics under the same pull, to 1 %, which is what the block
+    still rings by."""
+
+    def under(dynamic: float, sideways: History, dt: float, end: float):
+        given = dropped(0.0, dt, end, k_ic=np.inf)
+        line = np.array([[-0.1, 0.4], [0.1, 0.6]])
+        given = replace(
+            given,
+            cracks=Cracks.from_polylines([line], aperture=np.inf),
+            loads=Loads(gravity=sideways),
+            dda=replace(given.dda, dynamic_factor=dynamic),
+        )
+        *_, cycle = cycles(given)
+        return np.stack([cycle.tips["k_i"], cycle.tips["k_ii"]])
+
+    times = np.linspace(0.0, 0.06, 301)
+    # Weight comes on slowly, then the base swings.
+    down = -9.81 * np.clip(times / 0.01, 0.0, 1.0)
+    swing = 2.943 * np.where(times > 0.01, np.sin(2 * np.pi * 5.0 * (times - 0.01)), 0.0)
+    shaken = under(1.0, History(times, np.column_stack([swing, down])), 2e-4, 0.06)
+    still = under(0.0, History.constant([2.943, -9.81]), 1.0, 3.0)
+    assert shaken == pytest.approx(still, abs=0.01 * np.abs(still).max())
