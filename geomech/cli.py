@@ -80,6 +80,10 @@ def _parser() -> argparse.ArgumentParser:
         "build", _build, "write the blocks that a scene is cut into, and a picture of them, before anything runs",
         "geomech build slope.toml\ngeomech build slope.toml --set geometry.seed=7 --out /tmp/seed7",
     )  # fmt: skip
+    build.description += (
+        " Joint sets are told as they were asked for and as they came out (block_system.json), with a picture of block"
+        " sizes, directions, trace lengths and nodes beside the blocks' own (joint_statistics.png)."
+    )
     _scene_arguments(build)
     build.add_argument("--out", type=Path, metavar="DIR", help="folder (default outputs/NAME[/VARIANT]/build)")
     build.add_argument("--picture", type=Path, metavar="FILE", help="where the picture goes (default DIR/blocks.png)")
@@ -222,7 +226,7 @@ def _build(options: argparse.Namespace) -> int:
         if told["sets"]:
             from .render.network_statistics import draw_network_statistics
 
-            pictures += f", {draw_network_statistics(scene, told, picture.with_name('joint_statistics.png')).name}"
+            pictures += f", {draw_network_statistics(scene, told, folder / 'joint_statistics.png').name}"
         print("\n".join([f"{told['title']}: {told['summary']}", *told["lines"], f"  written   {folder}, {pictures}"]))
     return DONE
 
