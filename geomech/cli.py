@@ -279,7 +279,8 @@ def _resume(options: argparse.Namespace) -> int:
     except Finished as nothing_left:
         _say(f"{options.run}: {nothing_left}")
     except NotResumable as error:
-        raise BadInput(f"{options.run}: {error}") from error
+        told = str(error)
+        raise BadInput(told if str(options.run) in told else f"{options.run}: {told}") from error
     return DONE
 
 
