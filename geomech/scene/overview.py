@@ -31,10 +31,19 @@ def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
     rows += _cut("cracks", _cracks(drawing.cracks))
     rows += _cut("loads", _loads(tables, drawing.blocks))
     stops = f" or the first of {', '.join(tables.run.stop_at)}" if tables.run.stop_at else ""
-    rows.append(("run", f"to {tables.run.end_time_s:g} s{stops}, in steps of at most {tables.dda.time_step_s:g} s"))
+    rows.append(("run", f"to {tables.run.end_time_s:g} s{stops}, {_steps(tables)}"))
     # A label stands before the first of its lines.
     labels = [label if k == 0 or rows[k - 1][0] != label else "" for k, (label, _) in enumerate(rows)]
     return [f"  {label:<9} {text}" for label, (_, text) in zip(labels, rows)]
+
+
+def _steps(tables: SceneTables) -> str:
+    run = tables.run
+    if run.stepping == "fixed":
+        return f"in steps of at most {tables.dda.time_step_s:g} s"
+    most = "" if run.longest_step_s is None else f", at most {run.longest_step_s:g} s long"
+    follows = ", the load following the cracks" if run.control == "toughness" else ""
+    return f"in steps from event to event{most}{follows}"
 
 
 def _cut(label: str, texts: Iterable[str]) -> list[tuple[str, str]]:

@@ -163,7 +163,9 @@ class RunTable(Table):
         "reaches its toughness, and else are as long as blocks may move in one",
     )
     longest_step_s: Positive | None = Field(
-        None, description='longest step of stepping "events", s (unset: none but by how far blocks move in it)'
+        None,
+        description='longest step of stepping "events", s (unset: none but by how far blocks move in it); loads at events do '
+        "not depend on it, the work of friction on crack faces is right to a step",
     )
     control: Literal["load", "toughness"] = Field(
         "load",
