@@ -36,8 +36,9 @@ NEAR, APPROACH = 1e-5, 0.98
 USE = 0.8
 #: Solutions that one search may take, and those without the event between two of them.
 MOST, OPEN = 40, 5
-#: An event within this part of the time itself is a jump of the drive (faces that close): tips grow beyond it.
-JUMP = 1e-12
+#: Two times nearer than this part of themselves are one. An event between them is a jump of the drive (faces that close or
+#: begin to slip), and tips grow at the later one, beyond it.
+JUMP = 1e-6
 
 
 class EventSteps:
@@ -108,6 +109,8 @@ class EventSteps:
             if not whole:
                 # It lies within a long step.
                 aim = start + APPROACH * (aim - start)
+        else:
+            self.reached = excess > 0
         return found, excess
 
     def _back(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
@@ -126,6 +129,8 @@ class EventSteps:
             whole = whole or not self._far(start - aim)
             if not whole:
                 aim = start - APPROACH * (start - aim)
+        else:
+            self.reached = True
         return found, excess
 
     def _at(self, now: CrackedBlocks, time: float, free: bool = False) -> tuple[Balance, float]:

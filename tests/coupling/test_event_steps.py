@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.coupling import cycles
+from geomech.coupling import cycles, event_steps
+from geomech.coupling.cracked_blocks import CrackedBlocks
 from geomech.ddm.criteria import maximum_tangential_stress
 from geomech.model import (
     Blocks,
@@ -113,6 +114,26 @@ def test_steps_do_not_pass_the_corners_of_a_history():
     )
     times = [cycle.state.time for cycle in cycles(problem)]
     assert {3.0, 5.5, 11.0, 12.0, 20.0} <= set(times) and len(times) < 12
+
+
+def test_a_jump_of_the_drive_is_an_event(monkeypatch):
+    """Faces that begin to slip may throw load on a tip at once: the step ends just after the jump, and not where it would
+    have passed the toughness but for it."""
+    jump = 41.7
+    monkeypatch.setattr(
+        event_steps,
+        "drive",
+        lambda now, found: (0.01 if found.result.state.time < jump else 0.05) * found.result.state.time,
+    )
+    problem = plate()
+    now, steps = CrackedBlocks(problem), event_steps.EventSteps(problem)
+    for _ in range(20):
+        found = steps.first_pass(now, problem.run.end_time)
+        if steps.reached:
+            break
+        now.state = found.result.state
+        steps.after(now, found)
+    assert steps.reached and 0 <= found.result.state.time - jump < 1e-6 * jump
 
 
 def test_births_are_events_too():
