@@ -16,7 +16,7 @@ from geomech.report.part import Part
 FAMILIES = {
     "closed": "closed faces, friction 30°",
     "horizontal": "φ from the horizontal",
-    "quadratic": "the paper's elements, increments of 2 mm, fixed steps",
+    "quadratic": "the paper's elements, ungraded; increments of 2 mm, fixed steps",
     "paper": "the paper's: these and Kelvin's solution",
 }
 #: Beginnings of variants' names that vary one setting → what it is called; the setting stands behind the first "_".
