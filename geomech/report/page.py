@@ -53,7 +53,7 @@ h2 { font-size: 1.2rem; line-height: 1.25; margin: 2.4rem 0 .6rem; padding-botto
 p { margin: .5rem 0; max-width: 46rem; }
 .lead { color: var(--soft); }
 nav { margin: 1rem 0 0; font-size: .92rem; }
-nav a { color: var(--accent); text-decoration: none; margin-right: 1rem; white-space: nowrap; }
+nav a { color: var(--accent); text-decoration: none; margin-right: 1rem; display: inline-block; }
 .facts { display: grid; grid-template-columns: repeat(auto-fill, minmax(10.5rem, 1fr)); gap: .6rem; margin: 1rem 0; padding: 0; }
 .facts div { background: var(--tint); border-radius: .35rem; padding: .5rem .7rem; }
 .facts dt { color: var(--soft); font-size: .82rem; }

@@ -186,7 +186,7 @@ def _lines(runs: dict[int, Watch]) -> Part:
     rows = []
     for phi, run in runs.items():
         angle = coalescence_line_deg(run)
-        row = [phi, "not joined" if np.isnan(angle) else f"{angle:.2f}"]
+        row = [phi, "not joined" if np.isnan(angle) else f"{round(angle, 2) + 0.0:.2f}"]
         known = phi in published.PHI_DEG
         row += [f"{published.TIP_TO_TIP_ANGLE_DEG[phi]:.1f}" if known else None]
         rows.append([*row, *(f"{table[phi]:.2f}" if known else None for table in sources.values())])
