@@ -74,7 +74,9 @@ def _watched() -> Iterator[Watch]:
     from ..dda.block_solver import BlockSolver
     from ..dda.contacts import ContactFinder
 
-    watch, find, solve = Watch(), ContactFinder.find, BlockSolver.solve
+    watch, find = Watch(), ContactFinder.find
+    solve, roughly = BlockSolver.solve, BlockSolver.rough_solution
+    inside = False
 
     def timed_find(self, *given):
         began = time.perf_counter()
@@ -83,20 +85,31 @@ def _watched() -> Iterator[Watch]:
         finally:
             watch.search += time.perf_counter() - began
 
-    def timed_solve(self, data, right, *within):
-        began = time.perf_counter()
+    def timed(work, solutions, *given):
+        nonlocal inside
+        if inside:  # a rough solution that asks for an exact one counts once
+            return work(*given)
+        inside, began = True, time.perf_counter()
         try:
-            return solve(self, data, right, *within)
+            return work(*given)
         finally:
+            inside = False
             watch.solution += time.perf_counter() - began
-            watch.solutions += 1
-            watch.last = self, data, right
+            watch.solutions += solutions
 
-    ContactFinder.find, BlockSolver.solve = timed_find, timed_solve
+    def timed_solve(self, data, right, *within):
+        watch.last = self, data, right
+        return timed(solve, 1, self, data, right, *within)
+
+    def timed_roughly(self, data, within):
+        solution = timed(roughly, 0, self, data, within)
+        return lambda right: timed(solution, 1, right)
+
+    ContactFinder.find, BlockSolver.solve, BlockSolver.rough_solution = timed_find, timed_solve, timed_roughly
     try:
         yield watch
     finally:
-        ContactFinder.find, BlockSolver.solve = find, solve
+        ContactFinder.find, BlockSolver.solve, BlockSolver.rough_solution = find, solve, roughly
 
 
 def measure(quick: bool = False) -> Measured:

@@ -7,6 +7,8 @@ Schultz 1986), which brings the residual down to round-off.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
 
@@ -92,6 +94,8 @@ class BlockSolver:
         self._factors = Factors(points, rows, columns, np.float32 if self.n >= SINGLE else np.float64)
         self._factored = np.empty((self.n, 36))
         self._has_factors = False
+        self._rough: Factors | None = None
+        self._rough_serves = True
         #: ``shares``: factorisations, one that was done in part as that part.
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
 
@@ -116,6 +120,39 @@ class BlockSolver:
             # Beyond single precision: double from now on.
             self._factors, self._has_factors = Factors(*self._pattern), False
         return self._solved(data, right, within)
+
+    def rough_solution(self, data: np.ndarray, within: float) -> Callable[[np.ndarray], np.ndarray]:
+        """What gives x (6n,) for one right side after the other with a residual ``within`` that part of it, from factors in single
+        precision (half the time of double ones, where that is all the digits asked for), which leave those of `solve`
+        alone. Raises numpy.linalg.LinAlgError."""
+
+        def exactly(right: np.ndarray) -> np.ndarray:
+            return self.solve(data, right, within)
+
+        if self._factors.single or not self._rough_serves:
+            return exactly
+        if self._rough is None:
+            self._rough = Factors(*self._pattern, np.float32, self._factors.tree)
+        try:
+            self._rough.factor(data)
+        except np.linalg.LinAlgError:
+            self._rough_serves = False
+            return exactly
+        self.counts["factorisations"] += 1
+        self.counts["shares"] += 1.0
+
+        def solution(right: np.ndarray) -> np.ndarray:
+            x = np.zeros(len(right))
+            for k in range(2 + REFINEMENTS):
+                rest, target = (right, 0.0) if k == 0 else self._residual(data, right, x, within)
+                if np.abs(rest).max(initial=0.0) <= target:
+                    return x
+                x += self._rough.substitute(rest)
+                self.counts["substitutions"] += 1
+            self._rough_serves = False
+            return exactly(right)
+
+        return solution
 
     def _solved(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
         """`solve` with the factors as they are; None where single precision does not do."""

@@ -298,11 +298,19 @@ class Factors:
     """The factors of one pattern of 6×6 blocks, in ``dtype`` float64 or float32.
 
     ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both triangles
-    and the diagonal, sorted by row then column. The order of elimination is internal.
+    and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree`` already planned for
+    the same pattern.
     """
 
-    def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, dtype: type = np.float64):
-        self.tree: Tree = plan(points, rows, columns)
+    def __init__(
+        self,
+        points: np.ndarray,
+        rows: np.ndarray,
+        columns: np.ndarray,
+        dtype: type = np.float64,
+        tree: Tree | None = None,
+    ):
+        self.tree: Tree = plan(points, rows, columns) if tree is None else tree
         parent = self.tree.parent
         self._child, self._sibling = np.full(len(parent), -1), np.full(len(parent), -1)
         for f in range(len(parent) - 1, -1, -1):

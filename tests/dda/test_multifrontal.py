@@ -97,6 +97,22 @@ def test_single_precision_is_refined_to_the_same_residual(monkeypatch):
     assert np.abs(1e50 * x - expected).max() <= 1e-8 * np.abs(expected).max()
 
 
+def test_rough_solutions_have_the_residual_asked_for_and_leave_the_exact_ones_alone():
+    points, rows, columns, data = springs_between(600, seed=8)
+    data[rows == columns] += 1e3 * np.eye(6)
+    right, solver = np.random.default_rng(2).normal(size=3600), BlockSolver(points, rows, columns)
+    exact = solver.solve(data.ravel(), right)
+    rough = solver.rough_solution(3.0 * data.ravel(), 1e-4)
+    x = rough(right)
+    assert 0.0 < np.abs(solver.multiply(3.0 * data.ravel(), x) - right).max() <= 1e-4 * np.abs(right).max()
+    done = solver.counts["factorisations"]
+    assert np.array_equal(solver.solve(data.ravel(), right), exact)
+    assert solver.counts["factorisations"] == done
+    # Beyond the range of single precision they are the exact ones.
+    x = solver.rough_solution(1e50 * data.ravel(), 1e-4)(right)
+    assert np.abs(1e50 * x - exact).max() <= 1e-8 * np.abs(exact).max()
+
+
 def test_result_does_not_depend_on_threads(monkeypatch):
     points, rows, columns, data = springs_between(400, seed=5)
     right = np.ones(2400)
