@@ -33,7 +33,7 @@ _SHORT_OF = 0.99
 _CLEAR = 3.0
 #: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere, …
 _END, _STUCK = 1e-14, 1e-3
-#: … nor do so many in a row that are shorter than this.
+#: … and so many in a row that are shorter than this, hardly.
 _BLOCKED, _SHORT = 5, 0.05
 #: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their difference.
 _LEAST_LEFT = 1e-14
@@ -175,6 +175,11 @@ class CentralPath:
         self.missed, self.ended, self._blocked = 1.0, False, 0
 
     @property
+    def blocked(self) -> bool:
+        """Whether the last iterations hardly got ahead."""
+        return self._blocked >= _BLOCKED
+
+    @property
     def unknowns(self) -> np.ndarray:
         """(6 n,) the motion at hand."""
         return self._unknowns
@@ -262,7 +267,7 @@ class CentralPath:
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
         self._blocked = self._blocked + 1 if far < _SHORT else 0
         self.epsilon = epsilon
-        self.ended = not (epsilon > _END and far > _STUCK and self._blocked < _BLOCKED)
+        self.ended = not (epsilon > _END and far > _STUCK)
         return int(self._undecided().sum())
 
     def _products(self, normal, width, back, ahead, above, below) -> np.ndarray:

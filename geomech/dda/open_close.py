@@ -5,8 +5,8 @@ switched and the step solved again: Newton's method, which ends in two or three 
 lost for good, break only when all else is right.
 
 Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states returns,
-the `CentralPath` proposes states to go on from, unless contacts are few. If it is blocked, `RoundedLaws` do, and if they fail
-too, rounds of `LaggedFriction`, slowly and surely. If these end without, the sliding contacts stick
+the `CentralPath` proposes states to go on from, unless contacts are few. If it is blocked, `RoundedLaws` do (for more blocks than
+a dense matrix holds), and if they fail too, rounds of `LaggedFriction`, slowly and surely. If these end without, the sliding contacts stick
 again and only the worst contact of each block is switched, and if a combination still returns, only the first (the
 least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
 Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
@@ -213,15 +213,17 @@ def _settled(equations: _Equations, states: _States, answer: _Answer, iterations
     )
 
 
-def _proposed(path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int) -> tuple[_States | None, int]:
+def _proposed(
+    path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int, patient: bool
+) -> tuple[_States | None, int]:
     """States that the ``path`` proposes once nearly all contacts are decided, none of those ``offered`` already, or None if
-    it ends or takes more than ``budget`` iterations; and the iterations spent. Raises `Unsettled`."""
+    it ends, takes more than ``budget`` iterations or, unless ``patient``, is blocked; and the iterations spent. Raises `Unsettled`."""
     for spent in range(1, budget + 1):
         try:
             undecided = path.advance()
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
-        if path.ended:
+        if path.ended or (path.blocked and not patient):
             return None, spent
         if undecided <= max(2, _DECIDED * len(bonded)) and path.missed < _BALANCED:
             states = _States(*path.states(), bonded)
@@ -259,23 +261,24 @@ def _slower(
     equations: _Equations, answer: _Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
     """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (which knows of no
-    lift), and the solutions spent since the last. Raises `Unsettled`."""
-    of = equations
-    laws = RoundedLaws(
-        of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, path.unknowns,
-        float(np.sqrt(path.epsilon)),
-    )  # fmt: skip
-    told = 0
-    try:
-        for state, direction in laws.stages():
-            states = _States(state, direction, bonded)
-            if states.key not in offered:
-                offered.add(states.key)
-                yield states, laws.solutions - told
-                told = laws.solutions
-    except np.linalg.LinAlgError as error:
-        raise Unsettled(str(error)) from error
-    told = laws.solutions - told
+    lift), and the solutions spent since the last. Where the matrix is dense a hundred solutions cost little, and blocks
+    that topple one by one go the surer way at once. Raises `Unsettled`."""
+    of, told = equations, 0
+    if of.pattern.solver is not None:
+        laws = RoundedLaws(
+            of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, path.unknowns,
+            float(np.sqrt(path.epsilon)),
+        )  # fmt: skip
+        try:
+            for state, direction in laws.stages():
+                states = _States(state, direction, bonded)
+                if states.key not in offered:
+                    offered.add(states.key)
+                    yield states, laws.solutions - told
+                    told = laws.solutions
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        told = laws.solutions - told
     if not of.springs.lift.any():
         for states, spent in _lagged(equations, answer, bonded, offered, budget):
             yield states, told + spent
@@ -308,7 +311,7 @@ def settle(
     path: CentralPath | None = None
     slower: Iterator[tuple[_States, int]] | None = None
     caution, fewest, tries = _ALL, np.inf, 0
-    few = len(found) <= _FEW
+    few, small = len(found) <= _FEW, pattern.solver is None
     iteration = 0
     # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states fits.
     closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
@@ -355,7 +358,7 @@ def settle(
                     )
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration
-                proposal, spent = _proposed(path, states.bonded, offered, budget)
+                proposal, spent = _proposed(path, states.bonded, offered, budget, small)
                 iteration += spent
             seen.clear()
             if proposal is None:

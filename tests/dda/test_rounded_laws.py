@@ -66,7 +66,7 @@ def settled_both_ways(monkeypatch, blocks, friction: float):
     first = forces()
     asked = []
     stages = RoundedLaws.stages
-    monkeypatch.setattr(open_close, "_proposed", lambda path, bonded, offered, budget: (None, 0))
+    monkeypatch.setattr(open_close, "_proposed", lambda *_, **__: (None, 0))
     monkeypatch.setattr(open_close, "_lagged", lambda *_: iter(()))
     monkeypatch.setattr(RoundedLaws, "stages", lambda self: (asked.append(1), stages(self))[1])
     second = forces()
