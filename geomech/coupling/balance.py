@@ -27,8 +27,9 @@ DYNAMIC_TOLERANCE = 1e-4
 #: free flight has hardly any.
 STILL = 1e-3
 
-#: Passes at one geometry; they agree after two to eight. A lag that is left is corrected by the next step.
-COMPLIANCE_PASSES = 12
+#: Passes at one geometry; they agree after two to eight, or some more where faces of a block that is nearly cut through open and
+#: close. A lag that is left is corrected by the next step.
+COMPLIANCE_PASSES = 20
 
 
 @dataclass(frozen=True, eq=False)
