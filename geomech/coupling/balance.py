@@ -50,13 +50,15 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`.
     """
     settling = Settling()
-    tolerance = COMPLIANCE_TOLERANCE if now.problem.dda.dynamic_factor == 0.0 else DYNAMIC_TOLERANCE
+    static = now.problem.dda.dynamic_factor == 0.0
+    tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     result, iterations = None, 0
     for attempt in range(COMPLIANCE_PASSES):
         with now.timed("dda"):
             result = now.system.step(now.state, now.problem.loads, dt, now.response, load_time, result)
-            # Passes that took steps of unlike lengths would never agree.
-            dt = min(dt, result.dt)
+            if not static:
+                # Passes that took steps of unlike lengths would never agree. (In statics they share their load instead.)
+                dt = min(dt, result.dt)
             if load_time is not None and result.state.time != load_time:
                 result = replace(result, state=replace(result.state, time=load_time))
         iterations += result.statistics["open_close_iterations"]
