@@ -30,10 +30,6 @@ class Part:
 
     def add_to(self, page: Page) -> None:
         page.section(self.title)
-        self.add_below(page)
-
-    def add_below(self, page: Page) -> None:
-        """The same without its title."""
         page.text(*self.before)
         if self.rows:
             page.table(self.headers, self.rows)

@@ -148,7 +148,8 @@ def _growth(wings: Wings) -> Part:
     last = wings.run_off
     to_end = wings.height / 2 - wings.tip[last, 1]
     load, mm = wings.load[[0, last]] / MPA, np.array([wings.arrested, wings.wing[last], to_end]) * 1e3
-    shear = np.abs(wings.k[1:, 1] / wings.k[1:, 0]).max() if len(wings.k) > 1 else np.nan
+    opened = wings.k[1:][wings.k[1:, 0] > 0]
+    shear = np.abs(opened[:, 1] / opened[:, 0]).max() if len(opened) else np.nan
     words = [
         f"The first burst, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm; then each increment needs a higher load,",
         f"{len(wings.stable) - 1} times over. At {load[1]:.1f} MPa, {mm[1]:.0f} mm long and {mm[2]:.0f} mm from the specimen's",
