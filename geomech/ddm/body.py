@@ -275,15 +275,19 @@ class Body:
         try:
             return self._solved(load, warm, equilibrium_tolerance, history)
         except NotSolved as failure:
-            # The iteration was picked by the number of unknowns; elements that are very unlike stop it.
-            if self.settings.solver != "auto" or self.faces.n_unknowns + self.boundary.n_unknowns > FACTORABLE:
-                raise
-            _log.info("%s; factored instead", failure)
-            before = copy(self)
-            self.compressed, self._factored_after_all = False, True
-            vars(self).pop("face_equations", None)
-            self._assemble(before, self._outside.holds, False)
+            self._factor_after_all(failure)
             return self._solved(load, warm, equilibrium_tolerance, history)
+
+    def _factor_after_all(self, failure: NotSolved) -> None:
+        """The iteration was picked by the number of unknowns; elements that are very unlike, or parts that hardly hang
+        together, stop it. Raises ``failure`` where it was asked for, or where there are too many to factor."""
+        if self.settings.solver != "auto" or self.faces.n_unknowns + self.boundary.n_unknowns > FACTORABLE:
+            raise failure
+        _log.info("%s; factored instead", failure)
+        before = copy(self)
+        self.compressed, self._factored_after_all = False, True
+        vars(self).pop("face_equations", None)
+        self._assemble(before, self._outside.holds, False)
 
     def _solved(
         self,
@@ -409,13 +413,20 @@ class Body:
         if not self.faces.n:
             return np.zeros((3, 3))
         right = np.column_stack([-on_elements(self.faces, unit) for unit in np.eye(3)])
-        if sol is not None and self.rough:
-            jumps = self.face_equations.tangent(right, sol.face_states)
-        else:
-            closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
-            jumps = self.crack_system.constrained(right, closed, np.zeros_like(right))[0]
+        try:
+            jumps = self._jumps_of(right, sol)
+        except NotSolved as failure:
+            self._factor_after_all(failure)
+            jumps = self._jumps_of(right, sol)
         response = self.strain_weights @ jumps
         return 0.5 * (response + response.T)
+
+    def _jumps_of(self, right: np.ndarray, sol: Solution | None) -> np.ndarray:
+        """(n_unknowns, k) jumps under the loads ``right`` of the faces, with the states of ``sol``."""
+        if sol is not None and self.rough:
+            return self.face_equations.tangent(right, sol.face_states)
+        closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
+        return self.crack_system.constrained(right, closed, np.zeros_like(right))[0]
 
 
 def _same_loops(old: list[np.ndarray], new: list[np.ndarray]) -> bool:

@@ -95,6 +95,9 @@ def test_what_the_iteration_does_not_solve_is_factored(few, monkeypatch):
     assert body._outside.iterated
     np.testing.assert_allclose(factors(body.solve(load)), factors(dense), rtol=1e-12)
     assert not body._outside.iterated
+    # Its compliance alone, as of a body whose ligament is nearly cut.
+    other = ddm.Body([OUTLINE], network(1), ROCK)
+    np.testing.assert_allclose(other.compliance(), dense.body.compliance(), rtol=1e-12)
 
 
 BLOCK = np.array([[-1.0, -1.0], [6.0, -1.0], [6.5, 6.0], [-1.0, 6.0]])
