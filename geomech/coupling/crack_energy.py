@@ -24,7 +24,7 @@ class CrackEnergy:
     stored     around cracks, now
     friction   rubbed off between crack faces
     fracture   released at tips that grew
-    parting    released as blocks parted: the last ligaments, and what the cracks stored that are walls now
+    parting    released as tips met something and blocks parted: the last ligaments, and what the cracks stored that are walls now
     residual   work − stored − friction − fracture − parting: of increments and steps, and since blocks feel their cracks' mean
                strain only
     """
@@ -48,8 +48,11 @@ class CrackEnergy:
         keys = list(zip(tips["crack"].tolist(), tips["end"].tolist()))
         now = dict(zip(keys, release.tolist()))
         for key, (grown, before) in self._growing.items():
-            # A tip that has met something has no K any more.
-            self._released += 0.5 * grown * (before + now.get(key, before))
+            if key in now:
+                self._released += 0.5 * grown * (before + now[key])
+            else:
+                # A tip that has met something: G rises without bound as the last ligament goes, its integral by no rule.
+                self._parted = True
         turned = (tips["k_eq"] ** 2 / modulus).tolist()
         self._growing = {
             key: (grown, before) for key, grown, before in zip(keys, tips["grown"].tolist(), turned) if grown > 0
