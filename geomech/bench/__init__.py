@@ -21,6 +21,7 @@ TOPICS = {
     "many": "geomech.bench.many_cracks",
     "output": "geomech.bench.output_cost",
     "schemes": "geomech.bench.block_schemes",
+    "skips": "geomech.bench.skips",
     "stability": "geomech.bench.stability",
     "startup": "geomech.bench.startup",
     "steps": "geomech.bench.load_steps",

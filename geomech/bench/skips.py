@@ -1,0 +1,169 @@
+"""What a scene does not need is not done: what each of these skips saves, and that its results are the same.
+
+Every row is the same work twice in one process, without the skip and with it, the shorter of two times each; the difference is
+the largest of the states' coordinates and stress intensity factors, relative. Modules are counted in processes of their own.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from ..model import Cracks, Problem, State
+from . import block_scenes, coupling_cost
+from .figures import Measured
+
+SPECIMEN = Path("pipelines/two_cracks/toml.toml")
+#: What a scene of blocks alone must not load, nor one of cracks that writes no interior fields.
+CRACK_SOLVER, MESHER, PICTURES = "geomech.ddm.body", "gmsh", "vtkmodules"
+
+#: A run's results: coordinates and stress intensity factors.
+Results = list[np.ndarray]
+
+
+def measure(quick: bool = False) -> Measured:
+    """The table. Raises AssertionError when results with a skip are not those without it."""
+    rows = [*_rows(quick)]
+    width = max(len(label) for label, *_ in rows)
+    lines = [f"{'what is not done':<{width}}     without      with    times   difference"]
+    differences, times = {}, {}
+    for label, without, with_it, difference in rows:
+        lines.append(
+            f"{label:<{width}}  {1e3 * without:8.1f} ms {1e3 * with_it:8.1f} ms {without / with_it:7.1f}   {difference:8.1e}"
+        )
+        differences[label], times[label] = difference, with_it
+    worst = max(differences.values())
+    # Kept factors are renewed by rows and columns, which is round-off; all else is the same to the bit.
+    if worst > 1e-9:
+        raise AssertionError(f"results with and without a skip differ by {worst:.1e}")
+    lines += ["", *_modules()]
+    return Measured.of("\n".join(lines), errors=differences, times=times)
+
+
+def _rows(quick: bool) -> Iterator[tuple[str, float, float, float]]:
+    cracked = coupling_cost.wall(60 if quick else 200, 20)
+    cracked = replace(cracked, run=replace(cracked.run, end_time=4.5 * coupling_cost.TIME_STEP))
+    label = "bodies, factors and compliances of what has not changed: a wall with 20 cracked bricks, 5 steps"
+    yield label, *_twice(lambda skip: _coupled(replace(cracked, run=replace(cracked.run, skip=skip))))
+    if SPECIMEN.exists():
+        specimen = _specimen(0.3 if quick else 1.0)
+        label = "the same while cracks grow: the two-crack specimen"
+        yield label, *_twice(lambda skip: _coupled(replace(specimen, run=replace(specimen.run, skip=skip))))
+        yield (
+            "fields inside the blocks, which were not asked for: the same run, written",
+            *_twice(lambda skip: _written(specimen, interior=not skip)),
+        )
+    yield "search for pairs of blocks that have hardly moved: a wall of 1000, 20 searches", *_twice(_searches)
+    blocks_alone = replace(cracked, cracks=Cracks.from_polylines([]))
+    yield (
+        "the coupling, where nothing is cracked: that wall against the block solver alone",
+        *_twice(lambda skip: _blocks(blocks_alone) if skip else _coupled(blocks_alone)),
+    )
+
+
+def _twice(run: Callable[[bool], Results]) -> tuple[float, float, float]:
+    """Seconds without the skip, with it, and the difference of the results. Everything is run once before."""
+    run(True)
+    spent: dict[bool, list[float]] = {False: [], True: []}
+    found: dict[bool, Results] = {}
+    for skip in (False, True, False, True):
+        began = time.perf_counter()
+        found[skip] = run(skip)
+        spent[skip].append(time.perf_counter() - began)
+    difference = max(
+        (
+            float(np.abs(a - b).max() / np.abs(b).max())
+            for a, b in zip(found[True], found[False], strict=True)
+            if a.size
+        ),
+        default=0.0,
+    )
+    return min(spent[False]), min(spent[True]), difference
+
+
+def _coupled(problem: Problem) -> Results:
+    from ..coupling import cycles
+
+    *_, last = cycles(problem)
+    factors = np.concatenate([last.tips["k_i"], last.tips["k_ii"]]) if len(last.tips) else np.empty(0)
+    return [last.state.vertices, factors]
+
+
+def _blocks(problem: Problem) -> Results:
+    from .. import dda
+
+    states = dda.run(
+        problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, problem.run.end_time
+    )
+    *_, last = states
+    return [last.vertices, np.empty(0)]
+
+
+def _specimen(part: float) -> Problem:
+    """The two-crack specimen, φ = 0, to that ``part`` of the load at which its cracks join."""
+    from ..scene import load_scene
+
+    return load_scene(SPECIMEN, [f"run.end_time_s={1050 * part:g}"], "phi_0").problem()
+
+
+def _written(problem: Problem, interior: bool) -> Results:
+    from ..coupling import cycles
+    from ..output.series import Series
+
+    with TemporaryDirectory() as folder:
+        observer = Series(interior_every=5 if interior else 0)
+        observer.on_start(problem, Path(folder))
+        for last in cycles(problem):
+            observer.on_cycle(last)
+        observer.on_end({})
+    return [last.state.vertices, np.concatenate([last.tips["k_i"], last.tips["k_ii"]])]
+
+
+def _searches(skip: bool) -> Results:
+    """Pairs of blocks at rest but for a thousandth of the window a time, sought anew or kept; each list as a set of results."""
+    from ..dda import near_pairs
+
+    blocks = block_scenes.wall(1000)
+    window, vertices = 0.01, State.at_rest(blocks).vertices
+    kept = near_pairs.NearPairs(blocks.vertex_start, blocks.fixed)
+    box = near_pairs.boxes(vertices, blocks.vertex_start[:-1])
+    near = [
+        kept.of(vertices + 1e-5 * k, window) if skip else near_pairs.near_pairs(box, blocks.fixed, 2.0 * window)
+        for k in range(20)
+    ]
+    return [pairs.astype(float) for pairs in near[-1:]]
+
+
+def _modules() -> list[str]:
+    """What runs load, each in a process of its own; AssertionError where one loads what it does not need."""
+    from .startup import COMMANDS
+
+    lines = ["modules that a run does not load"]
+    for label, unwanted, wishes in (
+        ("run, blocks alone (Gmsh)", (CRACK_SOLVER, PICTURES), []),
+        ("run, cracks too (TOML)", (MESHER, PICTURES), ["--set", "output.interior=false"]),
+    ):
+        command = COMMANDS[label]
+        scene = Path(command[1])
+        if not scene.exists():
+            continue
+        with TemporaryDirectory() as folder:
+            code = (
+                "import sys\nfrom geomech.cli import main\n"
+                f"main({[*command, *wishes, '--quiet', '--out', folder]!r})\n"
+                "print(*sorted(sys.modules))"
+            )
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        loaded = set(done.stdout.splitlines()[-1].split())
+        there = [name for name in unwanted if name in loaded]
+        if there:
+            raise AssertionError(f"{label} loads {', '.join(there)}")
+        lines.append(f"  {label}{' without interior fields' if wishes else ''}: neither {' nor '.join(unwanted)}")
+    return lines
