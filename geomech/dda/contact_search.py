@@ -4,8 +4,10 @@ A vertex meets the interior of an edge when its corner points away from the edge
 through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
 entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
 within the other's edge; where each lies within the other's, the two corners are the ends of a short common face, and both
-stand for the line. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
-smaller penetration carries the contact; each is stored as the other's *partner*.
+stand for the line. An edge bounds its block no farther than to its other end: corners that are beyond it do not meet there,
+however near they are (outlines that a crack has left have edges shorter than the window). When two lines remain, the corners
+overlap only if both gaps are negative, and the line of the smaller penetration carries the contact; each is stored as the
+other's *partner*.
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ _ANGLE = 0.05
 _PARALLEL = 0.0025
 # Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
 _ENDS = 1e-4
+# Corners that are past the far end of an edge by more than this part of it are not met by its line; a corner that is pressed
+# into the face behind a short riser is past the riser's end by what it penetrates.
+_PAST = 0.1
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
 
@@ -121,8 +126,8 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
     pick_edge = np.empty(4, np.int64)
     rows = np.empty(4, np.int64)
     pick = np.empty(
-        (4, 6)
-    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside
+        (4, 7)
+    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside, distance past its far end
     twin = np.empty(4, np.int64)  # the other end of the same face
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
@@ -157,6 +162,7 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                     nx, ny = sign * nx, sign * ny
                     outside = max(0.0, -along, along - length)
                     inside = min(along, length - along)
+                    past = along - length if edge == v or edge == w else -along
                     same = -1
                     for k in range(n_lines):
                         if pick[k, 0] * nx + pick[k, 1] * ny > 1.0 - _PARALLEL:
@@ -184,11 +190,12 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                         twin[k] = -1
                     pick_vertex[k], pick_edge[k] = vertex, edge
                     pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
-                    pick[k, 5] = inside
-                widest = -np.inf
+                    pick[k, 5], pick[k, 6] = inside, past
+                widest, met = -np.inf, True
                 for k in range(n_lines):
                     widest = max(widest, pick[k, 2])
-                if widest > window:
+                    met = met and pick[k, 6] <= _PAST * pick[k, 4]
+                if widest > window or not met:
                     continue
                 if count + 4 > table.shape[0]:
                     return -1

@@ -121,3 +121,19 @@ def test_a_short_common_face_is_held_at_both_ends(tilt):
     ends = [k for k, pair in enumerate(table[:, :2].tolist()) if pair in ([2, 4], [4, 2])]
     # The line beside the corners is crossed by both; the ends do not wait for each other.
     assert not np.isin(table[ends, 2:], ends).any()
+
+
+@pytest.mark.parametrize("window", [0.004, 0.05, 0.3])
+def test_faces_that_a_crack_has_left_touch_and_do_not_overlap(window):
+    """A bump of facets shorter than the window in its own imprint: lines of far facets are crossed, their blocks are not."""
+    x = np.array([-0.05, -0.03, -0.01, 0.0, 0.01, 0.03, 0.05])
+    bump = np.column_stack([x, 1.0 + 0.0026 * (1 - (x / 0.05) ** 2)])
+    below = np.vstack([[[-2, 0], [2, 0], [2, 1]], bump[::-1], [[-2, 1]]])
+    above = np.vstack([[[-2, 1]], bump, [[2, 1], [2, 2], [-2, 2]]])
+    table, geometry, _ = search([below, above], window=window)
+    gap = geometry[:, 3]
+    for row in np.flatnonzero(gap < -1e-12):  # where corners offer two lines, they are apart if one of the gaps is open
+        partners = table[row, 2:][table[row, 2:] >= 0]
+        assert (gap[partners] > -1e-12).any()
+    # Level ends of the faces, and the facets in their imprint.
+    assert (np.abs(gap) < 1e-12).sum() >= 6
