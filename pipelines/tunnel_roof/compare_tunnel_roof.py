@@ -1,0 +1,151 @@
+"""The roof block's bridge and fall, beside statics, fracture mechanics and Newton."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from geomech.model import Cycle
+from geomech.reference import roof_block as published
+
+#: The bridge is a fortieth of the parting, not of half-planes, and the roof above it bends a little: measured 0.1 to 0.4 %.
+FORCE_TOLERANCE = 0.006
+#: The bending of the roof shears the bridge (K_II/K_I 0.05 to 0.15): it breaks at up to 1.5 (K_II/K_I)² below the load at which
+#: K_I alone would do it (`maximum tangential stress`), which statics and K_I know nothing of.
+LOAD_TOLERANCE = 0.04
+#: Way of a block in free fall is exact in the time scheme; sliding friction keeps five digits, less the walls' own springs.
+FALL_TOLERANCE, SLIDE_TOLERANCE = 1e-6, 2e-3
+#: Of a block that is held, m: what springs and rock give under a weight of 23 t.
+HELD = 1e-4
+
+
+@dataclass
+class Watch:
+    """Observer: what a run says of its bridge and its block.
+
+    weight, thrust  N/m at full gravity; ``half_angle``, ``friction`` rad, of the side joints
+    bridge          m, half its width; ``toughness`` Pa √m
+    wall_mass       kg/m of one of the walls
+    rows            (time s, way of the block down m) of every cycle
+    broke           (part of the full load, K_I, K_II) at the last load before the bridge grew shorter; None: it has not
+    """
+
+    rows: list[tuple[float, float]] = field(default_factory=list)
+    broke: tuple[float, float, float] | None = None
+    parted: bool = False
+
+    def on_start(self, problem, folder) -> None:
+        blocks, loads = problem.blocks, problem.loads
+        corners = np.array([[-2.5, 5.0], [2.5, 5.0], [2.0, 7.0], [-2.0, 7.0]])
+        x, y = corners.T
+        area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+        gravity = -loads.gravity.at(10.0)[1]
+        roof = next(k for k, name in enumerate(blocks.names) if name.startswith("roof"))
+        wall = blocks.names.index("left")
+        self.gravity = gravity
+        self.weight = area * problem.materials[blocks.material[roof]].density * gravity
+        self.toughness = problem.materials[blocks.material[roof]].k_ic
+        self.wall_mass = blocks.areas()[wall] * problem.materials[blocks.material[wall]].density
+        self.thrust = 7.0 * max(abs(each.history.at(10.0)).max() for each in loads.edge_tractions)
+        self.half_angle = math.atan2(x[1] - x[2], y[2] - y[1])
+        self.friction = max(law.friction_angle for law in problem.joints)
+        ends = problem.cracks.nodes
+        self.bridge = float(np.abs(ends[:, 0]).min()) if len(ends) else 0.0
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        if self.broke is None and len(cycle.tips) and (cycle.tips["grown"] > 0).any():
+            self.broke = (cycle.state.time, float(cycle.tips["k_i"].mean()), float(np.abs(cycle.tips["k_ii"]).mean()))
+        self.parted |= any(event.kind == "split" for event in cycle.events)
+        self.rows.append((cycle.state.time, -float(cycle.monitors["block"][1])))
+
+    def on_end(self, summary, error=None) -> None:
+        self.time, self.way = np.array(self.rows).T
+
+    @property
+    def force(self) -> float:
+        """Of the bridge, N/m, under full load, that its K_I tells."""
+        load, k_i, _ = self.broke
+        return k_i * math.sqrt(math.pi * self.bridge) / load
+
+    @property
+    def statics(self) -> float:
+        """The same by statics."""
+        return published.bridge_force(self.weight, self.thrust, self.half_angle, self.friction)
+
+    @property
+    def breaks(self) -> float:
+        """Part of the full load at which that force gives K_I = K_Ic."""
+        return self.toughness / published.ligament_factor(self.statics, self.bridge)
+
+    @property
+    def fell(self) -> bool:
+        """Whether the run went on in real time."""
+        return self.time[-1] > 1.2
+
+    @property
+    def newton(self) -> float:
+        """Acceleration of the freed block, m/s²."""
+        return published.acceleration(
+            self.weight, self.thrust, self.half_angle, self.friction, self.wall_mass, self.gravity
+        )
+
+    @property
+    def acceleration(self) -> float:
+        """m/s², from three places at full weight: nothing of how the fall began is left in it."""
+        end = self.time[-1]
+        a, b, c = (np.interp(end - back, self.time, self.way) for back in (0.2, 0.1, 0.0))
+        return float((c - 2 * b + a) / 0.1**2)
+
+
+def report(runs: Mapping[str, Watch]) -> str:
+    """The comparison as text."""
+    lines = [
+        "The bridge: force on it from K_I, and the part of the full load at which it breaks",
+        f"  {'':10s} force, kN/m  W − 2H tan(φ − α)  breaks at  K_Ic √(πc) over that force",
+    ]
+    for name, run in runs.items():
+        if run.broke is not None:
+            lines.append(
+                f"  {name:10s} {run.force / 1e3:11.2f} {run.statics / 1e3:18.2f} {run.broke[0]:10.4f} {run.breaks:27.4f}"
+            )
+    lines += ["Then: acceleration under full gravity", f"  {'':10s} m/s²      Newton's    way, m"]
+    for name, run in runs.items():
+        if run.fell:
+            lines.append(f"  {name:10s} {run.acceleration:8.5f}  {run.newton:8.5f} {run.way[-1]:9.5f}")
+    return "\n".join(lines)
+
+
+def check(runs: Mapping[str, Watch]) -> None:
+    """AssertionError when one of them is missed by more than its tolerance."""
+    for name, run in runs.items():
+        if run.broke is not None:
+            assert run.parted, f"{name}: the bridge has not parted"
+            assert abs(run.force / run.statics - 1) < FORCE_TOLERANCE, (
+                f"{name}: the bridge's force is not that of statics"
+            )
+            assert abs(run.broke[0] / run.breaks - 1) < LOAD_TOLERANCE, f"{name}: the bridge does not break at its K_Ic"
+        if run.fell and run.newton == 0.0:
+            assert run.way[-1] < HELD, f"{name}: a block that its walls hold has come down"
+        elif run.fell:
+            tolerance = FALL_TOLERANCE if run.thrust < 1e-3 * run.weight else SLIDE_TOLERANCE
+            assert abs(run.acceleration / run.newton - 1) < tolerance, (
+                f"{name}: the block does not fall as Newton has it"
+            )
+
+
+def draw(runs: Mapping[str, Watch], file: Path) -> None:
+    """Ways of the blocks over time, beside what they must be."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6, 4), layout="constrained")
+    axes = figure.subplots()
+    for name, run in runs.items():
+        if run.fell:
+            axes.plot(run.time, -run.way, label=name.replace("_", " "))
+    axes.set(xlabel="time, s (weight and thrust grow until 1 s)", ylabel="the block's height, m")
+    axes.legend()
+    figure.savefig(file, dpi=120)
