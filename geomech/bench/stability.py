@@ -1,4 +1,5 @@
-"""Where the block solver stays right: maps over penalty, time step, contrasts, slivers, offsets, overlaps, speeds, debris.
+"""Where the solvers stay right. The block solver: maps over penalty, time step, contrasts, slivers, offsets, overlaps, speeds,
+debris; cracks and cracked blocks: `crack_limits`.
 
 Every cell is a small scene with a reference that was not computed with it: right (within the bound said), refused with a
 reason, reported (beyond the bound, and a warning says so), or wrong. The bounds leave room for true elasticity only.
@@ -7,120 +8,47 @@ reason, reported (beyond the bound, and a warning says so), or wrong. The bounds
 from __future__ import annotations
 
 import json
-import logging
-import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from .. import dda
+from . import crack_limits
 from . import stability_scenes as scenes
 from .figures import Measured
-from .stability_scenes import Outcome
-
-RIGHT, REPORTED, REFUSED, WRONG = "right", "reported", "refused", "wrong"
-
-
-@dataclass(frozen=True)
-class Cell:
-    map: str
-    row: str
-    column: str
-    verdict: str
-    error: float
-    penetration: float
-    gain: float
-    cuts: int
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Map:
-    """A grid of scenes: ``scene(row, column)`` for every pair of values; right where its error is below ``bound``."""
-
-    title: str
-    measure: str
-    row_name: str
-    rows: Sequence[float]
-    column_name: str
-    columns: Sequence[float]
-    bound: float
-    scene: Callable[[float, float], Outcome]
-
-    def cells(self) -> Iterator[Cell]:
-        for row in self.rows:
-            for column in self.columns:
-                verdict, found, reason = self._judged(row, column)
-                yield Cell(self.title, f"{row:g}", f"{column:g}", verdict, **asdict(found), reason=reason)
-
-    def _judged(self, row: float, column: float) -> tuple[str, Outcome, str]:
-        heard = _Warnings()
-        log = logging.getLogger("geomech")
-        log.addHandler(heard)
-        try:
-            found = self.scene(row, column)
-        except (ValueError, dda.NotConverged) as refusal:
-            return REFUSED, Outcome(math.nan, math.nan, math.nan), str(refusal)
-        finally:
-            log.removeHandler(heard)
-        if found.error <= self.bound:
-            return RIGHT, found, ""
-        return (REPORTED, found, heard.first) if heard.first else (WRONG, found, "")
-
-
-class _Warnings(logging.Handler):
-    """Keeps the first warning it hears."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.first = ""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.first = self.first or record.getMessage()
+from .stability_grid import QUANTITIES, REFUSED, REPORTED, RIGHT, WRONG, Map, table
 
 
 def measure(quick: bool = False) -> Measured:
-    """The maps as text; JSON and a picture go to outputs/stability. ``quick`` takes every other value."""
-    from ..render.stability_map import draw
+    """The maps as text; JSON and pictures of the verdicts, and of condition numbers, residuals, energy gained and penetration
+    go to outputs/stability. ``quick`` takes every other value."""
+    from ..render.stability_map import draw, draw_quantity
 
-    maps = list(_maps(quick))
+    of_blocks, of_cracks = list(_maps(quick)), list(crack_limits.maps(quick))
+    maps = of_blocks + of_cracks
     lines, every = [], []
     for grid in maps:
         cells = list(grid.cells())
         every += cells
-        lines += [*_table(grid, cells), ""]
+        lines += [*table(grid, cells), ""]
     counts = Counter(cell.verdict for cell in every)
     lines.append("  ".join(f"{counts[verdict]} {verdict}" for verdict in (RIGHT, REPORTED, REFUSED, WRONG)))
     folder = Path("outputs/stability")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "stability.json").write_text(json.dumps([asdict(cell) for cell in every], indent=1), encoding="utf-8")
-    draw(maps, every, folder / "stability.png")
-    lines.append(f"{folder}/stability.json, {folder}/stability.png")
+    draw(of_blocks, every, folder / "stability.png")
+    draw(of_cracks, every, folder / "cracks.png")
+    for quantity, name in QUANTITIES.items():
+        draw_quantity(maps, every, quantity, name, folder / f"{quantity}.png")
+    pictures = ["stability", "cracks", *QUANTITIES]
+    lines.append(", ".join([f"{folder}/stability.json", *(f"{name}.png" for name in pictures)]))
     # Not each cell's own: many are round-off. A cell that was right and is not, shows in the share.
     wrong = {f"{grid.title}: share of cells not right": 0.0 for grid in maps}
     for grid in maps:
         verdicts = [cell.verdict for cell in every if cell.map == grid.title]
         wrong[f"{grid.title}: share of cells not right"] = 1 - verdicts.count(RIGHT) / len(verdicts)
     return Measured.of("\n".join(lines), errors=wrong)
-
-
-def _table(grid: Map, cells: Sequence[Cell]) -> Iterator[str]:
-    yield f"{grid.title}: {grid.measure} (right below {grid.bound:g}); {grid.row_name} down, {grid.column_name} across"
-    yield " " * 10 + "".join(f"{value:>11g}" for value in grid.columns)
-    for k, row in enumerate(grid.rows):
-        mine = cells[k * len(grid.columns) : (k + 1) * len(grid.columns)]
-        marks = (
-            f"{c.error:.1e}" + ("!" if c.verdict == WRONG else "") if c.verdict != REFUSED else "refused" for c in mine
-        )
-        yield f"{row:>10g}" + "".join(f"{mark:>11}" for mark in marks)
-    for verdict in (REFUSED, REPORTED):
-        for reason in sorted({c.reason for c in cells if c.verdict == verdict})[:2]:
-            yield f"    {verdict}: {reason}"
-    worst = max((c.penetration for c in cells if c.verdict != REFUSED), default=0.0)
-    gain = max((c.gain for c in cells if c.verdict != REFUSED), default=0.0)
-    yield f"    worst penetration {worst:.1e} of a block, energy gain {gain:.1e}, {sum(c.cuts for c in cells)} steps cut"
 
 
 def _maps(quick: bool) -> Iterator[Map]:

@@ -22,12 +22,14 @@ WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
 @dataclass(frozen=True)
 class Outcome:
     """What a scene did: ``error`` in the measure that its map states; ``penetration`` in block sizes; ``gain`` of mechanical
-    energy over all there was; ``cuts`` of steps."""
+    energy over all there was; ``cuts`` of steps; ``condition`` number and ``residual`` of the equations. nan: there are none."""
 
     error: float
-    penetration: float = 0.0
-    gain: float = 0.0
+    penetration: float = math.nan
+    gain: float = math.nan
     cuts: int = 0
+    condition: float = math.nan
+    residual: float = math.nan
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:

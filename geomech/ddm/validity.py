@@ -9,6 +9,8 @@ import numpy as np
 from ..model import Cracks
 from ..model.polygon import signed_area
 
+#: Coordinates must resolve a segment to this part of its length: K is off by some fifty times that (its elements are shorter).
+FEWEST_DIGITS = 1e-5
 #: Lengths below this part of the extent are zero.
 _SMALL = 1e-9
 #: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: there K begins to be off by more
@@ -98,6 +100,14 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
         raise ValueError(f"{name(int(np.argmin(cracks.lengths)))}: a crack segment has no length")
     if not (cracks.aperture >= 0).all():
         raise ValueError(f"{name(int(np.argmin(cracks.aperture)))}: an aperture must not be negative")
+    digits = np.spacing(np.abs(segments).max(axis=(1, 2))) / cracks.lengths
+    if (digits > FEWEST_DIGITS).any():
+        s = int(np.argmax(digits))
+        x, y = segments[s, 0]
+        raise ValueError(
+            f"{name(s)}: its segment of {cracks.lengths[s]:.3g} m at ({x:g}, {y:g}) is too short for coordinates that large, which "
+            f"have steps of {digits[s] * cracks.lengths[s]:.1g} m: count them from an origin near the rock"
+        )
     fresh = np.ones(n, bool) if fresh is None else fresh
     new = np.flatnonzero(fresh)
     if not len(new):
