@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import JointTable, Springs, contact_springs, penalties
 from .curved_joints import CurvedJoints
@@ -46,6 +47,7 @@ class ContactSet:
     wear, lift                 m: way slid to and fro, and how far that has forced the faces apart
     stretch                    m: motion along the edge that the multipliers of sticking contacts still have to take back
     relies_on_glue             corners have been left out that hold as long as all bonds do
+    faces                      those that bonds hold at both ends; None without any
     tried                      state and direction that open–close iterations begin with, where these are others
     """
 
@@ -68,6 +70,7 @@ class ContactSet:
     lift: np.ndarray
     stretch: np.ndarray
     relies_on_glue: bool = False
+    faces: BondedFaces | None = None
     tried: tuple[np.ndarray, np.ndarray] | None = None
 
     def trying(self, rows: np.ndarray) -> ContactSet:
@@ -191,6 +194,9 @@ class ContactFinder:
             partner, geometry = _among(keep, partner), geometry[keep]
             springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
             remembered = {name: value[keep] for name, value in remembered.items()}
+        bonded, faces = remembered["bonded"], None
+        if bonded.any():
+            faces = BondedFaces.of(block, other, partner, geometry, bonded)
         return ContactSet(
             vertex=vertex,
             edge=edge,
@@ -202,6 +208,7 @@ class ContactFinder:
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
             relies_on_glue=glued is not None,
+            faces=faces,
             **remembered,
         )
 

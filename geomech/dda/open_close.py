@@ -21,6 +21,7 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
+from .bonded_faces import check_faces
 from .central_path import CentralPath
 from .contact_springs import Springs
 from .contact_states import check_states, contact_forces
@@ -189,6 +190,11 @@ class _Equations:
             forces, found.partner, found.rounding, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
             known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
         )  # fmt: skip
+        if (faces := found.faces) is not None:
+            check_faces(
+                faces.start, faces.rows, faces.arm, faces.length, forces, state, bonded, known.normal, known.shear, known.friction,
+                known.peak, known.hold, known.cohesion, known.tension, known.keeps, self.slack, *called, violation,
+            )  # fmt: skip
         return _Answer(unknowns, forces, _States(*called), violation, missed, slip, springs, gap)
 
 

@@ -95,7 +95,9 @@ def stop(
     resisted, pushed = -sense * settled.shear_force[rows], settled.normal_force[rows]
     slips = settled.state[rows] == SLIP
     slope, firm = np.where(slips | stopped.stops, springs.friction[rows], springs.peak[rows]), springs.hold[rows]
-    firm = np.where(slips | stopped.stops, springs.sliding[rows], firm + settled.bonded[rows] * springs.cohesion[rows])
+    firm = np.where(
+        slips | stopped.stops, springs.sliding[rows], firm + (settled.bonded[rows] > 0) * springs.cohesion[rows]
+    )
     strength = np.maximum(slope * pushed + firm, np.abs(resisted))
     # Friction all along, which those that slid to the end had, leaves the speed ``full``.
     full, bound = np.where(slips, u1, np.nan), np.full(len(rows), np.nan)

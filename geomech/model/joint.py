@@ -70,7 +70,8 @@ class Roughness:
 
 @dataclass(frozen=True)
 class JointLaw:
-    """Strength and stiffness of a joint; strengths are Pa (times a contact's tributary length), angles rad.
+    """Strength and stiffness of a joint; strengths are Pa (times a contact's tributary length), angles rad. A bonded face fails
+    as one, in tension at its extreme fibre, in shear by c ℓ + N tan φ of all of it.
 
     friction_angle, cohesion    of the joint before it has slipped (its peak); with ``roughness`` the angle is φr
     tensile_strength            lost with the cohesion's peak when either fails

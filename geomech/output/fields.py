@@ -97,7 +97,7 @@ SERIES: dict[str, tuple[Field, ...]] = {
             "bonded",
             "point",
             "-",
-            "1 while cohesion and tensile strength hold, 2 after slip that wears cohesion",
+            "1 while cohesion and tensile strength hold, 2 after slip that wears cohesion, 3 cracked from the edge of its face",
             dtype="int32",
         ),
         Field("block_id", "point", "-", "owner of the vertex", dtype="int32"),

@@ -76,9 +76,9 @@ def test_bonds_break_only_where_they_must():
     polygons = [rectangle(-1, -1, 0, 2)] + [rectangle(k, 0, k + 1, 1) for k in range(5)]
     blocks = Blocks.from_polygons(polygons, fixed=[True] + [False] * 5)
     moment = 2600 * 9.81 * 5 * 2.5
-    # Contacts at the two ends of a 1 m joint with half a metre each carry M / 1 m.
+    # The extreme fibre of a 1 m joint carries 6 M / (1 m)².
     for share, holds in ((2.0, True), (0.5, False)):
-        joint = JointLaw("glue", friction_angle=0.5, cohesion=1e7, tensile_strength=share * moment / 0.5)
+        joint = JointLaw("glue", friction_angle=0.5, cohesion=1e7, tensile_strength=share * 6 * moment)
         system = dda.BlockSystem(
             blocks, [Material("rock", 10e9, 0.25, density=2600.0)], [joint],
             settings=DdaSettings(max_displacement_ratio=0.5),

@@ -40,13 +40,12 @@ def test_plane_failure_with_friction_to_round_off(friction_deg, penalty, time_st
 
 @pytest.mark.parametrize(("friction_deg", "cohesion"), [(40, 5e3), (40, 15e3), (20, 15e3)])
 def test_plane_failure_with_cohesion(friction_deg, cohesion):
-    # Cohesion is brittle: the joint is soft beside the rock, or one end of it fails before the other is used. What is left of
-    # that costs 0.2 %; the trials bracket the factor to 0.2 %.
-    law = JointLaw("plane", np.radians(friction_deg), cohesion, normal_stiffness=1e9, shear_stiffness=1e8)
+    # The trials bracket the factor to 0.2 %.
+    law = JointLaw("plane", np.radians(friction_deg), cohesion)
     expected = rock_slopes.plane_failure_factor(SLAB, DIP, 4.0, cohesion, np.radians(friction_deg))
     found = slab(law)
     print(f"φ = {friction_deg}°, c = {cohesion / 1e3:g} kPa: {found.factor:.4f}, should be {expected:.4f}")
-    assert found.factor == pytest.approx(expected, rel=4e-3)
+    assert found.factor == pytest.approx(expected, rel=2e-3)
 
 
 def test_plane_failure_of_a_rough_joint():
@@ -92,14 +91,14 @@ def test_two_blocks_on_a_bilinear_plane(steep_deg, flat_deg, smooth):
 
 
 def test_a_column_glued_to_an_incline_topples():
-    # Held by the tensile strength σt of the upper half of its base, b/2, at the arm b about its toe:
-    # F = σt b²/2 / [W (h sin α − b cos α)/2]. Brittle: no drift points at it, bisection does.
-    dip, width, height, strength = np.radians(25), 1.0, 4.0, 30e3
+    # Held by the tensile strength σt at the upper edge of its base (Navier), where its weight pulls by
+    # W (3 h sin α / b − cos α)/b: F = σt b / [W (3 h sin α / b − cos α)]. Brittle: no drift points at it, bisection does.
+    dip, width, height, strength = np.radians(25), 1.0, 4.0, 200e3
     polygons = [turned(rectangle(-3, -2, 8, 0), dip), turned(rectangle(2, 0, 2 + width, height), dip)]
     blocks = Blocks.from_polygons(polygons, fixed=[True, False])
     found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("glue", np.radians(50), 1e6, strength)], WEIGHT)
     weight = 2600 * GRAVITY * width * height
-    expected = 0.5 * strength * width**2 / (0.5 * weight * (height * np.sin(dip) - width * np.cos(dip)))
+    expected = strength * width / (weight * (3 * height * np.sin(dip) / width - np.cos(dip)))
     assert found.factor == pytest.approx(expected, rel=1e-3)
     assert "turning left" in found.mechanism[0]
 

@@ -47,26 +47,24 @@ def slab(law: JointLaw) -> dda.BlockSystem:
 def test_plane_failure_by_strength_reduction(cohesion):
     """Cohesion and tan φ divided by F until the slab goes: FoS = (c A + W cos α tan φ)/(W sin α).
 
-    The formula holds where all of the joint fails at once. Cohesion is brittle, so the joint must be soft beside the rock
-    (0.1 GPa/m): on springs forty times as stiff as the rock the slab's own strain loads one end of its base twice as much
-    as the other, that end fails first, and half of the cohesion is lost before the rest is used.
+    The formula holds where all of the joint fails at once, as a bonded face does however unevenly its ends are loaded.
     """
     weight = 2600 * GRAVITY * 2 * 4 * np.cos(DIP)
     expected = rock_slopes.plane_failure_factor(weight, DIP, 4.0, cohesion, np.radians(40))
 
-    def soft(friction, c):
-        return JointLaw("plane", np.arctan(friction), c, normal_stiffness=1e9, shear_stiffness=1e8)
+    def stiff(friction, c):
+        return JointLaw("plane", np.arctan(friction), c)
 
     def stands(reduction):
         return stays(
-            slab(soft(np.tan(np.radians(60)), 1e6)),
-            slab(soft(np.tan(np.radians(40)) / reduction, cohesion / reduction)),
+            slab(stiff(np.tan(np.radians(60)), 1e6)),
+            slab(stiff(np.tan(np.radians(40)) / reduction, cohesion / reduction)),
         )
 
     factor = limit(lambda f: not stands(f), 0.5, 3.0)
     print(f"c = {cohesion / 1e3:g} kPa: factor of safety {factor:.4f}, should be {expected:.4f}")
-    # The uneven load that is left costs 0.14 %, first order in the joint's stiffness; bisection and threshold 0.01 %.
-    assert factor == pytest.approx(expected, rel=2e-3)
+    # Bisection and threshold.
+    assert factor == pytest.approx(expected, rel=3e-4)
 
 
 @pytest.mark.parametrize("depth", [0.6, 1.2, 1.8])

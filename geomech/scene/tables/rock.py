@@ -48,8 +48,13 @@ class JointTable(Table):
     friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] = Field(
         0.0, description="friction angle, degrees: that of the peak, with jrc the residual one"
     )
-    cohesion_pa: NotNegative = Field(0.0, description="cohesion, Pa, until the joint slips or parts")
-    tensile_strength_pa: NotNegative = Field(0.0, description="tensile strength, Pa, until the joint slips or parts")
+    cohesion_pa: NotNegative = Field(
+        0.0, description="cohesion, Pa, until the joint slips or parts: its faces hold c l + N tan φ"
+    )
+    tensile_strength_pa: NotNegative = Field(
+        0.0,
+        description="tensile strength, Pa, until the joint slips or parts: a face parts where its edge, N/l + 6 M/l^2, reaches it",
+    )
     residual_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] | None = Field(
         None, description="friction angle after slip, degrees (unset: as before)"
     )

@@ -1,0 +1,180 @@
+"""Bonds of whole faces: what two corners of a face hold together, and when the bond between them fails.
+
+An edge on an edge is held by contacts at the ends of the overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle are the
+resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which between blocks that deform evenly is a straight
+line. Its extreme fibre is at
+
+    σ = T/ℓ + 6 |M|/ℓ²      (Navier; for two corners 2 (2 T₁ − T₀)/ℓ at the end 1),
+
+and where that reaches the tensile strength a brittle bond fails from end to end, unless the resultant presses within the
+face: then the crack from its edge ends before the other, and what is left holds by friction and cohesion but no pull. Sheared,
+the face holds Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts, for what one end does not hold the other does. The
+corners one by one would hold three times the moment, and half the cohesion where one end slips before the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from ..model import OPEN, SLIP, STICK
+
+#: Bonds of a CONTACT row: whole, and cracked from its edge, so that it holds only while it is pressed.
+WHOLE, CRACKED = 1, 3
+#: Contacts whose normals are nearer in direction than this (cosine) may lie on one face …
+_ALIGNED = 0.9986
+#: … if they are off its line by less than this part of their distance (sine of the same angle, about 3°).
+_OFF_LINE = 0.053
+#: The tributary lengths of a face's contacts add up to its length but for this part: otherwise it has gaps.
+_WITHOUT_GAPS = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class BondedFaces:
+    """Faces (m,) that at least two bonds hold, as a step begins.
+
+    start   (m + 1,)  where the contacts of each begin in ``rows``
+    rows    (k,)      contacts, rows of the step's `ContactSet`
+    arm     (k,) m    from the middle of the face
+    length  (m,) m
+    """
+
+    start: np.ndarray
+    rows: np.ndarray
+    arm: np.ndarray
+    length: np.ndarray
+
+    @classmethod
+    def of(
+        cls, block: np.ndarray, other: np.ndarray, partner: np.ndarray, geometry: np.ndarray, bonded: np.ndarray
+    ) -> BondedFaces | None:
+        """Faces among the contacts (n,) of a `ContactSet`; None without any."""
+        some = np.flatnonzero(
+            ((bonded == WHOLE) | (bonded == CRACKED)) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1)
+        )
+        if len(some) < 2:
+            return None
+        first, last = np.minimum(block[some], other[some]), np.maximum(block[some], other[some])
+        order = np.lexsort((last, first))
+        some = some[order]
+        swapped = block[some] > other[some]
+        face, along = _on_one_line(first[order], last[order], swapped, np.ascontiguousarray(geometry[some]))
+        by_face = np.argsort(face, kind="stable")
+        some, face, along = some[by_face], face[by_face], along[by_face]
+        start = np.append(np.flatnonzero(np.diff(face, prepend=-1)), len(face))
+        low, high = np.minimum.reduceat(along, start[:-1]), np.maximum.reduceat(along, start[:-1])
+        length, tributary = high - low, np.add.reduceat(geometry[some, 4], start[:-1])
+        keep = (np.diff(start) > 1) & (np.abs(tributary - length) <= _WITHOUT_GAPS * length)
+        if not keep.any():
+            return None
+        members = np.repeat(keep, np.diff(start))
+        arm = along - np.repeat(0.5 * (low + high), np.diff(start))
+        return cls(np.append(0, np.cumsum(np.diff(start)[keep])), some[members], arm[members], length[keep])
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _on_one_line(first, last, swapped, geometry):
+    """Number of the face of each contact (n,), and where it lies along it (m), the contacts ordered by pairs of blocks."""
+    n = first.shape[0]
+    face, lead, along = np.empty(n, np.int64), np.empty(n, np.int64), np.zeros(n)
+    pair, faces = 0, 0
+    for c in range(n):
+        if first[c] != first[pair] or last[c] != last[pair]:
+            pair = c
+        face[c] = -1
+        sense = -1.0 if swapped[c] else 1.0
+        for k in range(pair, c):
+            if lead[k] != k:
+                continue
+            turn = sense * (-1.0 if swapped[k] else 1.0)
+            nx, ny = geometry[k, 1], geometry[k, 2]
+            dx, dy = geometry[c, 5] - geometry[k, 5], geometry[c, 6] - geometry[k, 6]
+            straight = turn * (nx * geometry[c, 1] + ny * geometry[c, 2]) > _ALIGNED
+            if straight and abs(nx * dx + ny * dy) <= _OFF_LINE * np.sqrt(dx * dx + dy * dy):
+                face[c], lead[c], along[c] = face[k], k, nx * dy - ny * dx
+                break
+        if face[c] < 0:
+            face[c], lead[c] = faces, c
+            faces += 1
+    return face, along
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def check_faces(
+    start,
+    rows,
+    arm,
+    length,
+    forces,
+    state,
+    bonded,
+    normal,
+    shear,
+    friction,
+    peak,
+    hold,
+    cohesion,
+    tension,
+    keeps,
+    slack,
+    new_state,
+    new_direction,
+    new_bonded,
+    violation,
+):
+    """Put right, in place, what `check_states` calls for contacts whose whole face is bonded; other arguments as there."""
+    for f in range(length.shape[0]):
+        intact, out, pulls = True, False, False
+        pull = moment = strength = drawn = sheared = capacity = firm = least = 0.0
+        for k in range(start[f], start[f + 1]):
+            c = rows[k]
+            if bonded[c] != WHOLE and bonded[c] != CRACKED:
+                intact = False
+                break
+            force = forces[c, 0]
+            pull -= force
+            moment -= force * arm[k]
+            drawn += abs(forces[c, 1])
+            capacity += peak[c] * force + hold[c] + cohesion[c]
+            firm += cohesion[c] + hold[c]
+            strength += tension[c] if bonded[c] == WHOLE else 0.0
+            least = max(least, normal[c] * slack)
+            sheared = max(sheared, 1e-3 * shear[c] * slack)
+            pulls = pulls or -force > normal[c] * slack
+            out = out or state[c] != STICK
+        if not intact:
+            continue
+        if out:
+            # A way of iterating that knows nothing of faces has let go of what they hold.
+            for k in range(start[f], start[f + 1]):
+                c = rows[k]
+                new_state[c], new_bonded[c] = STICK, bonded[c]
+                violation[c] = (
+                    normal[c] * abs(forces[c, 2]) + shear[c] * abs(forces[c, 3]) if state[c] != STICK else 0.0
+                )
+            continue
+        fibre = pull + 6.0 * abs(moment) / length[f] - strength
+        parts = strength > 0.0 and fibre > 1e-9 * strength + 6.0 * least
+        capacity = max(0.0, capacity)
+        slides = drawn - capacity > 1e-9 * capacity + sheared
+        for k in range(start[f], start[f + 1]):
+            c = rows[k]
+            if strength == 0.0 and pulls:
+                # Corners that press wait for those that open.
+                if -forces[c, 0] <= normal[c] * slack:
+                    new_state[c], new_bonded[c], violation[c] = STICK, bonded[c], 0.0
+                continue
+            new_state[c], new_bonded[c], violation[c] = STICK, bonded[c], 0.0
+            if parts:
+                violation[c] = fibre
+                new_bonded[c] = 0 if pulls or firm == 0.0 else CRACKED
+            elif slides:
+                violation[c] = drawn - capacity
+                new_bonded[c] = 2 if keeps[c] else 0
+            if new_bonded[c] == 0 or new_bonded[c] == 2:
+                if forces[c, 0] < 0.0:
+                    new_state[c], new_bonded[c] = OPEN, 0
+                elif slides and (keeps[c] or abs(forces[c, 1]) > friction[c] * forces[c, 0]):
+                    new_state[c], new_direction[c] = SLIP, np.sign(forces[c, 1])
