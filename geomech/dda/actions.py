@@ -10,7 +10,6 @@ import numpy as np
 from ..model import BOLT, GROUND, Blocks, Loads, State
 from .assembly import Pattern
 from .bolts import ROUNDS, BoltSet, check_bolts, labels
-from .contact_springs import Springs
 from .contacts import ContactSet
 from .force_rows import POINT_FORCE
 from .imposed_motion import ImposedMotion, Pairs
@@ -99,10 +98,11 @@ class StepActions:
 
     def settle(
         self, pattern: Pattern, matrix: np.ndarray, right: np.ndarray, vectors: np.ndarray, found: ContactSet,
-        springs: Springs, gap: np.ndarray, settle: Settle,
+        gap: np.ndarray, settle: Settle,
     ) -> tuple[Settled, np.ndarray]:  # fmt: skip
         """Settled contacts and the solver's unknowns (n_free, 6), given ones among them. Changes matrix, right side and
-        vectors in place, to those of the equations that are solved. Raises `Unsettled`."""
+        vectors in place, to those of the equations that are solved; given motion adds to what contacts' gaps and ``stretch`` begin
+        with. Raises `Unsettled`."""
         if self.bolts is not None:
             self.bolts.stiffen_turning(matrix, self.order, self.moments)
         shift = np.zeros((len(found), 2))
@@ -119,8 +119,7 @@ class StepActions:
         if shift.any():
             geometry = found.geometry.copy()
             geometry[:, 3] += shift[:, 0]
-            shear = found.shear - springs.shear * shift[:, 1]
-            found = replace(found, geometry=geometry, shear=shear, stretch=found.stretch + shift[:, 1])
+            found = replace(found, geometry=geometry, stretch=found.stretch + shift[:, 1])
             gap = gap + shift[:, 0]
         settled = self._with_bolts(pattern, matrix, right, found, gap, settle)
         unknowns = settled.unknowns

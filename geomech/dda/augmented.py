@@ -71,8 +71,8 @@ def settle_augmented(
     closed = found.state != OPEN
     pressed, drawn = closed & held[0], closed & held[1]
     multiplier = np.concatenate([np.where(pressed, found.normal, 0.0), np.where(drawn, found.shear, 0.0)])
-    stretch = np.where(drawn, found.stretch, 0.0)
-    mixing, iterations = _Mixing(), 0
+    stretch = found.stretch
+    unheld, mixing, iterations = found.shear, _Mixing(), 0
     for update in range(_MOST_UPDATES):
         if update and update % _PATIENCE == 0:
             more = np.where(held[0], (_STIFFER - 1.0) * springs.normal, 0.0)
@@ -80,7 +80,7 @@ def settle_augmented(
             shear = np.where(held[1], _STIFFER, 1.0) * springs.shear
             springs, mixing = replace(springs, normal=springs.normal + more, shear=shear), _Mixing()
         normal, shear = multiplier[:n], multiplier[n:]
-        start = np.where(held[1], shear - springs.shear * stretch, found.shear)
+        start = np.where(held[1], shear, unheld) - springs.shear * stretch
         settled = solve(replace(found, shear=start), springs, gap - normal / springs.normal)
         iterations += settled.iterations
         closed = settled.state != OPEN

@@ -45,7 +45,8 @@ class ContactSet:
     state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
     normal, shear, slip        forces N and sliding m
     wear, lift                 m: way slid to and fro, and how far that has forced the faces apart
-    stretch                    m: motion along the edge that the multipliers of sticking contacts still have to take back
+    stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact does not
+                count yet: what multipliers have left of it, and what given motion makes of it in the step
     relies_on_glue             corners have been left out that hold as long as all bonds do
     faces                      those that bonds hold at both ends; None without any
     tried                      state and direction that open–close iterations begin with, where these are others

@@ -267,6 +267,8 @@ class BlockSystem:
             return settle(pattern, matrix, right, contacts, vectors, stiff, start, self._slack, most, curved)
 
         if not self._tolerance or not len(found):
+            if found.stretch.any():
+                found = replace(found, shear=found.shear - springs.shear * found.stretch)
             return solve(found, springs, gap)
         return settle_augmented(solve, found, springs, gap, self._finder.on_penalty(found), self._tolerance)
 
@@ -363,7 +365,7 @@ class BlockSystem:
                 unknowns = settled.unknowns
             else:
                 settled, unknowns = actions.settle(
-                    pattern, matrix, right, vectors, found, springs, gap,
+                    pattern, matrix, right, vectors, found, gap,
                     lambda pattern, matrix, right, found, gap: self._settled(
                         pattern, matrix, right, found, vectors, springs, gap, curved
                     ),
