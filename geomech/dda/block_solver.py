@@ -3,6 +3,11 @@
 Where springs have changed since the last factorisation, only the fronts of their blocks and those above are eliminated
 again; where blocks have hardly moved, none. What is kept so, or factored in single precision, preconditions GMRES (Saad &
 Schultz 1986), which brings the residual down to round-off.
+
+Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for a
+factorisation and a substitution, ms): these factors 10 + 3 and 224 + 32, in single precision 6 + 0.4 and 128 + 16; PARDISO of
+MKL 2026 11 to 19 + 6 and 245 to 478 + 61; an incomplete factorisation with GMRES 234 and 5400; smoothed aggregation (pyamg 5, six
+fields an aggregate) and block Jacobi do not come to 1e-10 in 500 iterations.
 """
 
 from __future__ import annotations
