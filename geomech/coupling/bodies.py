@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -123,11 +124,12 @@ def solve_bodies(
     history: dict,
     solved_from: dict | None = None,
     skip: bool = True,
+    names: Sequence[str] = (),
 ) -> dict:
     """block → solution of its body, side by side; ``warm``: earlier solutions, whose face states are the first guess;
     ``history``: what crack faces with friction remember of the load step before. An earlier solution of the same geometry
     under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same, too, and nothing is to be worked
-    out anew (``skip``)."""
+    out anew (``skip``). Raises what `ddm.Body.solve` raises, with the block's name, of ``names``, before it."""
     from .. import ddm
 
     solved_from = {} if solved_from is None else solved_from
@@ -139,7 +141,13 @@ def solve_bodies(
         if same and history.get(b) is solved_from.get(b):
             body.work.solutions_kept += 1
             return known
-        return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
+        try:
+            return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
+        except (ValueError, ddm.NotConverged) as failure:
+            # (Others have more than a message, as `ddm.OutOfEquilibrium`.)
+            if type(failure) not in (ValueError, ddm.NotConverged):
+                raise
+            raise type(failure)(f"{names[b] if b < len(names) else f'block {b}'}: {failure}") from failure
 
     return dict(zip(bodies, side_by_side(solved, list(bodies), threads_for(bodies))))
 

@@ -77,7 +77,9 @@ class CrackedBlocks:
     def solve(self, bodies: dict, loads: dict[int, BoundaryLoad], warm: dict) -> dict:
         """block → solution of its body under its load, with the memory of crack faces at the start of the step."""
         with self.timed("ddm solve"):
-            return solve_bodies(bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip)
+            return solve_bodies(
+                bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip, self.blocks.names
+            )
 
     # -- changes of the blocks -----------------------------------------------------------------------------------------
 
@@ -144,11 +146,17 @@ class CrackedBlocks:
         def moved(block: int, point) -> tuple[float, float]:
             return tuple(motion.current(block, np.asarray(point, dtype=float)).tolist())
 
-        nodes = self.cracks.nodes.copy()
-        for block in np.unique(self.cracks.block).tolist():
-            own = np.unique(self.cracks.segments[self.cracks.block == block])
+        # Cracks that end from both sides at one point of a joint may share its node: their blocks take it to two places.
+        ends = np.column_stack([self.cracks.segments.ravel(), np.repeat(self.cracks.block, 2)])
+        kept, numbers = np.unique(ends, axis=0, return_inverse=True)
+        node, owner = kept.T
+        nodes = self.cracks.nodes[node]
+        for block in np.unique(owner).tolist():
+            own = owner == block
             nodes[own] = motion.current(block, nodes[own])
-        self.cracks = replace(self.cracks, nodes=nodes)
+        self.cracks = replace(
+            self.cracks, nodes=nodes, segments=numbers.reshape(-1, 2), surface=self.cracks.surface[node]
+        )
         self.problem = replace(self.problem, loads=on_moved(self.problem.loads, moved))
         if self.gauge is not None:
             self.gauge = tuple((b, moved(b, p)) for b, p in self.gauge)

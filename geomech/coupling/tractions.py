@@ -374,6 +374,8 @@ def _add_edge_piece(pieces: _Pieces, blocks: Blocks, vertices: np.ndarray, row: 
     length = np.hypot(*now)
     stretch = length / np.hypot(*(b - a))
     s0, s1 = ((row[end] - vertices[first]) @ now / length**2 for end in ("start", "end"))
+    if abs(s1 - s0) <= SNAP:
+        return  # as where a water table meets the edge's end: no force to speak of, and no length to put it on
     start = a if s0 < SNAP else a + s0 * (b - a)
     end = b if s1 > 1 - SNAP else a + s1 * (b - a)
     t_start, t_end = row["traction"] @ turn_back.T * stretch

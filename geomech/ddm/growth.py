@@ -34,6 +34,9 @@ SNAP_TO_TIP, SNAP_TO_NODE = 0.5, 0.1
 AHEAD = math.cos(math.radians(60.0))
 #: Two tips meet half way when each lies within this of the other's direction of growth.
 FACING = math.cos(math.radians(45.0))
+#: A way that would meet a boundary at a smaller angle goes straight across to it instead: the mouth would be too sharp to be
+#: resolved (a body is refused below 3°), and the rock between is as good as gone.
+GRAZES = math.sin(math.radians(5.0))
 #: A tip that would turn back along its own crack more sharply than this stands still.
 TURN_BACK = math.radians(170.0)
 
@@ -199,6 +202,8 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
         ways = _attracted(work, step)
     crack = network.crack_at(step.node)
     for obstacle, node, at in ways:
+        if obstacle.row is None and node is None and _grazes(step.start, at, obstacle):
+            _, at = nearest_on(step.start, obstacle.a, obstacle.b)
         # So near already that a segment would be a sliver: then the tip itself is drawn onto what it meets.
         drawn = math.dist(step.start, at) < work.sliver
         allowed = set() if node is None else {node}
@@ -215,6 +220,12 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
     if _clear(work, step, step.end, set(), None):
         network.extend(step.node, network.add_node(step.end))
         grown[step.row] = step.length
+
+
+def _grazes(start: Point, at: Point, edge: Obstacle) -> bool:
+    """Whether the way from ``start`` to ``at`` on a boundary's ``edge`` runs nearly along it."""
+    (x, y), (dx, dy) = (at[0] - start[0], at[1] - start[1]), (edge.b[0] - edge.a[0], edge.b[1] - edge.a[1])
+    return abs(x * dy - y * dx) < GRAZES * math.hypot(x, y) * math.hypot(dx, dy)
 
 
 def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
