@@ -22,6 +22,7 @@ TOPICS = {
     "output": "geomech.bench.output_cost",
     "schemes": "geomech.bench.block_schemes",
     "skips": "geomech.bench.skips",
+    "slopes": "geomech.bench.fuzzed_slopes",
     "stability": "geomech.bench.stability",
     "startup": "geomech.bench.startup",
     "steps": "geomech.bench.load_steps",
