@@ -76,6 +76,7 @@ def boundary_loads(
     """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on that
     geometry the forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
+    strengths = [joint.tensile_strength for joint in problem.joints]
     acting = beside_acting(result.contacts, blocks.n_blocks)
     touching = zip(_rows_of(acting["block"], numbers), _rows_of(acting["other"], numbers))
     contacts, edges, points = (
@@ -103,6 +104,7 @@ def boundary_loads(
             problem.dda.dynamic_factor * float(state.velocity[b, 2]),
             None if forces.reaction is None else forces.reaction[b],
             problem.run.boundary_stress,
+            strengths,
         )
         for b in bodies
     }

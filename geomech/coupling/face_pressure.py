@@ -28,9 +28,12 @@ def no_pull(length: float, force: float, moment: float) -> tuple[list[Piece], fl
     if 0 <= length - arm < length / 3:
         pieces, lone = _near_end(length, force, length - arm)
         return [(length - reach, length, 0.0, peak) for reach, peak in pieces], 0.0, lone
-    p_start = (4 * force * length - 6 * moment) / length**2
-    p_end = (6 * moment - 2 * force * length) / length**2
-    return [(0.0, length, p_start, p_end)], 0.0, 0.0
+    return [linear(length, force, moment)], 0.0, 0.0
+
+
+def linear(length: float, force: float, moment: float) -> Piece:
+    """The pressure linear on [0, length] with resultant ``force`` and ``moment`` about 0."""
+    return 0.0, length, (4 * force * length - 6 * moment) / length**2, (6 * moment - 2 * force * length) / length**2
 
 
 def _near_end(length: float, force: float, arm: float) -> tuple[list[tuple[float, float]], float]:

@@ -1,7 +1,8 @@
 """Contact forces of a block made into one boundary load of its elastic body, with the same force and moment.
 
 The contacts of one joint face (two edges that lie against each other) are one distribution with the resultant and moment of
-its contact forces: linear, or a triangle where that would pull although the resultant pushes (`face_pressure`). It ends where
+its contact forces: linear, or, but for bonds with tensile strength, a triangle where that would pull although the resultant
+pushes (`face_pressure`). It ends where
 the faces do: a contact that opens takes the pressure back from its place the further the wider it gapes. Shear follows the
 pressure, so that it breaks Coulomb's law nowhere unless it breaks it as a whole. A lone vertex pressed into an edge spreads
 over a short piece of that edge; a lone force on a block's own corner is resolved along the corner's two edges and enters there
@@ -27,7 +28,7 @@ import numpy as np
 
 from ..ddm.loads import resultants
 from ..model import Blocks, Motion
-from .face_pressure import no_pull
+from .face_pressure import linear, no_pull
 
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = np.radians(10.0)
@@ -85,17 +86,19 @@ def boundary_load(
     spin: float = 0.0,
     reaction: np.ndarray | None = None,
     route: str = "contacts",
+    tensile_strength: Sequence[float] | None = None,
 ) -> BoundaryLoad:
     """The load of ``block``.
 
     ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
     that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
     ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which is
-    spread over the block as its inertia is; ``route``: "contacts", "springs" or "kelvin-springs".
+    spread over the block as its inertia is; ``route``: "contacts", "springs" or "kelvin-springs"; ``tensile_strength`` of the
+    joint laws, Pa (None: none has any).
     """
     c, s = math.cos(rotation), math.sin(rotation)
     pieces = _Pieces()
-    touches = _touches(block, motion, contacts, c, s)
+    touches = _touches(block, motion, contacts, c, s, tensile_strength)
     pointed = route != "contacts"
     if pointed:
         pieces.points += [(_on_outline(blocks, touch), np.array(touch.force)) for touch in touches]
@@ -142,7 +145,7 @@ class _Touch(NamedTuple):
     """A contact as one of its blocks feels it. There are few, so they are plain numbers.
 
     ``own``: the block owns the vertex, not the edge; ``normal`` of the edge, current axes; ``point`` and the ``force`` on
-    the block in its reference frame; ``acts``: it carries force; ``gap`` m.
+    the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``: it may pull.
     """
 
     own: bool
@@ -153,16 +156,22 @@ class _Touch(NamedTuple):
     force: tuple[float, float]
     acts: bool
     gap: float
+    holds: bool
 
 
-def _touches(block: int, motion: Motion, contacts: np.ndarray, c: float, s: float) -> list[_Touch]:
+def _touches(
+    block: int, motion: Motion, contacts: np.ndarray, c: float, s: float, tensile_strength: Sequence[float] | None
+) -> list[_Touch]:
     """What touches ``block``, which has turned by the angle of cosine ``c`` and sine ``s``."""
     rows = contacts[(contacts["block"] == block) | (contacts["other"] == block)]
+    holding = np.zeros(len(rows), bool)
+    if tensile_strength is not None:
+        holding = (rows["bonded"] == 1) & (np.asarray(tensile_strength)[rows["law"]] > 0)
     names = ("block", "vertex", "edge", "normal", "normal_force", "shear_force", "gap")
     columns = (rows[name].tolist() for name in names)
     touches = []
-    for owner, vertex, edge, normal, push, shear, gap, point in zip(
-        *columns, motion.reference(block, rows["point"]).tolist(), strict=True
+    for owner, vertex, edge, normal, push, shear, gap, point, holds in zip(
+        *columns, motion.reference(block, rows["point"]).tolist(), holding.tolist(), strict=True
     ):
         own = owner == block
         if not own:
@@ -170,7 +179,7 @@ def _touches(block: int, motion: Motion, contacts: np.ndarray, c: float, s: floa
         # Shear acts along the edge's direction: its outward normal turned by +90°.
         x, y = push * normal[0] - shear * normal[1], push * normal[1] + shear * normal[0]
         acts = push != 0 or shear != 0
-        touches.append(_Touch(own, vertex, edge, normal, point, (c * x + s * y, c * y - s * x), acts, gap))
+        touches.append(_Touch(own, vertex, edge, normal, point, (c * x + s * y, c * y - s * x), acts, gap, holds))
     return touches
 
 
@@ -249,9 +258,11 @@ def _add_face(pieces: _Pieces, blocks: Blocks, side: list[int], touches: list[_T
         shear += ax * x + ay * y
         size += abs(x) + abs(y)
     # The force that goes with a unit of pressure: shear in proportion to it, evenly spread where faces are held together
-    # besides and there is none to go by.
+    # besides and there is none to go by. Pressure on a bond that may pull is linear, and shear even, wherever its resultant
+    # is: it goes on without a jump as that leaves the face.
     reach = [place for place, _ in acting]
-    even = abs(total) <= 1e-9 * size or not min(reach) <= moment / total <= max(reach)
+    holds = all(touch.holds for _, touch in acting)
+    even = holds or abs(total) <= 1e-9 * size or not min(reach) <= moment / total <= max(reach)
     slope = 0.0 if even else shear / total
     per_push = (slope * ax - ay, slope * ay + ax)
     gapes = [(place, touch) for place, touch in zip(places, touches) if not touch.acts]
@@ -261,7 +272,8 @@ def _add_face(pieces: _Pieces, blocks: Blocks, side: list[int], touches: list[_T
             first, last = (min(max(_on_grid(place, length), 0.0), length) for place in (low[0], high[0]))
             if first == last:
                 first, last = max(low[0], 0.0), min(high[0], length)
-            found, at_first, at_last = no_pull(last - first, share * total, share * (moment - first * total))
+            force_and_moment = last - first, share * total, share * (moment - first * total)
+            found, at_first, at_last = ([linear(*force_and_moment)], 0.0, 0.0) if holds else no_pull(*force_and_moment)
             for a, b, p_a, p_b in found:
                 t_a, t_b = ((p * per_push[0], p * per_push[1]) for p in (p_a, p_b))
                 _add_on_side(pieces, blocks, side, line, (first + a, first + b), t_a, t_b)

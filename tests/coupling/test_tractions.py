@@ -201,3 +201,28 @@ def test_turned_block_sees_its_forces_in_its_own_frame():
     here = load_of(0, blocks, upright)
     assert there.segments == pytest.approx(here.segments, abs=1e-13)
     assert there.tractions == pytest.approx(here.tractions, abs=1e-13)
+
+
+def test_bonds_that_pull_have_linear_pressure_and_no_jump():
+    """The resultant of two bonded contacts leaves the face: tractions change as little as it does. A face without tensile
+    strength is a triangle, and at last a lone force, before; a bond goes on as the linear pressure it has beyond."""
+    lower = SQUARE
+    blocks = Blocks.from_polygons([lower, SQUARE + [0.0, 1.0]])
+    bottom = edge_between(blocks, 1, [0.0, 1.0], [1.0, 1.0])
+
+    def load(push, **options):
+        rows = []
+        for x, force in ((0.0, 1.0), (1.0, push)):
+            vertex = vertex_at(blocks, 0, [x, 1.0])
+            rows.append(contact(vertex, bottom, 0, 1, [x, 1.0], [0, -1], force, 0.3))
+            rows[-1]["bonded"] = 1
+        return load_of(0, blocks, rows, **options)
+
+    inside, outside = (load(push, tensile_strength=[1.0]) for push in (1e-9, -1e-9))
+    assert np.allclose(moments_of(inside), moments_of(outside), rtol=0, atol=1e-8)
+    assert not np.allclose(moments_of(load(1e-9)), moments_of(load(-1e-9)), rtol=0, atol=1e-3)
+    # Force and moment are the contacts' whatever the law.
+    for found in (inside, load(1e-9)):
+        moments = moments_of(found)
+        assert np.allclose(moments[:, 0], [0.6, -1.0], rtol=0, atol=1e-8)
+        assert moments[1, 1] - moments[0, 2] == pytest.approx(-0.6, abs=1e-8)
