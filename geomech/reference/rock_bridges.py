@@ -75,3 +75,16 @@ def high_angle_bridges_multiplier(
     Mech. Min. Sci. 20, 227-236: bridges at a high angle to the joints fail in tension with the resistance T X.
     """
     return tensile_strength * steps / driving_force(weight, dip, 0.0, 0.0, friction_angle)
+
+
+def direct_shear_strength(normal_force: float, friction_angle: float, bridge: float, toughness: float) -> float:
+    """The shear force N tan φ + K √(πb) at which a short ``bridge`` 2b between two co-planar joints has K_II = ``toughness``, of
+    a specimen whose joints slide: what `shear_factor` leaves beside friction on the whole plane."""
+    return normal_force * math.tan(friction_angle) + toughness * math.sqrt(math.pi * bridge / 2)
+
+
+def tearing_bridge(normal_stress: float, tensile_strength: float) -> float:
+    """The mean shear stress √(T (T + σ)) at which a bridge under the pressure σ across and nothing along it has the principal
+    tension T: the tensile strength of Lajtai (1969), "Strength of discontinuous rocks in direct shear", Géotechnique 19,
+    218-233, who saw bridges of plaster tear obliquely first where the pressure on them was low."""
+    return math.sqrt(tensile_strength * (tensile_strength + normal_stress))
