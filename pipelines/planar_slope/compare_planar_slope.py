@@ -121,9 +121,8 @@ def check(name: str, seen: BridgedPlane) -> None:
     """AssertionError where a formula is missed by more than is explained."""
     share = 100 * seen.bridge / seen.length  # per cent of the plane that is whole
     off = seen.started / seen.expected() - 1
-    # 0.2 % remain of the shortest bridge (elements, and joint by the tension crack that does not slide). What the formula
-    # leaves out of the mean is of second order in the bridge's length, the difference of the ends of first.
-    assert abs(seen.factor_ratio - 1) < 0.004 + 0.002 * share**2, f"{name}: the bridge's K_II is off the formula's"
+    # 0.1 to 0.3 % remain: elements, joint by the tension crack that does not slide, and what grows with the bridge.
+    assert abs(seen.factor_ratio - 1) < 0.005, f"{name}: the bridge's K_II is off the formula's"
     assert seen.unlike < 0.005 + 0.01 * share, f"{name}: the bridge's ends differ"
     assert abs(off) < seen.unlike + abs(seen.factor_ratio - 1) + 0.002, f"{name}: the load is off by more than K_II is"
     if seen.criterion == "f":
