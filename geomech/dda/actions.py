@@ -21,16 +21,17 @@ from .step import contact_resultants
 Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]
 
 
-def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: bool) -> np.ndarray:
+def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0) -> np.ndarray:
     """(2,) m/s² gravity at the time ``acting``, less the acceleration of a base that the blocks are seen from: its mean over
-    the step from ``start``, so that velocities are exact, or in statics its value at that time."""
+    the time ``dt`` from ``start`` + ``ahead``, that over the step (``ahead`` 0) so that velocities are exact, or in statics its
+    value at ``acting``."""
     gravity = loads.gravity.at(acting)
     if loads.base is None or loads.base.frame != "base":
         return gravity
     record = loads.base.acceleration
     if static:
         return gravity - record.at(acting)
-    return gravity - (record.integral(start + dt) - record.integral(start)) / dt
+    return gravity - (record.integral(start + ahead + dt) - record.integral(start + ahead)) / dt
 
 
 class StepActions:

@@ -306,7 +306,7 @@ class BlockSystem:
         scheme = self.scheme
         time = state.time + dt
         acting = state.time + scheme.weight * dt if load_time is None else load_time
-        gravity = felt_gravity(loads, state.time, acting, dt, scheme.static)
+        gravity = felt_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
         points, edges = self._load_map.rows(loads, acting, vertices, state.rotation)
         centroid = np.ascontiguousarray(moments[:, 1:3])
         load = generalised(points, edges, centroid)

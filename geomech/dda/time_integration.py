@@ -87,6 +87,11 @@ class TimeScheme:
             return carried, 1.0
         return carried + 0.5 * self.recall * dt * before, 1.0 / (1.0 - self.recall)
 
+    def ahead(self, before: np.ndarray | None, dt: float) -> float:
+        """s by which forces that are taken as a mean over a time ``dt`` must be later than the step: the α-scheme's are those of
+        the step's end, about which the mean is then taken; arguments as for `begun`."""
+        return 0.0 if self.recall == 0.0 or before is None else 0.5 * dt
+
     def corrected(
         self, velocity: np.ndarray, before: np.ndarray | None, mean: np.ndarray, turn: np.ndarray, dt: float
     ) -> tuple[np.ndarray, np.ndarray | None]:
