@@ -104,6 +104,11 @@ class CrackedBlocks:
         )
         self._take_bodies()
 
+    def take_step(self, state: State, budget: dda.EnergyBudget) -> None:
+        """Go on from ``state``, where the last pass has left the blocks, with what the faces of its cracks remember."""
+        self.state, self.budget = state, budget
+        self.history = {b: s.memory for b, s in self.solutions.items() if s.memory is not None}
+
     def take_split(self, split) -> None:
         """Blocks, state and cracks of the `Split`; gauges and monitors go to the child that holds their point."""
 

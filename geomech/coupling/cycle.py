@@ -2,7 +2,8 @@
 
 At each load the cycle is repeated from the same start of the step until no tip grows; every pass is yielded as a
 `Cycle`. The state that leaves the last pass starts the next load step. Where the load follows the cracks (`event_steps`),
-each pass in which they grow is a load step of its own.
+each pass in which they grow is a load step of its own. Blocks part at the end of a pass: in statics the passes that follow at
+the same load begin there, in dynamics the next step does.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .balance import balanced
 from .collapse import lost, relax
 from .cracked_blocks import CrackedBlocks
 from .event_steps import SETTLED, TOGETHER, EventSteps
-from .growing import births, growth_of_tips, initiations, take_growth
+from .growing import births, cuts_through, growth_of_tips, initiations, take_growth
 from .record import event, record
 from .tips_in_time import TipsInTime
 
@@ -176,19 +177,22 @@ class Coupling:
                     self.tips.went(tips)
                 events += initiations(now, tips, result.state)
                 stops = self._stops(events)
+            # Blocks part where the pass has left them, in equilibrium with what their faces bear.
+            parts = cuts_through(now, growth)
+            ends = growth is None or self.follows or (parts and not static)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed
             budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
             if now.bodies:
                 now.crack_energy.passed(tips, now.blocks, now.problem.materials)
-                if growth is None or self.follows:
+                if ends or parts:
                     now.crack_energy.after(now.state, result.state, now.blocks, solutions)
                 statistics |= now.crack_energy.statistics()
             if self.tips is not None and len(tips):
                 statistics["fastest_tip"] = self.tips.speed.fastest(result.dt)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)
-            if growth is None or self.follows:
+            if ends:
                 if growth_pass == growing.max_passes:
                     log.warning(
                         "cycle %d: tips still grow after %d passes at one load; going on to the next load",
@@ -199,14 +203,16 @@ class Coupling:
                 self.length.after(result, dt, now.system.allowed_ratio)
                 if self.tips is not None:
                     self.tips.end(tips, now.blocks, result.dt, now.loads)
-                now.state, now.budget = result.state, budget
-                now.history = {b: s.memory for b, s in solutions.items() if s.memory is not None}
+                now.take_step(result.state, budget)
                 if growth is not None:
-                    self.events.grown()
+                    if self.events is not None:
+                        self.events.grown()
                     self._brought = take_growth(now, growth, result.state, solutions)
                 elif self.events is not None:
                     self.events.after(now, found)
                 return stops
+            if parts:
+                now.take_step(result.state, budget)
             pending = take_growth(now, growth, result.state, solutions)
             self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1)
             self.between()

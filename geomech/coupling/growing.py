@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..model import Event, State
@@ -10,7 +12,8 @@ from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
 from .mean_stress import rotated_mean_stress
 from .record import event
-from .splitting import split_blocks
+from .split_forces import contacts_after
+from .splitting import divides, split_blocks
 
 
 def growth_of_tips(
@@ -94,8 +97,17 @@ def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Eve
     return tuple(events)
 
 
+def cuts_through(now: CrackedBlocks, growth) -> bool:
+    """Whether ``growth`` (None: there is none) cuts some block in two."""
+    if growth is None or not growth.joins:
+        return False
+    with now.timed("growth"):
+        return divides(now.blocks, growth.cracks)
+
+
 def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tuple[Event, ...]:
-    """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought, at ``state``."""
+    """Make ``growth`` the present geometry; split what it cut through, which is to stand at ``state``: ``solutions`` are those of
+    its end. Returns the events it brought, at ``state``."""
     names = now.cracks.names
     events = []
     for join in growth.joins:
@@ -108,11 +120,16 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
     if split is None:
         now.take_cracks(growth.cracks)
         return tuple(events)
+    cut = now.blocks
     for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1):
         parts = np.flatnonzero(split.parent == b)
         centre = now.blocks.loops(b)[0].mean(axis=0)
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
+    loads = now.loads
     now.take_split(split)
+    with now.timed("growth"):
+        contacts = contacts_after(now.system, split, cut, solutions, loads, now.problem.loads)
+    now.state = replace(now.state, contacts=contacts)
     return tuple(events)
 
 

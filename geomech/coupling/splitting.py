@@ -34,6 +34,9 @@ class Split:
     cracks     what is not a block face now, each segment with the child that holds it
     parent     (n_blocks,) the block before the split that each one comes from
     lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, for slivers are merged
+    vertex_origin, edge_origin   (n_vertices,) the vertex, and the edge, before the split that each vertex, and the edge that leaves
+               it, is (part of); −1 for a new vertex and for an edge that was a crack face
+    edge_span  (n_vertices, 2) from where to where on that edge, 0 to 1
     """
 
     blocks: Blocks
@@ -41,6 +44,9 @@ class Split:
     cracks: Cracks
     parent: np.ndarray
     lost_area: np.ndarray
+    vertex_origin: np.ndarray
+    edge_origin: np.ndarray
+    edge_span: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +59,11 @@ class _Piece:
     edge_span: list[np.ndarray]  # a loop each, (n, 2): from where to where on the old edge, 0 to 1
     parent: int
     name: str
+
+
+def divides(blocks: Blocks, cracks: Cracks) -> bool:
+    """Whether ``cracks`` cut some block in two. Raises ValueError as `split_blocks`."""
+    return any(BlockGraph.of(blocks, int(block), cracks).closes() for block in np.unique(cracks.block))
 
 
 def split_blocks(
@@ -115,7 +126,11 @@ def split_blocks(
         removed=None if state.removed is None else state.removed[parent],
     )
     lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
-    return Split(children_blocks, after, rest, parent, lost)
+    origin, edge_origin, span = (
+        np.concatenate([part for piece in pieces for part in getattr(piece, name)])
+        for name in ("origin", "edge_origin", "edge_span")
+    )
+    return Split(children_blocks, after, rest, parent, lost, origin, edge_origin, span)
 
 
 def _divide(

@@ -20,6 +20,7 @@ from .step_length import StepLength
 from .strength_reduction import FactorOfSafety, factor_of_safety
 from .system import BlockSystem, run
 from .time_integration import TimeScheme
+from .told_contacts import ToldContacts
 
 __all__ = [
     "EDGE_FORCE",
@@ -38,6 +39,7 @@ __all__ = [
     "StepLength",
     "StepResult",
     "TimeScheme",
+    "ToldContacts",
     "block_moments",
     "contact_resultants",
     "displacement_matrix",

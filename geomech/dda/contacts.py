@@ -44,7 +44,8 @@ class ContactSet:
     springs              stiffness and strengths
     state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
     normal, shear, slip        forces N and sliding m
-    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart
+    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they have to
+                               come nearer than the geometry says to meet)
     stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact does not
                 count yet: what multipliers have left of it, and what given motion makes of it in the step
     relies_on_glue             corners have been left out that hold as long as all bonds do
@@ -109,7 +110,8 @@ class ContactSet:
         )
         rows["length"] = self.geometry[:, 4]
         rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
-        rows["lift"] = np.maximum(self.lift + settled.lifted, 0.0)
+        # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
+        rows["lift"] = np.maximum(self.lift + settled.lifted, np.minimum(self.lift, 0.0))
         rows["stretch"] = settled.stretch
         return rows
 
@@ -156,8 +158,8 @@ class ContactFinder:
         corners that are held to each other by the glue around them, if that ``glue_holds``."""
         old = state.contacts
         if len(old):
-            # Faces that slid apart press at a distance.
-            window += max(0.0, float(old["lift"].max()))
+            # Faces that slid apart press at a distance, those that do not fit pass each other by as much.
+            window += float(np.abs(old["lift"]).max())
             # What soft springs have let in deeper than that touches still.
             window = max(window, -_DEEPER * float(old["gap"][old["state"] != OPEN].min(initial=0.0)))
         keys = old["vertex"] * len(vertices) + old["edge"]
@@ -260,7 +262,7 @@ class ContactFinder:
         pair = np.stack(
             [np.minimum(touched["block"], touched["other"]), np.maximum(touched["block"], touched["other"])]
         )
-        for c in np.flatnonzero(remembered["state"] == OPEN):
+        for c in np.flatnonzero((remembered["state"] == OPEN) & (remembered["lift"] >= 0)):
             same = (pair[0] == min(block[c], other[c])) & (pair[1] == max(block[c], other[c]))
             same &= np.abs(touched["normal"] @ geometry[c, 1:3]) > _ALIGNED
             same &= touched["wear"] > remembered["wear"][c]

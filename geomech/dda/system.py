@@ -27,6 +27,7 @@ from .step import CrackResponse, NotConverged, StepResult
 from .step_length import StepLength
 from .stopping import Stopped, dissipating, stop
 from .time_integration import TimeScheme, advance, assemble_blocks, turned
+from .told_contacts import ToldContacts, told_rows
 from .viscous_boundary import QuietEdges
 
 log = logging.getLogger(__name__)
@@ -209,6 +210,18 @@ class BlockSystem:
                 )
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
+
+    def contacts_near(self, state: State) -> ContactSet:
+        """The contacts that a step from ``state`` would begin with."""
+        return self._finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self._limit)
+
+    def told(self, found: ContactSet, forces: ToldContacts) -> np.ndarray:
+        """CONTACT rows of ``found``, those that ``forces`` tell of as these say: for a `State` whose next step begins so."""
+        if self._tolerance:
+            on_multiplier = self._finder.on_penalty(found)[0]
+        else:
+            on_multiplier = np.zeros(len(found), bool)
+        return told_rows(found, forces, self._finder.closure, on_multiplier)
 
     def _refuse_unheld(self, loads: Loads, time: float) -> None:
         """In statics weight needs something to rest on: what falls for ever has no equilibrium."""

@@ -39,7 +39,7 @@ CONTACT = np.dtype(
         ),  # 1 while cohesion and tensile strength hold, 0 once they are lost, 2 after slip that wears cohesion, 3 cracked from
         # the edge of its face: cohesion holds while it is pressed
         ("wear", np.float64),  # m, length of the way it has slid, to and fro
-        ("lift", np.float64),  # m, by which sliding has forced the faces apart
+        ("lift", np.float64),  # m, faces forced apart by sliding; negative: a gap that the geometry has not
         ("stretch", np.float64),  # m, motion along the edge while sticking that a multiplier has still to take back
     ]
 )
