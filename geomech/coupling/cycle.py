@@ -2,8 +2,8 @@
 
 At each load the cycle is repeated from the same start of the step until no tip grows; every pass is yielded as a
 `Cycle`. The state that leaves the last pass starts the next load step. Where the load follows the cracks (`event_steps`),
-each pass in which they grow is a load step of its own. Blocks part at the end of a pass: in statics the passes that follow at
-the same load begin there, in dynamics the next step does.
+each pass in which they grow is a load step of its own. Blocks part where a pass has left them: in statics the passes that
+follow at the same load begin there (unless the block hung by a thread), in dynamics the next step does.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .balance import balanced
 from .collapse import lost, relax
 from .cracked_blocks import CrackedBlocks
 from .event_steps import SETTLED, TOGETHER, EventSteps
-from .growing import births, cuts_through, growth_of_tips, initiations, take_growth
+from .growing import births, growth_of_tips, initiations, part_here, take_growth
 from .record import event, record
 from .tips_in_time import TipsInTime
 
@@ -178,7 +178,7 @@ class Coupling:
                 events += initiations(now, tips, result.state)
                 stops = self._stops(events)
             # Blocks part where the pass has left them, in equilibrium with what their faces bear.
-            parts = cuts_through(now, growth)
+            parts = part_here(now, growth, result.state)
             ends = growth is None or self.follows or (parts and not static)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed

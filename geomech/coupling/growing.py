@@ -12,8 +12,8 @@ from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
 from .mean_stress import rotated_mean_stress
 from .record import event
-from .split_forces import contacts_after
-from .splitting import divides, split_blocks
+from .split_forces import contacts_after, holds_together
+from .splitting import divided, split_blocks
 
 
 def growth_of_tips(
@@ -97,17 +97,18 @@ def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Eve
     return tuple(events)
 
 
-def cuts_through(now: CrackedBlocks, growth) -> bool:
-    """Whether ``growth`` (None: there is none) cuts some block in two."""
+def part_here(now: CrackedBlocks, growth, state: State) -> bool:
+    """Whether ``growth`` (None: there is none) cuts blocks in two whose parts can go on from ``state``, where the pass has left them."""
     if growth is None or not growth.joins:
         return False
     with now.timed("growth"):
-        return divides(now.blocks, growth.cracks)
+        cut = divided(now.blocks, growth.cracks)
+    return bool(len(cut)) and (now.problem.dda.dynamic_factor != 0.0 or holds_together(state, cut))
 
 
 def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tuple[Event, ...]:
-    """Make ``growth`` the present geometry; split what it cut through, which is to stand at ``state``: ``solutions`` are those of
-    its end. Returns the events it brought, at ``state``."""
+    """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought, at ``state``, the end of the
+    pass with these ``solutions``. Where the blocks stand there, the parts begin with the forces of their faces."""
     names = now.cracks.names
     events = []
     for join in growth.joins:
@@ -125,11 +126,12 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         parts = np.flatnonzero(split.parent == b)
         centre = now.blocks.loops(b)[0].mean(axis=0)
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
-    loads = now.loads
+    loads, stands = now.loads, now.state is state
     now.take_split(split)
-    with now.timed("growth"):
-        contacts = contacts_after(now.system, split, cut, solutions, loads, now.problem.loads)
-    now.state = replace(now.state, contacts=contacts)
+    if stands:
+        with now.timed("growth"):
+            contacts = contacts_after(now.system, split, cut, solutions, loads, now.problem.loads)
+        now.state = replace(now.state, contacts=contacts)
     return tuple(events)
 
 

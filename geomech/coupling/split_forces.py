@@ -6,6 +6,9 @@ moment, press nowhere where the faces do not and break no Coulomb law that they 
 faces that have slid their slip. Along what the crack has only just cut, rock bore the stress: pressure, and as much shear as the
 new joint can take, stay; tension is let go. Edges that a mouth has divided are treated likewise, with the traction from
 outside. The other contacts of the parts keep the forces that they had, whatever their springs become.
+
+All that holds where the last pass has left the blocks. In statics a block that hangs by a thread is strained beyond measure
+before it parts; it then starts from where the load step began, and nothing is told.
 """
 
 from __future__ import annotations
@@ -28,6 +31,11 @@ _ALIGNED = 0.9975
 _IN_ROCK = 12
 #: Gauss points on a piece of a load that is linear: its moment is a cubic at most.
 _IN_LOAD = 2
+#: Faces that are farther apart than this part of the smaller block's size (√area) are told to be so far: contacts are sought as
+#: far off as faces pass each other by, which must not reach the blocks' other sides.
+_FARTHEST = 0.02
+#: Mean strains of cracks up to here are small: strains of rock that breaks are a few thousandths.
+_SMALL = 0.01
 #: Forces below this part of the largest are round-off.
 _NOTHING = 1e-12
 
@@ -80,6 +88,11 @@ class _Faces:
         return self.gap[here].ravel()[nearest], self.slip[here].ravel()[nearest]
 
 
+def holds_together(state: State, blocks: np.ndarray) -> bool:
+    """Whether the ``blocks`` (numbers) have small strains of cracks in ``state``, so that parts may begin where they stand."""
+    return bool(np.abs(state.crack_strain[blocks]).max(initial=0.0) <= _SMALL)
+
+
 def _along(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where on the segment from ``a`` to ``b`` the ``points`` (n, 2) are, 0 to 1, and which of them are on it at all."""
     d = b - a
@@ -127,12 +140,10 @@ def contacts_after(
         _tell_of_walls(told, found, split, parent, solutions[parent], float(state.rotation[parent]))
         loaded = {load.edge_name for load in acting.edge_tractions}
         _tell_of_divided_edges(told, found, split, before, parent, loads[parent], loaded)
-    return system.told(found, _contacts(system, found, told, blocks, state, np.isin(split.parent, cut)))
+    return system.told(found, _contacts(system, found, told, blocks, np.isin(split.parent, cut)))
 
 
-def _contacts(
-    system: dda.BlockSystem, found, told: _Told, blocks: Blocks, state: State, is_part: np.ndarray
-) -> dda.ToldContacts:
+def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_part: np.ndarray) -> dda.ToldContacts:
     """``told`` as forces along the contacts' own axes; contacts of parts (n_blocks,) of which nothing is told keep what they bear."""
     across = found.geometry[:, 1:3]
     normal = np.sum(told.force * across, axis=1)
@@ -141,13 +152,15 @@ def _contacts(
     rough = np.array([joint.roughness is not None for joint in system.joints])[found.law]
     most = np.where(rough, np.inf, found.springs.peak * normal)
     shear = np.clip(shear, -most, most)
+    size = np.sqrt(blocks.areas())
+    gap = np.minimum(told.gap, _FARTHEST * np.minimum(size[found.block], size[found.other]))
     keeps = ~told.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
     which = np.flatnonzero(told.known | keeps)
     return dda.ToldContacts(
         which=which,
         normal=np.where(told.known, normal, found.normal)[which],
         shear=np.where(told.known, shear, found.shear)[which],
-        gap=np.where(told.known & np.isfinite(told.gap), told.gap, found.gap)[which],
+        gap=np.where(told.known & np.isfinite(told.gap), gap, found.gap)[which],
         slip=np.where(told.known, told.slip, found.slip)[which],
     )
 
@@ -205,7 +218,8 @@ def _in_rock(solution, a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> tupl
     place = 0.5 * (gauss + 1)
     vector = traction(solution.stress(a + place[:, None] * (b - a)), normal)
     stress = np.column_stack([vector @ normal, vector @ -normal_of(normal)])
-    stress[stress[:, 0] >= 0] = 0.0
+    # Rock that is torn as a whole lets go of what it pressed with on one side, too.
+    stress[(stress[:, 0] >= 0) | (weight @ stress[:, 0] >= 0)] = 0.0
     return place, 0.5 * weight * np.hypot(*(b - a)), stress
 
 

@@ -61,9 +61,9 @@ class _Piece:
     name: str
 
 
-def divides(blocks: Blocks, cracks: Cracks) -> bool:
-    """Whether ``cracks`` cut some block in two. Raises ValueError as `split_blocks`."""
-    return any(BlockGraph.of(blocks, int(block), cracks).closes() for block in np.unique(cracks.block))
+def divided(blocks: Blocks, cracks: Cracks) -> np.ndarray:
+    """The blocks that ``cracks`` cut in two. Raises ValueError as `split_blocks`."""
+    return np.array([b for b in np.unique(cracks.block).tolist() if BlockGraph.of(blocks, b, cracks).closes()], int)
 
 
 def split_blocks(
