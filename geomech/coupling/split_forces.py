@@ -3,8 +3,8 @@
 The last solution of the whole body is in equilibrium, and so is every part of it under the tractions on its own boundary. Each
 segment of a new face hands its traction on to the contacts at its two ends by the linear shape functions, which keep force and
 moment, press nowhere where the faces do not and break no Coulomb law that they obey. Faces that are apart leave a gap, and
-faces that have slid their slip. Along what the crack has only just cut, rock bore the stress: pressure, and as much shear as the
-new joint can take, stay; tension is let go. Edges that a mouth has divided are treated likewise, with the traction from
+faces that have slid their slip. Along what the crack has only just cut, rock bore the stress: where it pressed as a whole, its
+resultant stays, with as much shear as the new joint can take; where it pulled, it lets go. Edges that a mouth has divided are treated likewise, with the traction from
 outside. The other contacts of the parts keep the forces that they had, whatever their springs become.
 
 All that holds where the last pass has left the blocks. In statics a block that hangs by a thread is strained beyond measure
@@ -213,14 +213,16 @@ def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rota
 
 
 def _in_rock(solution, a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places, shares and tractions without tension on a segment of rock that the last solution had whole."""
+    """Places, shares and tractions on a segment of rock that the last solution had whole: its resultant, if that presses, where
+    rock was pressed. Bent rock that lets go of its tension keeps no more of its pressure than is in balance."""
     gauss, weight = np.polynomial.legendre.leggauss(_IN_ROCK)
-    place = 0.5 * (gauss + 1)
+    place, share = 0.5 * (gauss + 1), 0.5 * weight * np.hypot(*(b - a))
     vector = traction(solution.stress(a + place[:, None] * (b - a)), normal)
-    stress = np.column_stack([vector @ normal, vector @ -normal_of(normal)])
-    # Rock that is torn as a whole lets go of what it pressed with on one side, too.
-    stress[(stress[:, 0] >= 0) | (weight @ stress[:, 0] >= 0)] = 0.0
-    return place, 0.5 * weight * np.hypot(*(b - a)), stress
+    pressure = np.maximum(-vector @ normal, 0.0)
+    resultant = share @ np.column_stack([vector @ normal, vector @ -normal_of(normal)])
+    if resultant[0] >= 0:
+        return place, share, np.zeros((len(place), 2))
+    return place, share, pressure[:, None] / (share @ pressure) * resultant
 
 
 def _contact_at(rows, found, across: np.ndarray, edges: tuple[int, int]) -> int:

@@ -16,8 +16,8 @@ from ..model import CONTACT, OPEN, SLIP, STICK
 if TYPE_CHECKING:
     from .contacts import ContactSet
 
-#: A shear force nearer to its strength than this part of it slides.
-_AT_STRENGTH = 1e-9
+#: A shear force nearer to its strength than this part of it is tried as sliding: edges have turned by strains since it was known.
+_AT_STRENGTH = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
