@@ -256,8 +256,7 @@ def test_hyperbolic_closure():
 
 def test_plane_failure_with_residual_strength():
     # A slab on 35°: held by its peak while (cA + W cos α tan φ) / (W sin α) > 1 (Hoek & Bray 1981); once broken, it slides
-    # at g sin α − g cos α tan φr − cr A/m. The slab is thin, so that its weight stands evenly on both its contacts: the
-    # upper one has 0.7 % less than its half, and fails earlier by a part of that.
+    # at g sin α − g cos α tan φr − cr A/m.
     slope, gravity = math.radians(35), 9.81
     mass = 2600.0 * 10 * 0.1
     turn = np.array([[math.cos(slope), math.sin(slope)], [-math.sin(slope), math.cos(slope)]])
@@ -281,7 +280,7 @@ def test_plane_failure_with_residual_strength():
         while state.time < 100.0 and not state.contacts["wear"].any():
             state = system.step(state, fall, min(1.0, 100.0 - state.time)).state
         assert bool(state.contacts["wear"].any()) == (safety < 1)
-    # Cohesion does not grow with the weight: half a percent of safety is five percent of weight, and the upper contact as much.
+    # Cohesion does not grow with the weight: half a percent of safety is five percent of weight.
     assert state.time > 88.0
     moving = dda.BlockSystem(
         blocks, [Material("rock", 10e9, 0.0, density=2600.0)], [law],
