@@ -213,9 +213,11 @@ def _build(options: argparse.Namespace) -> int:
     from .output.block_system import write_block_system
     from .render.block_map import draw_block_map
     from .scene import load_scene
+    from .scene.drawing import MENDED
 
     scenes = _scenes(load_scene(options.scene, options.overrides, None), options)
-    _say_warnings(scenes.values())
+    # What was mended stands among the lines of each scene.
+    _say_warnings(scenes.values(), but=MENDED)
     for name, scene in scenes.items():
         folder = options.out or (default_folder(options.scene) / (name or "") / "build")
         folder = folder / name if options.out and name and len(scenes) > 1 else folder
@@ -471,9 +473,11 @@ def _say_errors(error: Exception) -> None:
     _say(f"{len(errors)} error{'s' if len(errors) > 1 else ''}; nothing was run")
 
 
-def _say_warnings(scenes: Iterable[Any]) -> None:
-    """A line each; what several variants share is said once."""
+def _say_warnings(scenes: Iterable[Any], but: str | None = None) -> None:
+    """A line each, ``but`` for those that begin so; what several variants share is said once."""
     for place, message, way_out in dict.fromkeys(warning for scene in scenes for warning in scene.warnings):
+        if but is not None and message.startswith(but):
+            continue
         _say(f"warning: {place}: {message}" + (f"; {way_out}" if way_out else ""))
 
 

@@ -34,7 +34,7 @@ DEBIAN = {
 
 #: Distributions that runs and pictures import, gmsh apart, which has a check of its own.
 PACKAGES = ("numpy", "scipy", "numba", "shapely", "pydantic", "tomli-w", "tqdm", "meshio", "vtk", "pyvista", "imageio",
-            "matplotlib")  # fmt: skip
+            "matplotlib", "ezdxf")  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -194,4 +194,4 @@ def _lines(told: dict[str, Any], jointed: Any) -> list[str]:
         rows.append(
             f"  bridges   {bridges['number']}, mean {bridges['mean_m']:.3g} m, least {bridges['shortest_m']:.3g} m"
         )
-    return rows + [f"  mended    {text}" for text in (jointed.told() if jointed else ())]
+    return rows + [f"  mended    {text}" for text in (jointed.told("listed in block_system.json") if jointed else ())]

@@ -111,13 +111,15 @@ class Progress:
 
 
 def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
-    """The few lines that end a run: why it ended, at what loads, how long it took, where the files are."""
+    """The few lines that end a run: why it ended, at what loads (times, where nothing leads), how long it took, where the
+    files are."""
     lines = [f"{summary.get('title', 'run')}: {summary.get('end', 'done')}"]
     for kind, first in summary.get("first", {}).items():
+        # A load of 0 is that of a scene which has no leading one: it is driven by time.
         load = first.get("load_pa")
-        text = f"  {kind:<13}" + (f" {abs(load) / 1e6:8.3f} MPa" if load is not None else "")
-        text += " in tension" if load is not None and load < 0 else ""
-        if first.get("load_normalised") is not None:
+        text = f"  {kind:<13}" + (f" {abs(load) / 1e6:8.3f} MPa" if load else f" t = {first['time_s']:.4g} s")
+        text += " in tension" if load and load < 0 else ""
+        if load and first.get("load_normalised") is not None:
             text += f"   σ√(πb)/K_Ic = {first['load_normalised']:.3f}"
         count = summary.get("events", {}).get(kind, 1)
         lines.append(text + (f"   (first of {count})" if count > 1 else ""))
@@ -136,7 +138,10 @@ def _told(cycle: Cycle) -> str:
     if not cycle.cracks.n_cracks:
         return f"t = {cycle.state.time:.4g} s, {told(cycle)}"
     growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
-    text = f"load {cycle.load / 1e6:.2f} MPa, cycle {cycle.number}"
+    # A load that has not begun by then is that of a scene which has no leading one: it is driven by time.
+    timed = not cycle.load and cycle.state.time > 0
+    drive = f"t = {cycle.state.time:.4g} s" if timed else f"load {cycle.load / 1e6:.2f} MPa"
+    text = f"{drive}, cycle {cycle.number}"
     return text + (f", {growing} of {len(cycle.tips)} tips growing" if len(cycle.tips) else "")
 
 

@@ -57,6 +57,12 @@ class Run:
         """Structured array, a row an event; columns of `fields.EVENTS`."""
         return read_table(self.folder / "events.csv", ())
 
+    @cached_property
+    def led(self) -> bool:
+        """Whether a leading edge is loaded at some time: a scene without one has a load of 0 throughout."""
+        load = self.history["load"]
+        return bool(np.any(np.isfinite(load) & (load != 0)))
+
     @property
     def title(self) -> str:
         return self.summary.get("title") or self.scene.get("title") or self.folder.name

@@ -83,7 +83,10 @@ def ticks(low: float, high: float, most: int, whole: bool = False) -> list[float
     """Round numbers from ``low`` to ``high``, at most about ``most``; ``whole`` ones where asked."""
     least = (high - low) / most
     step = 10.0 ** math.floor(math.log10(least))
-    step *= next(m for m in (1, 2, 5, 10) if m * step >= least * (1 - 1e-9))
+    enough = next(m for m in (1, 2, 5, 10) if m * step >= least * (1 - 1e-9))
+    # One number is no scale: a finer step where only one of the round ones lies between.
+    finer = {10: 5, 5: 2, 2: 1, 1: 0.5}[enough]
+    step *= enough if math.floor(high / (enough * step)) > math.ceil(low / (enough * step)) else finer
     if whole:
         step = max(1.0, step)
     return [k * step for k in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]

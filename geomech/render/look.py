@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -96,18 +96,13 @@ def look(
     x0, x1, y0, y1 = blocks.bounds[:4]
     if not int(blocks.field_data["REFERENCE"][0]):
         scale = 0.0  # drawn where they are
-    elif scale is None:
-        scale = _magnification(blocks, max(x1 - x0, y1 - y0))
+    interior = interior_grid(run, cycle)
+    shown = [grid for grid in (blocks, interior) if grid is not None]
+    if scale is None:
+        scale = _magnification(shown, max(x1 - x0, y1 - y0))
     # The frame holds what there was at the start as well: rock that runs out leaves its place.
     first = run.grid("blocks", min(run.grids("blocks")))
-    interior = interior_grid(run, cycle)
-    drawn = np.concatenate(
-        [
-            grid.points[:, :2] + scale * grid["displacement"][:, :2]
-            for grid in (first, blocks, interior)
-            if grid is not None
-        ]
-    )
+    drawn = np.concatenate([grid.points[:, :2] + scale * grid["displacement"][:, :2] for grid in (first, *shown)])
     (x0, y0), (x1, y1) = drawn.min(axis=0), drawn.max(axis=0)
     rock = _rock(blocks, interior)
     limits, beyond = _limits(interior if interior is not None else _filled(blocks, rock), component)
@@ -165,9 +160,10 @@ def _crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
     return (0.0, float(np.percentile(opening, 98))) if len(opening) else (0.0, 0.0)
 
 
-def _magnification(blocks: pv.UnstructuredGrid, size: float) -> float:
-    # A common translation shows nothing; what counts is how far points move against each other.
-    spread = np.ptp(blocks["displacement"], axis=0).max()
+def _magnification(shown: Sequence[pv.UnstructuredGrid], size: float) -> float:
+    # A common translation shows nothing; what counts is how far points move against each other, and cracked blocks give
+    # way further than the strain that they have as blocks.
+    spread = max(np.ptp(grid["displacement"], axis=0).max() for grid in shown)
     if spread <= 1e-12 * size:
         return 1.0
     scale = DEFORMATION * size / spread

@@ -226,7 +226,7 @@ class Painter:
         w, h = self.size
         u = self.unit
         said = []
-        if np.isfinite(row["load"]):
+        if self.run.led and np.isfinite(row["load"]):
             pulled = " in tension" if row["load"] < 0 else ""
             said.append(f"load {abs(row['load']) / 1e6:.2f} MPa{pulled}")
         said += [f"t = {rounded(row['time'])} s", f"cycle {int(row['cycle'])}"]

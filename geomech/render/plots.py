@@ -41,11 +41,11 @@ def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -
     """Draw the curves that ``run`` has data for as files in ``folder``; their paths. ``suffix`` ".svg" draws lines that stay
     sharp; ``more`` draws energies and monitors as well."""
     history, tips = run.history, run.tips
-    loaded = np.isfinite(history["load"]).sum() > 1
+    several = len(history) > 1
     wanted = {
-        "stress_strain": (stress_strain, loaded and np.isfinite(history["strain"]).sum() > 1),
-        "stress_intensity": (stress_intensity, loaded and len(tips) > 0),
-        "crack_length": (crack_length, loaded and len(tips) > 0),
+        "stress_strain": (stress_strain, several and run.led and np.isfinite(history["strain"]).sum() > 1),
+        "stress_intensity": (stress_intensity, several and len(tips) > 0),
+        "crack_length": (crack_length, several and len(tips) > 0),
         "energy": (energies, more and bool(_energy_curves(run))),
         "monitors": (monitors, more and bool(_monitor_curves(run))),
     }
@@ -126,8 +126,8 @@ def compared(runs: Mapping[str, Run], path: Path) -> Path | None:
 
 
 def stress_intensity(axes: Axes, run: Run) -> None:
-    """K_I (full) and K_II (dashed) against load at every tip: growth relieves a tip, the load drives it up again. Tips
-    with the same curves share one; the toughness is a line across."""
+    """K_I (full) and K_II (dashed) at every tip against load, or time where nothing leads: growth relieves a tip, the load
+    drives it up again. Tips with the same curves share one; the toughness is a line across."""
     curves = _tip_curves(run)
     for k, (label, load, k_i, k_ii) in enumerate(curves):
         colour = COLOURS[k % len(COLOURS)]
@@ -147,7 +147,7 @@ def stress_intensity(axes: Axes, run: Run) -> None:
         room = 2.0 * max(toughness / 1e6, high, -low)
         bottom, top = axes.get_ylim()
         axes.set_ylim(max(bottom, low - room), min(top, high + room))
-    axes.set(xlabel=_load_label(run), ylabel="stress intensity factor, MPa√m", title=run.title)
+    axes.set(xlabel=_drive_label(run), ylabel="stress intensity factor, MPa√m", title=run.title)
 
 
 def _calm_span(run: Run) -> tuple[float, float]:
@@ -159,7 +159,7 @@ def _calm_span(run: Run) -> tuple[float, float]:
 
 
 def _tip_curves(run: Run) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
-    """(label, load MPa, K_I, K_II MPa√m) of every tip; one for all tips whose curves lie on one another."""
+    """(label, load MPa or time s, K_I, K_II MPa√m) of every tip; one for all tips whose curves lie on one another."""
     tips = run.tips
     near = _SAME * float(np.nanmax(np.abs([tips["K_I"], tips["K_II"]]), initial=0.0))
     groups: list[tuple[list[tuple[int, int]], np.ndarray]] = []
@@ -175,7 +175,7 @@ def _tip_curves(run: Run) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]
             groups.append(([(crack, end)], mine))
     n = sum(len(members) for members, _ in groups)
     return [
-        (_tip_names(run, members, n), _sense(run) * mine["load"] / 1e6, mine["K_I"] / 1e6, mine["K_II"] / 1e6)
+        (_tip_names(run, members, n), _drive(run, mine), mine["K_I"] / 1e6, mine["K_II"] / 1e6)
         for members, mine in groups
     ]
 
@@ -193,17 +193,26 @@ def _tip_names(run: Run, members: list[tuple[int, int]], n_tips: int) -> str:
 
 
 def crack_length(axes: Axes, run: Run) -> None:
-    """The length of all cracks against load: what grows at one load is a vertical line."""
+    """The length of all cracks against load, or time where nothing leads: what grows at one load is a vertical line."""
     history = _to_the_end(run)
-    axes.plot(_sense(run) * history["load"] / 1e6, 1e3 * history["crack_length"], color=COLOURS[0], lw=1.8)
+    axes.plot(_drive(run, history), 1e3 * history["crack_length"], color=COLOURS[0], lw=1.8)
     _first_events(axes, run, None)
-    axes.set(xlabel=_load_label(run), ylabel="crack length, mm", title=run.title)
+    axes.set(xlabel=_drive_label(run), ylabel="crack length, mm", title=run.title)
 
 
 def _sense(run: Run) -> float:
     """1 where the leading load presses, −1 where it pulls: its largest value is drawn to the right."""
     load = run.history["load"]
     return -1.0 if np.nanmax(np.abs(load)) > np.nanmax(load) else 1.0
+
+
+def _drive(run: Run, rows: np.ndarray) -> np.ndarray:
+    """What ``rows`` are drawn against: the leading load, MPa, or the time, s, of a run without one."""
+    return _sense(run) * rows["load"] / 1e6 if run.led else rows["time"]
+
+
+def _drive_label(run: Run) -> str:
+    return _load_label(run) if run.led else "time, s"
 
 
 def _load_label(run: Run) -> str:
@@ -216,34 +225,30 @@ def _to_the_end(run: Run) -> np.ndarray:
 
 
 def _first_events(axes: Axes, run: Run, strain: np.ndarray | None) -> None:
-    """Mark the first event of every kind: as a point on the load–strain curve, or as a line at its load. Those that
-    would be drawn over one another share one mark."""
+    """Mark the first event of every kind: as a point on the load–strain curve, or as a line at its load (at its time
+    where nothing leads). Those that would be drawn over one another share one mark."""
     history = _to_the_end(run)
+    if not len(run.events):
+        return
+    _, first = np.unique(run.events["kind"], return_index=True)
+    events = run.events[np.sort(first)]
+    # On paper, a hundredth of the axes is the size of a mark.
+    size = np.array(
+        [1.0 if strain is None else np.nanmax(np.abs(strain)), np.nanmax(np.abs(_drive(run, history)), initial=0.0)]
+    )
     marks: dict[tuple[float, float], list[str]] = {}
-    for kind, cycle, load in _firsts(run):
-        row = min(np.searchsorted(history["cycle"], cycle), len(history) - 1)
-        at = (0.0 if strain is None else float(strain[row]), _sense(run) * float(load) / 1e6)
-        # On paper, a hundredth of the axes is the size of a mark.
-        size = np.array(
-            [1.0 if strain is None else np.nanmax(np.abs(strain)), np.nanmax(np.abs(history["load"])) / 1e6]
-        )
+    for event, drive in zip(events, _drive(run, events), strict=True):
+        row = min(np.searchsorted(history["cycle"], event["cycle"]), len(history) - 1)
+        at = (0.0 if strain is None else float(strain[row]), float(drive))
         near = [other for other in marks if np.all(np.abs(np.subtract(other, at)) <= 0.01 * size)]
-        marks.setdefault(near[0] if near else at, []).append(kind)
-    for k, ((x, load), kinds) in enumerate(marks.items()):
+        marks.setdefault(near[0] if near else at, []).append(str(event["kind"]))
+    for k, ((x, drive), kinds) in enumerate(marks.items()):
         colour, label = COLOURS[1 + k % (len(COLOURS) - 1)], ", ".join(kinds)
         if strain is None:
-            axes.axvline(load, color=colour, lw=1.0, ls=":", label=label)
+            axes.axvline(drive, color=colour, lw=1.0, ls=":", label=label)
         else:
-            axes.plot(x, load, "o", color=colour, ms=5, label=label)
-    if marks:
-        axes.legend(frameon=False, fontsize=8)
-
-
-def _firsts(run: Run) -> list[tuple[str, float, float]]:
-    first: dict[str, tuple[str, float, float]] = {}
-    for event in run.events:
-        first.setdefault(str(event["kind"]), (str(event["kind"]), event["cycle"], event["load"]))
-    return list(first.values())
+            axes.plot(x, drive, "o", color=colour, ms=5, label=label)
+    axes.legend(frameon=False, fontsize=8)
 
 
 def _save(curve, run: Run, path: Path) -> Path:

@@ -72,13 +72,12 @@ def key_results(run: Run) -> dict[str, Any]:
     """What a run came to, a few numbers; what it has not is left out."""
     summary = run.summary
     first = summary.get("first", {})
-    loaded = bool(np.nanmax(np.abs(run.history["load"]), initial=0.0)) if len(run.history) else False
 
     def at(kind: str) -> str | None:
         event = first.get(kind)
         if event is None:
             return None
-        if event.get("load_pa") is None or not loaded:
+        if event.get("load_pa") is None or not run.led:
             return f"{written(event['time_s'])} s"
         relative = event.get("load_normalised")
         return f"{event['load_pa'] / 1e6:.2f} MPa" + (f" ({relative:.3f})" if relative else "")
@@ -89,7 +88,7 @@ def key_results(run: Run) -> dict[str, Any]:
 
     facts: dict[str, Any] = {"how it ended": summary.get("end", "not ended")}
     facts |= {f"first {kind}": at(kind) for kind in first}
-    if loaded:
+    if run.led:
         facts["peak load, MPa"] = scaled("peak_load_pa", 1e-6, ".2f")
         facts["strain at the end, 10⁻³"] = scaled("last_strain", 1e3, ".3f")
     if summary.get("cracks"):

@@ -39,6 +39,10 @@ def _row(run: Run) -> dict[str, Any]:
         value = first.get(kind, {}).get(what)
         return None if value is None else value / scale
 
+    def load(kind: str, what: str, scale: float = 1.0) -> float | None:
+        # Where no edge leads, a load of 0 says nothing.
+        return of(kind, what, scale) if run.led else None
+
     def plain(what: str, scale: float = 1.0) -> float | None:
         value = summary.get(what)
         return None if value is None else value / scale
@@ -46,11 +50,11 @@ def _row(run: Run) -> dict[str, Any]:
     return {
         "run": run.folder.name,
         "end": summary.get("end", "not ended"),
-        "initiation MPa": of("initiation", "load_pa", 1e6),
-        "coalescence MPa": of("coalescence", "load_pa", 1e6),
-        "peak MPa": plain("peak_load_pa", 1e6),
-        "initiation σ√(πb)/K_Ic": of("initiation", "load_normalised"),
-        "coalescence σ√(πb)/K_Ic": of("coalescence", "load_normalised"),
+        "initiation MPa": load("initiation", "load_pa", 1e6),
+        "coalescence MPa": load("coalescence", "load_pa", 1e6),
+        "peak MPa": plain("peak_load_pa", 1e6) if run.led else None,
+        "initiation σ√(πb)/K_Ic": load("initiation", "load_normalised"),
+        "coalescence σ√(πb)/K_Ic": load("coalescence", "load_normalised"),
         "growth mm": plain("crack_growth_m", 1e-3),
         "cycles": summary.get("cycles"),
         "wall s": plain("wall_s"),

@@ -23,6 +23,9 @@ from .world import local_origin, moved_section
 if TYPE_CHECKING:
     from .jointing import Jointed
 
+#: What warnings of mended joints begin with.
+MENDED = "mended while cutting"
+
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
@@ -266,7 +269,8 @@ def _assembled(
             message = f"{at}: {flaw.message}" if at else flaw.message
             faults.append(Fault(place(path), message, flaw.way_out + counted_from))
         return drawing
-    warnings += [Fault(place(("geometry",)), f"mended while cutting: {text}", "") for text in cut.told()]
+    mended = cut.told("listed by geomech build")
+    warnings += [Fault(place(("geometry",)), f"{MENDED}: {text}", "") for text in mended]
     joints = tuple(joint.name for joint in cut.joints)
     return replace(
         drawing,

@@ -40,8 +40,9 @@ class Jointed:
     cutting: Cutting
     cracks: Cracks
 
-    def told(self) -> list[str]:
-        """What was found and mended, a line a kind, with the first places and what meets there now."""
+    def told(self, others: str) -> list[str]:
+        """What was found and mended, a line a kind, with the first places and what meets there now; ``others`` says where
+        the rest are listed."""
         kinds: dict[str, list[Mend]] = {}
         for mend in self.cutting.mends:
             kinds.setdefault(mend.kind, []).append(mend)
@@ -51,7 +52,7 @@ class Jointed:
             places = [
                 f"({mend.x:.6g}, {mend.y:.6g}){f' {mend.junction}' * bool(mend.junction)}" for mend in own[:_TOLD]
             ]
-            more = f" and {len(own) - _TOLD} more, listed by geomech build" if len(own) > _TOLD else ""
+            more = f" and {len(own) - _TOLD} more, {others}" if len(own) > _TOLD else ""
             size = max(mend.size for mend in own)
             lines.append(f"{len(own)} × {kind}, up to {size:.3g} {unit}, at {', '.join(places)}{more}")
         return lines

@@ -5,6 +5,9 @@ A picture is measured in pixels; positions follow from the layout within two of 
 
 from __future__ import annotations
 
+import csv
+import shutil
+
 import numpy as np
 import pytest
 import synthetic_run as made
@@ -17,6 +20,7 @@ from geomech.render.look import final_cycle, look
 from geomech.render.movie import moments
 from geomech.render.picture import picture
 from geomech.render.plots import _tip_curves, plots
+from geomech.report.table import table
 
 imageio = pytest.importorskip("imageio.v3")
 pytestmark = pytest.mark.skipif(offscreen.usable_window() is None, reason="no off-screen OpenGL here")
@@ -209,6 +213,28 @@ def test_ticks_are_round_and_inside():
     assert ticks(-48.2, 3.1, 6) == [-40.0, -30.0, -20.0, -10.0, 0.0]
     assert ticks(0.0, 1.0, 5) == pytest.approx([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
     assert ticks(3, 6, 20, whole=True) == [3, 4, 5, 6]
+    # Never one number alone, which would be no scale.
+    assert ticks(-0.77, -0.03, 4) == pytest.approx([-0.6, -0.4, -0.2])
+    assert ticks(8, 92, 2, whole=True) == [20, 40, 60, 80]
+
+
+def test_what_nothing_leads_is_drawn_against_time(drawn_run, tmp_path):
+    """A scene without a leading edge has a load of 0 throughout: no load is told, and curves go over time."""
+    folder = tmp_path / "run"
+    shutil.copytree(drawn_run.folder, folder)
+    for name in ("history.csv", "tips.csv", "events.csv"):
+        with open(folder / name, newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        with open(folder / name, "w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, rows[0])
+            writer.writeheader()
+            writer.writerows(row | {"load": "0.0"} for row in rows)
+    run = Run(folder)
+    assert drawn_run.led and not run.led
+    paths = plots(run, tmp_path, suffix=".svg")
+    assert [path.name for path in paths] == ["stress_intensity.svg", "crack_length.svg"]
+    (row,) = table([run])
+    assert row["initiation MPa"] is row["peak MPa"] is row["initiation σ√(πb)/K_Ic"] is None
 
 
 def test_curves_need_no_opengl(drawn_run, tmp_path):
