@@ -4,10 +4,10 @@ A vertex meets the interior of an edge when its corner points away from the edge
 through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
 entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
 within the other's edge; where each lies within the other's, the two corners are the ends of a short common face, and both
-stand for the line. An edge bounds its block no farther than to its other end: corners that are beyond it do not meet there,
-however near they are (outlines that a crack has left have edges shorter than the window). When two lines remain, the corners
-overlap only if both gaps are negative, and the line of the smaller penetration carries the contact; each is stored as the
-other's *partner*.
+stand for the line. Corners meet only if neither is nearer to a neighbour of the other: on outlines with edges shorter than the
+window, as cracks leave them, all are in reach of all, and the lines of far ones are crossed by blocks that do not touch.
+When two lines remain, the corners overlap only if both gaps are negative, and the line of the smaller penetration carries
+the contact; each is stored as the other's *partner*.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ _ANGLE = 0.05
 _PARALLEL = 0.0025
 # Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
 _ENDS = 1e-4
-# Corners that are past the far end of an edge by more than this part of it are not met by its line; a corner that is pressed
-# into the face behind a short riser is past the riser's end by what it penetrates.
-_PAST = 0.1
+# Corners are nearer to one than to another when their distances squared differ by more than this part.
+_NEARER = 1e-2
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
 
@@ -50,6 +49,32 @@ def _against(vertices, next_vertex, previous_vertex, vertex, edge):
         and _dot_to(vertices, vertex, previous_vertex[vertex], ty, -tx) >= -_ANGLE
     )
     return feasible, ty, -tx, px * ty - py * tx, px * tx + py * ty, length
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _nearer(vertices, here, one, other):
+    """Whether vertex ``here`` is nearer to vertex ``one`` than to the ``other``."""
+    ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
+    bx, by = vertices[here, 0] - vertices[other, 0], vertices[here, 1] - vertices[other, 1]
+    return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _meet(vertices, next_vertex, previous_vertex, v, w):
+    """Whether two corners are each other's: neither is nearer to a neighbour of the other along its outline."""
+    return not (
+        _nearer(vertices, v, next_vertex[w], w)
+        or _nearer(vertices, v, previous_vertex[w], w)
+        or _nearer(vertices, w, next_vertex[v], v)
+        or _nearer(vertices, w, previous_vertex[v], v)
+    )
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
+    """Whether an edge with this ``gap`` is what ``vertex`` meets at a corner, rather than the corner's ``other`` edge."""
+    feasible, _, _, beside, _, _ = _against(vertices, next_vertex, previous_vertex, vertex, other)
+    return not feasible or gap >= beside
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -126,8 +151,8 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
     pick_edge = np.empty(4, np.int64)
     rows = np.empty(4, np.int64)
     pick = np.empty(
-        (4, 7)
-    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside, distance past its far end
+        (4, 6)
+    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside
     twin = np.empty(4, np.int64)  # the other end of the same face
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
@@ -147,6 +172,8 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                 dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
                 if dx * dx + dy * dy > 2.25 * window * window or not convex[w]:
                     continue
+                if not _meet(vertices, next_vertex, previous_vertex, v, w):
+                    continue
                 n_lines = 0
                 for c in range(4):
                     # Vertices of the later block stand first: at an exact tie they own the contact.
@@ -162,7 +189,6 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                     nx, ny = sign * nx, sign * ny
                     outside = max(0.0, -along, along - length)
                     inside = min(along, length - along)
-                    past = along - length if edge == v or edge == w else -along
                     same = -1
                     for k in range(n_lines):
                         if pick[k, 0] * nx + pick[k, 1] * ny > 1.0 - _PARALLEL:
@@ -190,12 +216,11 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                         twin[k] = -1
                     pick_vertex[k], pick_edge[k] = vertex, edge
                     pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
-                    pick[k, 5], pick[k, 6] = inside, past
-                widest, met = -np.inf, True
+                    pick[k, 5] = inside
+                widest = -np.inf
                 for k in range(n_lines):
                     widest = max(widest, pick[k, 2])
-                    met = met and pick[k, 6] <= _PAST * pick[k, 4]
-                if widest > window or not met:
+                if widest > window:
                     continue
                 if count + 4 > table.shape[0]:
                     return -1
@@ -229,8 +254,22 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                     feasible, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
                     if not feasible or abs(gap) > window or along < -window or along > length + window:
                         continue
-                    if (along <= window and convex[edge]) or (along >= length - window and convex[end]):
-                        continue  # corner to corner, done above
+                    # In a re-entrant corner a vertex may be past an edge's end by what it penetrates, not round the next corner.
+                    if along < 0.0 and not convex[edge] and _nearer(vertices, v, previous_vertex[edge], edge):
+                        continue
+                    if along > length and not convex[end] and _nearer(vertices, v, next_vertex[end], end):
+                        continue
+                    # Corner to corner is done above, for corners that meet; of others the shallower edge is met within its ends.
+                    if convex[edge] and along <= window:
+                        if along < 0.0 or _meet(vertices, next_vertex, previous_vertex, v, edge):
+                            continue
+                        if not _shallower(vertices, next_vertex, previous_vertex, v, gap, previous_vertex[edge]):
+                            continue
+                    if convex[end] and along >= length - window:
+                        if along > length or _meet(vertices, next_vertex, previous_vertex, v, end):
+                            continue
+                        if not _shallower(vertices, next_vertex, previous_vertex, v, gap, end):
+                            continue
                     if count == table.shape[0]:
                         return -1
                     count = max(count, _add(table, count, first, v, edge) + 1)

@@ -137,3 +137,19 @@ def test_faces_that_a_crack_has_left_touch_and_do_not_overlap(window):
         assert (gap[partners] > -1e-12).any()
     # Level ends of the faces, and the facets in their imprint.
     assert (np.abs(gap) < 1e-12).sum() >= 6
+
+
+@pytest.mark.parametrize("window", [0.01, 0.1, 0.374])
+def test_corners_round_a_short_riser_do_not_overlap(window):
+    """Columns that have broken at their base side by side: the break of one ends 5 cm above where the next begins."""
+    base = [[-2, -1], [2, -1], [2, 0], [1, 0.0], [0.5, 0.0267], [0.2, 0.0158], [-0.15, 0.0146], [-0.5, 0.0]]
+    left = [[-0.5, 0.0526], [-0.8, 0.0257], [-1.15, 0.0], [-1.5, 0.0], [-2, 0.0]]
+    below = np.array(base + left)
+    inner = np.array([[-0.5, 0.0], [-0.15, 0.0146], [0.2, 0.0158], [0.5, 0.0267], [0.5, 10], [-0.5, 10]])
+    outer = np.array([[-1.5, 0.0], [-1.15, 0.0], [-0.8, 0.0257], [-0.5, 0.0526], [-0.5, 10], [-1.5, 10]])
+    table, geometry, _ = search([below, inner, outer], window=window)
+    gap = geometry[:, 3]
+    for row in np.flatnonzero(gap < -1e-12):
+        partners = table[row, 2:][table[row, 2:] >= 0]
+        assert (gap[partners] > -1e-12).any()
+    assert (np.abs(gap) < 1e-12).sum() >= 8
