@@ -50,6 +50,7 @@ def draw_quantity(grids: Sequence[Grid], cells: Sequence[Judged], quantity: str,
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, LogNorm
+    from matplotlib.ticker import LogLocator
 
     told = {g.title: [getattr(c, quantity) for c in cells if c.map == g.title] for g in grids}
     grids = [g for g in grids if any(v > 0 for v in told[g.title])]
@@ -65,9 +66,11 @@ def draw_quantity(grids: Sequence[Grid], cells: Sequence[Judged], quantity: str,
         faces = [shades(norm(v)) if v > 0 else "#f4f4f4" for v in values]
         _squares(panel, grid, faces, ["–" if math.isnan(v) else _short(v) for v in values])
         panel.set_title(grid.title, fontsize=10, loc="left")
-    figure.colorbar(
-        ScalarMappable(norm, shades), ax=last, orientation="horizontal", fraction=0.15, label=f"{name} (–: none)"
-    )
+    bar = figure.colorbar(
+        ScalarMappable(norm, shades), ax=last, orientation="horizontal", fraction=0.15, ticks=LogLocator(numticks=6),
+        label=f"{name} (–: refused, or none)",
+    )  # fmt: skip
+    bar.minorticks_off()
     return _saved(figure, path)
 
 
