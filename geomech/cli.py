@@ -147,7 +147,7 @@ def _parser() -> argparse.ArgumentParser:
     render.add_argument("--gif", action=argparse.BooleanOptionalAction, default=None, help="draw the movie")
 
     report = verb(
-        "report", _report, "tabulate what runs came to, and write a page with tables, curves and pictures: report.html",
+        "report", _report, "tabulate what runs came to, and write a page with tables, curves and pictures",
         "geomech report outputs/two_cracks/phi_0\ngeomech report outputs/two_cracks\ngeomech report outputs/bench_ddm",
     )  # fmt: skip
     report.description += (
@@ -157,7 +157,12 @@ def _parser() -> argparse.ArgumentParser:
         "runs", nargs="+", type=Path, metavar="RUN", help="run folders, folders of run folders, or a benchmark's folder"
     )
     report.add_argument("--csv", action="store_true", help="write the table as CSV, and no page")
-    report.add_argument("--out", type=Path, metavar="FILE", help="where the page goes (default report.html in RUN)")
+    report.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="where the page goes (default report.html in RUN, runs.html where RUN holds several)",
+    )
     report.add_argument("--page", action=argparse.BooleanOptionalAction, default=True, help="write the page")
 
     bench = verb(

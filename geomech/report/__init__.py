@@ -13,7 +13,8 @@ __all__ = ["COLUMNS", "as_csv", "as_text", "is_benchmark", "table", "write_page"
 
 def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> Path:
     """Write the page of ``runs``, which lie in ``folder`` (one: in it), or with none of the benchmark there; the file, by
-    default ``report.html`` in ``folder``."""
+    default ``report.html`` in ``folder``, or ``runs.html`` where runs are below it: there a study leaves its own
+    ``report.html``."""
     if not runs:
         from .of_benchmark import page_of_benchmark
 
@@ -26,7 +27,8 @@ def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> P
         from .of_runs import page_of_runs
 
         made = page_of_runs(runs, folder)
-    return made.write(folder / "report.html" if path is None else path)
+    below = any(run.folder.resolve() != folder.resolve() for run in runs)
+    return made.write(folder / ("runs.html" if below else "report.html") if path is None else path)
 
 
 def is_benchmark(folder: Path) -> bool:

@@ -15,6 +15,7 @@ import synthetic_run as made
 
 from geomech.cli import BAD_INPUT, DONE, main
 from geomech.output import Histories, Run, Series, Summary
+from geomech.report import write_page
 from geomech.report.of_runs import differences
 from geomech.report.page import Page, written
 
@@ -113,6 +114,16 @@ def test_page_of_a_run(runs, capsys):
     assert float(tips[1][4].replace("−", "-")) == pytest.approx(run.tips["K_I"][0] / 1e6, rel=1e-3)
     assert {kind for kind, _ in read.images} <= {"image/png", "image/svg+xml"}
     assert any(data[:5] == b"<?xml" for _, data in read.images)
+
+
+def test_a_studys_own_page_is_not_written_over(runs):
+    study = runs / "report.html"
+    study.write_text("tables of the study")
+    made = write_page(runs, [Run(runs / "one"), Run(runs / "other")])
+    assert made == runs / "runs.html"
+    assert study.read_text() == "tables of the study"
+    study.unlink()
+    made.unlink()
 
 
 def test_page_of_runs_side_by_side(runs, capsys):
