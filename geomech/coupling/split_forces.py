@@ -150,16 +150,20 @@ def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_pa
     shear = np.sum(told.force * normal_of(across), axis=1)
     normal = np.where(normal > _NOTHING * np.abs(told.force).max(initial=0.0), normal, 0.0)
     rough = np.array([joint.roughness is not None for joint in system.joints])[found.law]
-    most = np.where(rough, np.inf, found.springs.peak * normal)
-    shear = np.clip(shear, -most, most)
-    size = np.sqrt(blocks.areas())
-    gap = np.minimum(told.gap, _FARTHEST * np.minimum(size[found.block], size[found.other]))
     keeps = ~told.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
+    normal, shear = np.where(told.known, normal, found.normal), np.where(told.known, shear, found.shear)
+    size = np.sqrt(blocks.areas())
+    farthest = _FARTHEST * np.minimum(size[found.block], size[found.other])
+    gap = np.minimum(told.gap, farthest)
+    # Joints as soft as their law says, of the little length that a corner may be left with, cannot bear what a whole face did.
+    normal = np.minimum(normal, found.springs.normal * farthest)
+    most = np.where(rough, np.inf, found.springs.peak * np.maximum(normal, 0.0))
+    shear = np.where(found.bonded > 0, shear, np.clip(shear, -most, most))
     which = np.flatnonzero(told.known | keeps)
     return dda.ToldContacts(
         which=which,
-        normal=np.where(told.known, normal, found.normal)[which],
-        shear=np.where(told.known, shear, found.shear)[which],
+        normal=normal[which],
+        shear=shear[which],
         gap=np.where(told.known & np.isfinite(told.gap), gap, found.gap)[which],
         slip=np.where(told.known, told.slip, found.slip)[which],
     )
