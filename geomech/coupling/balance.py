@@ -3,6 +3,7 @@ that the blocks assumed."""
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +16,8 @@ from .compliance import crack_response
 from .cracked_blocks import CrackedBlocks
 from .settling import Settling
 from .side_by_side import side_by_side
+
+log = logging.getLogger(__name__)
 
 #: A pass is repeated while the crack strain it assumed and the one it found differ by more than this part of the
 #: block's strain.
@@ -30,6 +33,9 @@ STILL = 1e-3
 #: Passes at one geometry; they agree after two to eight, or some more where faces of a block that is nearly cut through open and
 #: close. A lag that is left is corrected by the next step.
 COMPLIANCE_PASSES = 20
+
+#: Larger lags than this are told of.
+NO_ANSWER = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,9 +72,16 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
         if not now.bodies:
             return Balance(result, {}, np.empty(0, TIP))
         _solve_bodies(now, result)
-        mismatch = _take_response(now, result.state, settling, tolerance)
+        differences = _take_response(now, result.state, settling, tolerance)
+        mismatch = float(differences.max())
         if mismatch < tolerance:
             break
+    lost = np.array(list(now.solutions), int)[differences > NO_ANSWER]
+    if len(lost):
+        log.warning(
+            "t = %g s: %s and the cracks in it find no common strain in %d passes (they differ by %.2g of it): it hangs by little",
+            result.state.time, ", ".join(now.blocks.names[b] for b in lost[:3]), attempt + 1, mismatch,
+        )  # fmt: skip
     imbalance = max(load.imbalance for load in now.loads.values())
     statistics = {
         "open_close_iterations": iterations,
@@ -89,8 +102,8 @@ def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
     now.solved_from = now.history
 
 
-def _take_response(now: CrackedBlocks, state: State, settling: Settling, tolerance: float) -> float:
-    """Set what DDA should assume next, and say how far off the last assumption was (relative strain)."""
+def _take_response(now: CrackedBlocks, state: State, settling: Settling, tolerance: float) -> np.ndarray:
+    """Set what DDA should assume next, and say how far off the last assumption was in each cracked block (relative strain)."""
     solutions = now.solutions
     blocks = np.array(list(solutions), int)
     compliance, offset = now.response.compliance.copy(), now.response.offset.copy()
@@ -111,13 +124,13 @@ def _take_response(now: CrackedBlocks, state: State, settling: Settling, toleran
         size = np.abs(elastic).max(axis=1) + np.abs(found).max(axis=1)
         size = np.maximum(size, STILL * size.max())
         if not size.any():
-            mismatch = 0.0
+            differences = np.zeros(len(blocks))
         else:
-            mismatch = float((np.abs(residual).max(axis=1) / size).max())
-            if mismatch >= tolerance:
+            differences = np.abs(residual).max(axis=1) / size
+            if differences.max() >= tolerance:
                 offset[blocks] = settling.next(offset[blocks] - residual, residual, compliance[blocks], size)
     now.response = dda.CrackResponse(compliance, offset)
-    return mismatch
+    return differences
 
 
 def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:

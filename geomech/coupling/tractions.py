@@ -225,7 +225,8 @@ def _faces_and_lone(
     for face, members in found.items():
         start, _, along, length = _line(blocks, blocks.sides[face[0]])
         acting = [touch for touch in members if touch.acts]
-        places = [_along(touch.point, start, along) for touch in acting]
+        # A corner that has slid past an end of the side presses on that end.
+        places = [min(max(_along(touch.point, start, along), 0.0), length) for touch in acting]
         # Points apart by no more than round-off are one.
         if acting and max(places) - min(places) > SAME * length:
             faces[face] = members
