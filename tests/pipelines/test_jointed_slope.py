@@ -46,6 +46,7 @@ def test_record_is_that_of_el_centro():
     assert not base.values[:2].any()
 
 
+@pytest.mark.slow
 def test_slips_like_a_sliding_block(tmp_path):
     """Whole blocks, over the two pulses that move the slope: Newmark's rigid block slips by 34.5 mm on its plane.
 
