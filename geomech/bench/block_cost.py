@@ -7,7 +7,6 @@ exponent of the cost, iterative solutions of the last equations, and errors agai
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import statistics
@@ -20,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from ..model import Blocks, JointLaw, State
+from ..output.summary import write_json
 from . import block_scenes
 from .block_iteration import Iterated, block_jacobi, two_levels
 from .block_scenes import FRICTION, GRAVITY, JOINT, ROCK, WEIGHT
@@ -133,7 +133,7 @@ def measure(quick: bool = False) -> Measured:
         "costs": [asdict(c) for c in costs], "exponents": exponents, "iterated": iterated, "errors": found,
         "shi_s_per_iteration": SHI, "quick": quick,
     }  # fmt: skip
-    (FOLDER / "cost_of_size.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(FOLDER / "cost_of_size.json", written)
     draw(costs, SHI, FOLDER / "cost_of_size.png")
     times = {f"{c.scene}, {c.blocks} blocks: {what}": getattr(c, what) for c in costs for what in ("iteration", "step")}
     return Measured.of(_table(costs, exponents, iterated, found), errors=found, times=times)

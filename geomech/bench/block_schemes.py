@@ -6,7 +6,6 @@ given blocks to the last state.
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -16,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..model import BaseMotion, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from ..output.summary import write_json
 from ..reference import block_chain
 from ..reference.base_shaking import sliding_block
 from ..reference.block_motion import column_shortening
@@ -56,7 +56,7 @@ def measure(quick: bool = False) -> Measured:
     points = list(_points(slice(None, None, 2) if quick else slice(None)))
     FOLDER.mkdir(parents=True, exist_ok=True)
     told = {"points": [asdict(p) for p in points], "quick": quick}
-    (FOLDER / "work_precision.json").write_text(json.dumps(told, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(FOLDER / "work_precision.json", told)
     draw(
         points, METHODS, FOLDER / "work_precision.png", (2, 2), lambda p: f"{p.size:g}",
         ("relative error, better to the right", "time, ms"), None,

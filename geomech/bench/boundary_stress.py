@@ -9,13 +9,13 @@ Errors are the largest of the four tips', relative to the largest |K| of that mo
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..model import Cycle, Problem
+from ..output.summary import write_json
 from ..reference.two_cracks import PHI_DEG
 from .figures import Measured
 
@@ -111,7 +111,7 @@ def measure(quick: bool = False) -> Measured:
     elements = [dict(zip(("phi_deg", "error_k_i", "error_k_ii"), (phi, *paper_elements(phi)))) for phi in angles]
     FOLDER.mkdir(parents=True, exist_ok=True)
     told = {"routes": rows, "quadratic_elements": elements, "quick": quick}
-    (FOLDER / "boundary.json").write_text(json.dumps(told, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(FOLDER / "boundary.json", told)
     lines = [
         "How contact forces reach the cracks: errors of K against the crack solver alone under the exact tractions",
         f"{'stress MPa':>10}{'φ':>5}  {'route':<22}{'K_I':>10}{'K_II':>10}",

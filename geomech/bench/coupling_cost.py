@@ -6,7 +6,6 @@ many passes as the strain of the cracks needs to settle; a pass is a step of the
 
 from __future__ import annotations
 
-import json
 import os
 import statistics
 import time
@@ -16,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ..model import Cracks, DdmSettings, GrowthSettings, Problem, RunSettings
+from ..output.summary import write_json
 from . import block_scenes
 from .figures import Measured
 
@@ -102,7 +102,7 @@ def measure(quick: bool = False) -> Measured:
     specimen = None if quick or not SPECIMEN.exists() else of_specimen(2)
     FOLDER.mkdir(parents=True, exist_ok=True)
     written = {"walls": walls, "specimen": specimen, "quick": quick, "processors": os.cpu_count()}
-    (FOLDER / "coupling.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(FOLDER / "coupling.json", written)
     lines = [
         "Coupling beside the blocks' own cost, a pass, when nothing grows (medians)",
         f"{'blocks':>8}{'cracked':>9}{'passes':>8}{'blocks ms':>11}{'coupling ms':>13}{'ratio':>8}   goal < {RATIO:g}",

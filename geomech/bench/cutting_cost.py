@@ -6,7 +6,6 @@ cut is checked: the blocks' areas add up to the rock's.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import time
@@ -16,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..output.summary import write_json
 from ..shapes import Joint, Zone, cut
 from ..shapes.joint_sets import Law, parallel_set, poisson_lines, voronoi
 from .block_cost import peak_memory
@@ -110,7 +110,7 @@ def measure(quick: bool = False) -> Measured:
     exponents = {network: exponent(own) for network, own in by_network.items()}
     FOLDER.mkdir(parents=True, exist_ok=True)
     written = {"costs": [asdict(c) for c in costs], "exponents": exponents, "quick": quick}
-    (FOLDER / "cost_of_size.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(FOLDER / "cost_of_size.json", written)
     draw_cutting(costs, FOLDER / "cost_of_size.png")
     busy = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     lines = [

@@ -15,10 +15,11 @@ import statistics
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
+
+from ..output.summary import installed, write_json
 
 #: Kinds of figures. Less is better of both; `TIME` in seconds, `ERROR` relative.
 ERROR, TIME = "error", "time"
@@ -74,12 +75,6 @@ def machine() -> dict:
     if information.is_file():
         names = [line.split(":", 1)[1].strip() for line in information.read_text().splitlines() if "model name" in line]
         processor = names[0] if names else processor
-    versions = {}
-    for package in PACKAGES:
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
     return {
         "processor": processor,
         "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
@@ -87,7 +82,7 @@ def machine() -> dict:
         "python": platform.python_version(),
         "threads of BLAS": os.environ.get("OPENBLAS_NUM_THREADS", "all"),
         "load average": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
-        "versions": versions,
+        "versions": installed(PACKAGES),
     }
 
 
@@ -126,7 +121,7 @@ def write(path: Path, topics: dict[str, Measured], *, quick: bool, unit: float) 
             for name, found in topics.items()
         },
     }
-    path.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_json(path, told)
     return path
 
 

@@ -6,10 +6,10 @@ find the load itself, whatever the longest step.
 
 from __future__ import annotations
 
-import json
 import time
 from pathlib import Path
 
+from ..output.summary import write_json
 from .figures import Measured
 
 #: Where the numbers go, below the working folder.
@@ -56,7 +56,7 @@ def measure(quick: bool = False) -> Measured:
         for dt in (FIXED[:2] if quick else FIXED)
     }
     FOLDER.mkdir(parents=True, exist_ok=True)
-    (FOLDER / "steps.json").write_text(json.dumps({"rows": rows, "quick": quick}, indent=1), encoding="utf-8")
+    write_json(FOLDER / "steps.json", {"rows": rows, "quick": quick})
     exact = rows["events"]["loads"]
     lines = [
         f"Load steps, two-crack specimen {VARIANT} to coalescence, warm; a second is 0.2 MPa",

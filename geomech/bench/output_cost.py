@@ -6,7 +6,6 @@ share of a run is that of a real one, block solver and all, with all that it doe
 
 from __future__ import annotations
 
-import json
 import statistics
 import tempfile
 import time
@@ -17,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..model import Cracks, Cycle, DdmSettings, GrowthSettings, Problem, RunSettings
+from ..output.summary import write_json
 from . import block_scenes
 from .figures import Measured
 
@@ -66,7 +66,7 @@ def measure(quick: bool = False) -> Measured:
     writers = {name: statistics.median(times) for name, times in _writers(problem, cycle, 3 if quick else 7).items()}
     FOLDER.mkdir(parents=True, exist_ok=True)
     told = {"series": asdict(found), "share of a run": share, "writers_s": writers, "quick": quick}
-    (FOLDER / "output.json").write_text(json.dumps(told, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(FOLDER / "output.json", told)
     ours = writers[OURS]
     lines = [
         f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles: {found.bytes_a_cycle / 1e6:.2f} MB a cycle",

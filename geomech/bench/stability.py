@@ -7,13 +7,13 @@ reason, reported (beyond the bound, and a warning says so), or wrong. The bounds
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
+from ..output.summary import write_json
 from . import crack_limits
 from . import stability_scenes as scenes
 from .figures import Measured
@@ -36,7 +36,7 @@ def measure(quick: bool = False) -> Measured:
     lines.append("  ".join(f"{counts[verdict]} {verdict}" for verdict in (RIGHT, REPORTED, REFUSED, WRONG)))
     folder = Path("outputs/stability")
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "stability.json").write_text(json.dumps([asdict(cell) for cell in every], indent=1), encoding="utf-8")
+    write_json(folder / "stability.json", [asdict(cell) for cell in every])
     draw(of_blocks, every, folder / "stability.png")
     draw(of_cracks, every, folder / "cracks.png")
     for quantity, name in QUANTITIES.items():

@@ -6,7 +6,6 @@ repetitions after one that is not counted. The error is the largest of any tip's
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
 import time
@@ -16,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from ..model import DdmSettings
+from ..output.summary import write_json
 from . import constant_elements, crack_problems, finite_elements, growth_run
 from .crack_problems import CrackProblem, factors, with_reference
 from .figures import Measured, machine
@@ -66,7 +66,7 @@ def measure(quick: bool = False) -> Measured:
     written = {
         "machine": machine(), "points": [asdict(p) for p in points], "growth": growth, "goals": goals, "quick": quick
     }  # fmt: skip
-    (FOLDER / "work_precision.json").write_text(json.dumps(written, indent=1, ensure_ascii=False), encoding="utf-8")
+    write_json(FOLDER / "work_precision.json", written)
     draw(points, METHODS, FOLDER / "work_precision.png")
     own = [(f"{p.problem}, {p.method}: {p.size}", p) for p in points if p.method in (OURS, ASKED)]
     return Measured.of(

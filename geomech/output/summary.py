@@ -8,6 +8,8 @@ import math
 import os
 import platform
 import time
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -146,11 +148,16 @@ def normalisation(problem: Problem) -> tuple[float, float] | None:
 def versions() -> dict[str, str]:
     """Versions of what computed the run."""
     found = {"python": platform.python_version(), "machine": f"{platform.machine()}, {os.cpu_count()} cores"}
-    for package in ("geomech", "numpy", "scipy", "numba", "shapely", "gmsh"):
-        try:
+    packages = ("geomech", "numpy", "scipy", "numba", "shapely", "gmsh")
+    return found | dict.fromkeys(packages, "not installed") | installed(packages)
+
+
+def installed(packages: Iterable[str]) -> dict[str, str]:
+    """The versions of those ``packages`` that are there."""
+    found = {}
+    for package in packages:
+        with suppress(importlib.metadata.PackageNotFoundError):
             found[package] = importlib.metadata.version(package)
-        except importlib.metadata.PackageNotFoundError:
-            found[package] = "not installed"
     return found
 
 
