@@ -17,6 +17,12 @@ PENALTY_RATIO = 40.0
 #: walls of two rocks 1 : 1000 do not settle and 1 : 10⁶ costs five digits; by the softer one alone, steel platens on rock
 #: give way twelve times as much as they need.
 _MOST_CONTRAST = 32.0
+#: A joint's stiffness per area acts on a contact's tributary length, and on no less than this part of the smaller block's
+#: size, √area. A corner has no length: were it as stiff as the solver's penalty, blocks that slide or turn from a face onto a
+#: corner would begin on it with the penetration of the soft face, a hundred times the force and energy from nowhere, and
+#: what comes to lie on a sliver of a face would store its shear force in a spring that is next to none.
+#: Faces of slabs up to 100 : 1 are longer than that.
+_LEAST_FACE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,20 +121,33 @@ def penalties(
     return PENALTY_RATIO * both * np.maximum(1.0, 4.0 * length * length / larger)
 
 
+def least_face(block: np.ndarray, other: np.ndarray, area: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """(n,) m of face that the stiffness of a contact between ``block`` and ``other`` (n,) is that of at least; ``area`` m² and
+    ``fixed`` (n_blocks,)."""
+    free = np.where(fixed, np.inf, area)
+    smaller = np.minimum(free[block], free[other])
+    return _LEAST_FACE * np.sqrt(np.where(np.isfinite(smaller), smaller, np.minimum(area[block], area[other])))
+
+
 def contact_springs(
-    table: JointTable, law: np.ndarray, length: np.ndarray, normal_penalty: np.ndarray, shear_penalty: np.ndarray
+    table: JointTable,
+    law: np.ndarray,
+    length: np.ndarray,
+    least: np.ndarray,
+    normal_penalty: np.ndarray,
+    shear_penalty: np.ndarray,
 ) -> Springs:
     """Springs of contacts with joint ``law`` (n,) and tributary ``length`` (n,) m, that have not slipped.
 
-    A law's stiffness (Pa/m) times the tributary length takes the place of the penalty (Pa); a lone corner has no
-    tributary length and keeps the penalty, and has neither cohesion nor tensile strength.
+    A law's stiffness (Pa/m) times the tributary length, at ``least`` (n,) m (`least_face`), takes the place of the penalty
+    (Pa). A lone corner has no tributary length and neither cohesion nor tensile strength.
     """
-    face = length > 0
+    bearing = np.maximum(length, least)
     kn, ks = table.normal_stiffness[law], table.shear_stiffness[law]
     friction, nothing = table.friction[law], np.zeros(len(law))
     return Springs(
-        normal=np.where(face & ~np.isnan(kn), kn * length, normal_penalty),
-        shear=np.where(face & ~np.isnan(ks), ks * length, shear_penalty),
+        normal=np.where(np.isnan(kn), normal_penalty, kn * bearing),
+        shear=np.where(np.isnan(ks), shear_penalty, ks * bearing),
         friction=friction,
         sliding=nothing,
         peak=friction,

@@ -12,7 +12,7 @@ import numpy as np
 from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
-from .contact_springs import JointTable, Springs, contact_springs, penalties
+from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
@@ -222,7 +222,12 @@ class ContactFinder:
         else:
             normal = np.full(len(block), float(kn))
         return contact_springs(
-            self._table, law, length, normal, normal if ks is None else np.full(len(block), float(ks))
+            self._table,
+            law,
+            length,
+            least_face(block, other, self._area, self._fixed),
+            normal,
+            normal if ks is None else np.full(len(block), float(ks)),
         )
 
     def _remembered(self, old, parent, time, geometry, partner, springs):
@@ -282,8 +287,8 @@ class ContactFinder:
         t, lone = self._table, found.geometry[:, 4] <= 0
         by_peak = t.stiff_by_peak[found.law] & ~lone
         return (
-            lone | np.isnan(t.normal_stiffness[found.law]),
-            (lone | np.isnan(t.shear_stiffness[found.law])) & ~by_peak,
+            np.isnan(t.normal_stiffness[found.law]),
+            np.isnan(t.shear_stiffness[found.law]) & ~by_peak,
         )
 
     def curved(self, found: ContactSet) -> CurvedJoints | None:
