@@ -311,15 +311,16 @@ def describe_contacts(
             if cosine < facing:
                 facing = cosine
                 mate[row] = own
+            # As near to an end as this, the corner stands for the end, too, and faces the edges on both sides of a flat node.
+            ends = _ENDS * max(length, own_length)
             for turn in range(3):
-                # A corner on a flat node faces the edges on both sides of that node.
                 face = edge
                 if turn == 1:
-                    if along > 1e-6 * length:
+                    if along > ends:
                         continue
                     face = previous_vertex[edge]
                 elif turn == 2:
-                    if along < (1.0 - 1e-6) * length:
+                    if along < length - ends:
                         continue
                     face = next_vertex[edge]
                 far = next_vertex[face]

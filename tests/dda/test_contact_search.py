@@ -91,6 +91,22 @@ def test_a_face_split_by_a_flat_node_keeps_its_length():
     assert geometry[:, 4].sum() == pytest.approx(2.0)
 
 
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("beside", [0.0, *(way * 10.0**k for k in (-7, -6, -5, -4, -3, -2) for way in (1, -1))])
+def test_a_face_keeps_its_length_while_a_corner_passes_a_flat_node(beside, mirrored):
+    """The length is what a joint's stiffness is multiplied by: a corner that has slid a tenth of a millimetre past a node of
+    the face below stands on no soft spring there. Counted double or not at all is at most where the two are told
+    apart, 1e-4 of an edge of 3 m, on both of its sides."""
+    lower = np.array([[-3, -1], [3, -1], [3, 0], [0, 0], [-3, 0.0]])
+    upper = rectangle(beside, 0.0, beside + 2.0, 1.0)
+    if mirrored:
+        lower, upper = (polygon[::-1] * [-1.0, 1.0] for polygon in (lower, upper))
+    _, geometry, _ = search([lower, upper])
+    assert geometry[:, 4].sum() == pytest.approx(2.0, abs=6e-4)
+    near = np.abs(geometry[:, 5]) < 0.5
+    assert geometry[near, 4].sum() == pytest.approx(1.0, abs=6e-4 + abs(beside))
+
+
 def test_many_blocks_agree_with_testing_every_pair():
     # The sweep over sorted boxes against the same narrow phase run on each pair of blocks alone.
     rng = np.random.default_rng(3)
