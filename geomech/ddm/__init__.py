@@ -1,6 +1,7 @@
 """Displacement discontinuity method: cracks in an elastic body.
 
     body = ddm.Body(loops, cracks, material)        # loops [] for the infinite plane; holes=, supports=
+    body = ddm.Body([], cracks, material, half_plane=ddm.HalfPlane((0, 0)))     # below a free surface
     sol = body.solve(ddm.BodyLoad(remote_stress=[0, 1e6, 0]))
     sol.tips["k_i"], sol.faces.opening, sol.stress(points), sol.displacement(points)
 
@@ -19,6 +20,7 @@ from importlib import import_module
 _PUBLIC = {
     "Body": ".body",
     "BodyLoad": ".loads",
+    "HalfPlane": ".half_plane",
     "OutOfEquilibrium": ".loads",
     "Pressure": ".loads",
     "Support": ".supports",
@@ -34,6 +36,7 @@ _MODULES = ("criteria", "growth", "initiation", "shapes")
 __all__ = [
     "Body",
     "BodyLoad",
+    "HalfPlane",
     "LoadHistory",
     "NotConverged",
     "OutOfEquilibrium",

@@ -10,9 +10,9 @@ import numpy as np
 from .distributed import LineForces, approximate, pieces
 from .influence import ElementSet
 from .loads import BodyLoad, OutOfEquilibrium, resultants
-from .particular import Particular
+from .particular import GrowingWithDepth, Particular
 from .placing import OFF, onto_boundary
-from .point_loads import KelvinLoad, WedgeLoad
+from .point_loads import KelvinLoad, MelanLoad, WedgeLoad
 from .unit_loads import on_elements
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Applied:
     """
 
     load: BodyLoad
-    particular: Particular
+    particular: Particular | GrowingWithDepth
     segments: np.ndarray
     tractions: np.ndarray
     functions: LineForces | None = None
@@ -125,14 +125,20 @@ def apply(load: BodyLoad, body: Body) -> Applied:
     return out
 
 
-def _particular(load: BodyLoad, body: Body) -> Particular:
+def _particular(load: BodyLoad, body: Body) -> Particular | GrowingWithDepth:
     force = np.zeros(2) if load.body_force is None else load.body_force
     gradient = np.zeros((2, 2)) if load.body_force_gradient is None else load.body_force_gradient
+    uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
+    if body.half_plane is not None:
+        body.half_plane.check_uniform(uniform)
+        body.half_plane.check_force(gradient)
+        return GrowingWithDepth.of(body.half_plane, force, load.k0, uniform, body.material)
+    if load.k0 is not None:
+        raise ValueError("k0: stress that grows with depth stands in a half-plane only")
     if not body.outlined and (force.any() or gradient.any()):
         raise ValueError("a body force needs a body with an outline")
     if load.about is not None:
         force = force + gradient @ (body.centroid - load.about)
-    uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
     return Particular(body.centroid, force, gradient, uniform, body.material)
 
 
@@ -140,16 +146,22 @@ def _point(out: Applied, body: Body, k: int, point, force, segments: list, tract
     """Add point load ``k`` as what it is where it stands."""
     from .validity import inside
 
-    edges, loop = body.mesh.edges, body.mesh.edge_loop
+    edges, loop, rock = body.mesh.edges, body.mesh.edge_loop, body.half_plane
+    if rock is not None:
+        height = rock.frame(point)[1]
+        if abs(height) <= OFF * body._extent:
+            at = point - height * np.asarray(rock.outward)
+            out.wedges.append(WedgeLoad(at, force, -np.asarray(rock.outward), 0.5 * np.pi, body.material))
+            return
     if len(edges):
         a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
         s = np.clip(np.sum((point - a) * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
         off = np.hypot(*(a + s[:, None] * d - point).T)
         edge = int(np.argmin(off))
     if not len(edges) or off[edge] > OFF * body._extent:
-        if not inside(body.loops, point[None])[0]:
+        if not inside(body.limits, point[None])[0] or (rock is not None and height > 0):
             raise ValueError(f"point load {k} at ({point[0]:g}, {point[1]:g}) is not on the body")
-        out.kelvin.append(KelvinLoad(point, force, body.material))
+        out.kelvin.append(_kelvin(body, point, force))
         return
     length = np.hypot(*d[edge])
     # At a corner: `edge` is to be the one that starts there.
@@ -163,7 +175,7 @@ def _point(out: Applied, body: Body, k: int, point, force, segments: list, tract
     if out.load.kelvin:
         # At a corner no element's node is near; along a side a node may be, and would take all of it.
         core = 0.0 if corner else min(SPREAD * body._extent, s[edge] * length, (1 - s[edge]) * length)
-        out.kelvin.append(KelvinLoad(at, force, body.material, core=0.5 * core))
+        out.kelvin.append(_kelvin(body, at, force, 0.5 * core))
         return
     out_way = d[edge] / np.hypot(*d[edge])
     back = -d[before] / np.hypot(*d[before])
@@ -184,6 +196,12 @@ def _point(out: Applied, body: Body, k: int, point, force, segments: list, tract
     else:
         segments.append(np.stack([at - 0.5 * width * out_way, at + 0.5 * width * out_way])[None])
         tractions.append(np.stack([force, force])[None] / width)
+
+
+def _kelvin(body: Body, point: np.ndarray, force: np.ndarray, core: float = 0.0) -> KelvinLoad:
+    if body.half_plane is None:
+        return KelvinLoad(point, force, body.material, core=core)
+    return MelanLoad(point, force, body.material, core=core, half_plane=body.half_plane)
 
 
 def _meets(edges: np.ndarray, origin: np.ndarray, way: np.ndarray, own: set[int], extent: float) -> bool:

@@ -32,6 +32,7 @@ from .crack_system import CrackSystem
 from .face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
 from .friction import FaceEquations
 from .functionals import TipFunctionals
+from .half_plane import HalfPlane
 from .influence import ElementSet, influence, reuse
 from .iterative import FACTORABLE, NotSolved, compressed, is_compressed
 from .loads import BodyLoad
@@ -50,7 +51,8 @@ class Body:
     """An elastic body with cracks.
 
     ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``holes``:
-    more of them, which may run either way, in the infinite plane too. ``cracks``: those of this body. ``previous``: an
+    more of them, which may run either way, in the infinite plane too. ``half_plane``: the rock is that below a free surface instead
+    of all of the plane; cracks may end at it. ``cracks``: those of this body. ``previous``: an
     earlier body of which whatever is unchanged, element by element, is reused, factors included (`bordered`): growth costs
     the rows and columns of the new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of a crack segment counts in
     them. ``counts`` tells what making it took, ``work`` what was done since by all bodies that share it. Raises ValueError naming the item on geometry that is no body,
@@ -68,7 +70,9 @@ class Body:
         supports: Sequence[Support] = (),
         face_laws: Sequence[JointLaw] = SMOOTH,
         work: Work | None = None,
+        half_plane: HalfPlane | None = None,
     ):
+        self.half_plane = half_plane
         self.material, self.cracks = material, cracks
         self.settings = settings = for_target(DdmSettings() if settings is None else settings)
         self.supports, self.face_laws = tuple(supports), tuple(face_laws)
@@ -78,6 +82,7 @@ class Body:
             previous.settings != settings
             or previous.nu != material.effective_poissons_ratio
             or previous.supports != self.supports
+            or previous.half_plane != half_plane
         ):
             previous = None
         self.counts = {"elements": 0, "elements_new": 0, "boundary_assemblies": 0, "boundary_factorisations": 0}
@@ -90,8 +95,10 @@ class Body:
         self.loops = previous.loops if same else check_outline(loops, holes)
         self.outlined = previous.outlined if same else outlined(self.loops)
         edges = previous.mesh.edges if same else outline_edges(self.loops)[0]
+        if half_plane is not None:
+            edges = self._in_half_plane(edges)
         check_cracks(cracks, edges, self.loops, _fresh(cracks, previous if same else None))
-        points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
+        points = np.concatenate([*self.loops, cracks.nodes, np.empty((0, 2))])
         self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
         self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
         marked: list[tuple[np.ndarray, int]] = []
@@ -100,7 +107,7 @@ class Body:
                 raise ValueError("supports need a body with an outline")
             self.support_segments = place(self.supports, edges, self._extent)
             marked = marks(self.supports, self.support_segments, self.loops, settings.grading_layers)
-        self.mesh: Mesh = mesh(self.loops, cracks, settings, marked, previous.mesh if same else None)
+        self.mesh: Mesh = mesh(self.loops, cracks, settings, marked, previous.mesh if same else None, half_plane)
         self.boundary: ElementSet = self.mesh.boundary
         self.faces: ElementSet = self.mesh.cracks
         if self.outlined and same:
@@ -111,9 +118,9 @@ class Body:
             self._reach = float(np.ptp(self.loops[0], axis=0).max())
             self.hole_moments = [area_moments([hole[::-1]])[:2] for hole in self.loops[1:]]
         else:
-            self.area, self.centroid = np.inf, np.zeros(2)
+            self.area, self.centroid = np.inf, np.zeros(2) if half_plane is None else np.array(half_plane.point)
         self._factored_after_all = previous is not None and previous._factored_after_all
-        solver = "dense" if self._factored_after_all else settings.solver
+        solver = "dense" if self._factored_after_all or half_plane is not None else settings.solver
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
         holes_held = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
         many = is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
@@ -138,7 +145,40 @@ class Body:
             holes=self.loops[n_outlines:],
             supports=self.supports,
             face_laws=self.face_laws,
+            half_plane=self.half_plane,
         )
+
+    def _in_half_plane(self, edges: np.ndarray) -> np.ndarray:
+        """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""
+        if self.outlined:
+            raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
+        if self.settings.solver == "compressed":
+            raise ValueError('half_plane: the solver "compressed" knows the infinite plane only; use "auto" or "dense"')
+        cracks = self.cracks
+
+        def name(node: int) -> str:
+            k = int(cracks.crack[np.argmax((cracks.segments == node).any(axis=1))])
+            return repr(cracks.names[k]) if k < len(cracks.names) else f"crack {k}"
+
+        self.half_plane.check_inside(self.loops, cracks.nodes, name)
+        return np.concatenate(
+            [edges, self.half_plane.edge(np.concatenate([*self.loops, cracks.nodes, np.empty((0, 2))]))]
+        )
+
+    @property
+    def limits(self) -> list[np.ndarray]:
+        """Loops about what is not rock, that above a free surface included, and the outline."""
+        if self.half_plane is None:
+            return self.loops
+        return [*self.loops, self.half_plane.sky(np.concatenate([*self.loops, self.cracks.nodes, np.empty((0, 2))]))]
+
+    @property
+    def sides(self) -> np.ndarray:
+        """(m, 2, 2) edges of the loops and, of a free surface, the piece that is in sight."""
+        if self.half_plane is None:
+            return self.mesh.edges
+        points = np.concatenate([*self.loops, self.cracks.nodes, np.empty((0, 2))])
+        return np.concatenate([self.mesh.edges, self.half_plane.edge(points)])
 
     def found_again(self, loops: list[np.ndarray], cracks: Cracks, material: Material) -> Body | None:
         """This body where ``loops``, ``cracks`` and ``material`` are its own, else None. What cracks and blocks are called

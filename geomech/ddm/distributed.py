@@ -28,8 +28,9 @@ class LineForces:
     density: np.ndarray
 
     @classmethod
-    def join(cls, parts: list[LineForces]) -> LineForces | None:
+    def join(cls, parts: list[LineForces | None]) -> LineForces | None:
         """All of them; None for none."""
+        parts = [part for part in parts if part is not None]
         if not parts:
             return None
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("start", "end", "density")))

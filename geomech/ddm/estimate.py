@@ -89,7 +89,7 @@ def _left_at(body: Body, point: np.ndarray, part: float) -> float:
     network, left = body.cracks, 0.0
     for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)):
         where = "mouth" if network.surface[node] else "crack"
-        for angle in wedges(network, node, body.mesh.edges):
+        for angle in wedges(network, node, body.sides):
             error, power = ungraded(float(angle), where)
             left = max(left, error * part**power)
     for loop in body.loops:

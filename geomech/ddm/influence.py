@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from . import kernels, shapes
+from .half_plane import HalfPlane
 
 #: Element–point pairs (some 30 ns each) below which another thread does not pay for itself.
 PAIRS_PER_THREAD = 8000
@@ -41,6 +42,7 @@ class ElementSet:
         start, end   (n, 2)   m
         kind         (n,)     see `shapes`
         source       (n,)     the outline edge or crack segment each lies on
+        half_plane            the half-plane they stand in, None in the infinite plane
 
     Unknowns run element, component (along the tangent, along the normal left of it), node: 2(p+1) an element; so do
     the rows of tractions collocated on them.
@@ -52,6 +54,7 @@ class ElementSet:
     source: np.ndarray
     order: int
     family: str
+    half_plane: HalfPlane | None = None
 
     @property
     def n(self) -> int:
@@ -129,7 +132,13 @@ class ElementSet:
 
     def take(self, which: np.ndarray) -> ElementSet:
         return ElementSet(
-            self.start[which], self.end[which], self.kind[which], self.source[which], self.order, self.family
+            self.start[which],
+            self.end[which],
+            self.kind[which],
+            self.source[which],
+            self.order,
+            self.family,
+            self.half_plane,
         )
 
     def unknowns(self, elements: np.ndarray) -> np.ndarray:
@@ -179,7 +188,8 @@ def _between(targets, sources, nu, tol, side, force):
         return np.empty((targets.n_unknowns, sources.n_unknowns), order="F")
     nodal = _to_nodal(sources.family, sources.order)
     start, end, kind, order = sources.start, sources.end, sources.kind, sources.order
-    return _tractions(targets.nodes, targets.tangent, start, end, kind, order, nu, tol, side, force, nodal)
+    rock = targets.half_plane
+    return _tractions(targets.nodes, targets.tangent, start, end, kind, order, nu, tol, side, force, nodal, rock)
 
 
 def line_forces(
@@ -187,13 +197,14 @@ def line_forces(
 ) -> np.ndarray:
     """(targets.n_unknowns, m, 2, degree+1) traction from line forces t^k along (component 0) and across (1) straight
     segments, Kelvin's solution integrated in closed form; points on a segment are seen from ``side`` of it."""
-    return _line_forces(targets.nodes, targets.tangent, start, end, degree, nu, tol, side)
+    return _line_forces(targets.nodes, targets.tangent, start, end, degree, nu, tol, side, targets.half_plane)
 
 
-def _line_forces(points, tangents, start, end, degree, nu, tol, side):
+def _line_forces(points, tangents, start, end, degree, nu, tol, side, half_plane):
     n, per = points.shape[:2]
     kind, unit = np.zeros(len(start), np.int64), np.broadcast_to(np.eye(degree + 1), (4, degree + 1, degree + 1))
-    out = _tractions(points, tangents, start, end, kind, degree, nu, tol, side, True, np.ascontiguousarray(unit))
+    unit = np.ascontiguousarray(unit)
+    out = _tractions(points, tangents, start, end, kind, degree, nu, tol, side, True, unit, half_plane)
     return out.reshape(2 * n * per, len(start), 2, degree + 1)
 
 
@@ -218,7 +229,7 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
     Sampled at nodes, a jump would be rounded to a node and the load's resultant with it (4 % in K_I in one case, 0.03 %
     so); with the moments kept, what is lost acts on no more than the element's own surroundings.
     """
-    t, n, c = targets.tangent, targets.normal, 0.5 * targets.length
+    t, n, c, rock = targets.tangent, targets.normal, 0.5 * targets.length, targets.half_plane
     middle = 0.5 * (targets.start + targets.end)
     rows = unit.reshape(targets.n, 2, targets.per, *unit.shape[1:])
     clustered, q = _clustered()
@@ -234,7 +245,7 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
             u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
             w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
             points = (middle[e] + c[e] * u[:, None] * t[e])[None]
-            values = _line_forces(points, t[e : e + 1], a[None], b[None], unit.shape[3] - 1, nu, tol, side)
+            values = _line_forces(points, t[e : e + 1], a[None], b[None], unit.shape[3] - 1, nu, tol, side, rock)
             values = values.reshape(2, len(u), 2, -1)
             legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (degrees + 0.5)
             rows[e, :, :, m] = np.einsum("jk,uk,cuxd->cjxd", at_nodes, legendre, values)
@@ -261,34 +272,57 @@ def project_total(
         u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
         w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
         points = (0.5 * (targets.start[e] + targets.end[e]) + c * u[:, None] * targets.tangent[e])[None]
-        unit = _line_forces(points, targets.tangent[e : e + 1], start, end, density.shape[2] - 1, nu, tol, side)
+        tangent, degree, rock = targets.tangent[e : e + 1], density.shape[2] - 1, targets.half_plane
+        unit = _line_forces(points, tangent, start, end, degree, nu, tol, side, rock)
         total = (unit.reshape(2 * len(u), -1) @ density.ravel()).reshape(2, len(u))
         legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (np.arange(targets.per) + 0.5)
         values[e] = total @ legendre @ at_nodes.T
 
 
-def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, nodal):
+def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, nodal, half_plane=None):
     """(2 n per, 2 (p+1) m), column-major, at ``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
     n, per = points.shape[:2]
     out = np.empty((2 * (order + 1) * len(start), 2 * n * per))
     if not out.size:
         return out.T
-    tangents = kernels.lanes_of(np.repeat(tangents, per, axis=0))
-    points = kernels.lanes_of(points.reshape(-1, 2))
+    tangents = np.repeat(tangents, per, axis=0)
+    points = points.reshape(-1, 2)
+    at, along = kernels.lanes_of(points), kernels.lanes_of(tangents)
     start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
     kind = np.ascontiguousarray(kind, dtype=np.int64)
     table, flat = shapes.moments(), out.reshape(-1)
 
     def work(first, last):
         kernels.tractions(
-            points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, nodal, flat
+            at, along, per, first, last, start, end, kind, order, nu, tol, side, force, table, nodal, flat
         )
+
+    if half_plane is not None:
+        from . import image_kernels
+
+        images = kernels.lanes_of(_mirrored(half_plane.frame(points)))
+        own, ends = half_plane.frame(start), half_plane.frame(end)
+        along_surface = kernels.lanes_of(half_plane.turned(tangents))
+        plane = work
+
+        def work(first, last):
+            plane(first, last)
+            image_kernels.tractions(
+                images, along_surface, per, first, last, own, ends, kind, order, nu, tol, force, table, nodal, flat
+            )
 
     _spread(n * per, n * per * len(start), work)
     return out.T
 
 
-def add_fields(points, start, end, kind, density, nu, tol, side, force, stress, shift) -> None:
+def _mirrored(in_frame: np.ndarray) -> np.ndarray:
+    """(n, 2) mirror images of points in the frame of a free surface; on it the image is seen from outside."""
+    return np.column_stack([in_frame[:, 0], np.abs(in_frame[:, 1])])
+
+
+def add_fields(
+    points, start, end, kind, density, nu, tol, side, force, stress, shift, half_plane: HalfPlane | None = None
+) -> None:
     """Add the stress (n, 3) and 2μ times the displacement (n, 2) of elements with monomial ``density`` (m, 2, p+1)."""
     if not len(points) or not len(start):
         return
@@ -304,6 +338,19 @@ def add_fields(points, start, end, kind, density, nu, tol, side, force, stress, 
     _spread(len(points), len(points) * len(start), work)
     stress += out[:3].T
     shift += out[3:].T
+    if half_plane is None:
+        return
+    from . import image_kernels
+
+    images = kernels.lanes_of(_mirrored(half_plane.frame(points)))
+    own, ends, out = half_plane.frame(start), half_plane.frame(end), np.zeros((5, len(points)))
+
+    def work(first, last):
+        image_kernels.fields(images, first, last, own, ends, kind, order, density, nu, tol, force, table, out)
+
+    _spread(len(points), len(points) * len(start), work)
+    stress += half_plane.stress_of(out[:3].T)
+    shift += out[3:].T @ half_plane.turn
 
 
 def reuse(

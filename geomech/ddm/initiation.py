@@ -93,7 +93,7 @@ def births(solution: Solution, material: Material, settings: GrowthSettings, blo
         raise ValueError(f"no place for cracks to be born {settings.initiation!r}; there are {PLACES[1:]}")
     if not settings.initiation or not (math.isfinite(material.tensile_strength) or math.isfinite(material.cohesion)):
         return []
-    network = Network(solution.body.cracks, lambda block: solution.body.loops, 0)
+    network = Network(solution.body.cracks, lambda block: solution.body.limits, 0)
     spacing = _spacing(settings)
     chosen: list[Birth] = []
     for birth in _candidates(solution, material, settings):
@@ -269,7 +269,7 @@ def _corners(cracks: Cracks) -> np.ndarray:
 
 def _from_surface(solution, material, settings, points, inward, segment, stress) -> Iterator[Birth]:
     """Cracks from surface points into the rock, along the directions that the ``stress`` there asks for."""
-    loops = solution.body.loops
+    loops = solution.body.limits
     for kind, way in _ways(stress, material, inward):
         here = np.flatnonzero(np.isfinite(way[:, 0]))
         felt = stress[here]
@@ -338,7 +338,7 @@ def _in_rock(solution, material, settings) -> Iterator[Birth]:
         return
     axes = [np.linspace(a, b, max(2, math.ceil((b - a) / step)) + 1) for a, b in zip(low, high)]
     points = np.stack(np.meshgrid(*[0.5 * (x[1:] + x[:-1]) for x in axes]), axis=-1).reshape(-1, 2)
-    points = points[inside(body.loops, points)]
+    points = points[inside(body.limits, points)]
     points = points[_away(body.cracks, points, np.full(len(points), -1), settings)]
     stress = solution.stress(points)
     tension, shear, angle = overstress(stress, material)

@@ -51,6 +51,8 @@ class BodyLoad:
     body_force           (2,)       N/m³ at ``about``
     body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
     about                (2,)       m; the centroid when left out
+    k0                   in a half-plane, the stress along its surface that goes with the body force, per stress out of
+                         it; left out, ν/(1−ν), that of rock that could not widen
     remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
                                     that carry it act on the outline in addition to ``tractions``. Holes are free of it
     crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a `Pressure`,
@@ -77,6 +79,7 @@ class BodyLoad:
     body_force: np.ndarray | None = None
     body_force_gradient: np.ndarray | None = None
     about: np.ndarray | None = None
+    k0: float | None = None
     remote_stress: np.ndarray | None = None
     crack_pressure: np.ndarray | float = 0.0
     hole_pressure: Pressure | Sequence[Pressure | float] | float = 0.0
@@ -119,6 +122,10 @@ class BodyLoad:
         if len(graded) == 2 and not np.array_equal(self.about, other.about):
             raise ValueError("body forces given about different points cannot be added")
         about = graded[0].about if graded else None
+        heavy = [load for load in (self, other) if load.body_force is not None]
+        if len(heavy) == 2 and self.k0 != other.k0:
+            raise ValueError("body forces with different k0 cannot be added")
+        k0 = heavy[0].k0 if heavy else None
         holes = self.hole_pressure, other.hole_pressure
         lists = [isinstance(p, (Sequence, np.ndarray)) for p in holes]
         if any(lists):
@@ -136,6 +143,7 @@ class BodyLoad:
             **joined,
             **summed,
             about=about,
+            k0=k0,
             hole_pressure=pressure,
             displacements=displacements,
             sides=self.sides + other.sides,

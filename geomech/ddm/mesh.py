@@ -20,6 +20,7 @@ from ..model import Cracks, DdmSettings
 from ..model.polygon import signed_area
 from . import shapes
 from .grading import KINK, Grading
+from .half_plane import ON_SURFACE, HalfPlane
 from .influence import ElementSet
 from .proximity import keep_apart
 
@@ -62,16 +63,18 @@ def mesh(
     settings: DdmSettings,
     marks: Sequence[tuple[np.ndarray, int]] = (),
     known: Mesh | None = None,
+    half_plane: HalfPlane | None = None,
 ) -> Mesh:
     """Elements of a body with outline ``loops`` (counter-clockwise, holes clockwise; holes alone or [] for the
     infinite plane). ``marks``: further points (2,) of the boundary that are to be nodes, with graded layers at each.
-    ``known``: a mesh of the same, but for the cracks."""
+    ``known``: a mesh of the same, but for the cracks. ``half_plane``: the rock is this; its surface has no elements."""
     edges, edge_loop = outline_edges(loops) if known is None else (known.edges, known.edge_loop)
     points = np.concatenate([edges.reshape(-1, 2), cracks.nodes])
     extent = np.ptp(points, axis=0).max() if len(points) else 0.0
     grading = Grading.of(settings)
+    sides_of_rock = edges if half_plane is None else np.concatenate([edges, half_plane.edge(points)])
     mouths = [
-        (cracks.nodes[k], _layers_at(cracks, k, edges, grading))
+        (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
         for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))
     ]
     key: tuple = float(extent), tuple((*point, deep) for point, deep in mouths)
@@ -80,30 +83,58 @@ def mesh(
     else:
         sides = key, _boundary(loops, edges, mouths, settings, grading, extent, marks), _straight_on(loops)
     boundary = sides[1]
-    crack = _cracks(cracks, settings, grading, extent, edges)
+    crack = _cracks(cracks, settings, grading, extent, sides_of_rock)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
+    touching, n_pieces = _touching(sides[2], edges, cracks, extent), len(pieces)
+    if half_plane is not None:
+        (start, end, pieces), kind, source, touching = _with_images(
+            half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
+        )
     start, end, kind, source = keep_apart(
-        start, end, kind, source, pieces, _touching(sides[2], edges, cracks, extent), len(edges), settings.grading_ratio, extent,
-        2 * (settings.order + 1),
-    )  # fmt: skip
+        start, end, kind, source, pieces, touching, len(edges), settings.grading_ratio, extent, 2 * (settings.order + 1)
+    )
+    if half_plane is not None:
+        own = source < n_pieces
+        start, end, kind, source = start[own], end[own], kind[own], source[own]
     on_crack = source >= len(edges)
     rest = ~on_crack
     # A rigid rotation of a boundary must be in its elements' span, or it is not without stress.
     order = max(settings.order, 1)
-    sides_now = ElementSet(start[rest], end[rest], kind[rest], source[rest], order, settings.nodes)
+    sides_now = ElementSet(start[rest], end[rest], kind[rest], source[rest], order, settings.nodes, half_plane)
     if known is not None and _alike(known.boundary, sides_now):
         sides_now = known.boundary
     return Mesh(
         sides_now,
         ElementSet(
-            start[on_crack], end[on_crack], kind[on_crack], source[on_crack] - len(edges), settings.order, settings.nodes
+            start[on_crack],
+            end[on_crack],
+            kind[on_crack],
+            source[on_crack] - len(edges),
+            settings.order,
+            settings.nodes,
+            half_plane,
         ),
         edges,
         edge_loop,
         sides,
     )  # fmt: skip
+
+
+def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: float):
+    """``ends`` (starts, ends and pieces, (n, 2) or (n, 2, 2)), kinds, sources and what touches, with the images that the free
+    surface makes of them behind: it is they that elements below it must not be long beside."""
+    ends = tuple(np.concatenate([x, half_plane.images(x, near)]) for x in ends)
+    n = len(touching)
+    both = np.zeros((2 * n, 2 * n), bool)
+    both[:n, :n] = both[n:, n:] = touching
+    pieces = ends[2][:n]
+    # A piece that begins at the surface meets its own image there, and those of its neighbours.
+    above = np.abs(half_plane.frame(pieces)[..., 1]) <= near
+    meets = np.diag(above.any(axis=1)) | (touching & above.any(axis=1) & above.any(axis=1)[:, None])
+    both[:n, n:], both[n:, :n] = meets, meets.T
+    return ends, np.concatenate([kind, kind]), np.concatenate([source, source + n]), both
 
 
 def _boundary(loops, edges, mouths, settings, grading, extent, marks):

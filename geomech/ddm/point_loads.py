@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..model import Material
+from .half_plane import HalfPlane
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,39 @@ class KelvinLoad:
         return (-(3 - 4 * nu) * 0.5 * np.log(r2 / self.unit**2) * self.force + along * rel) / (
             8 * np.pi * mu * (1 - nu)
         )
+
+
+@dataclass(frozen=True, eq=False)
+class MelanLoad(KelvinLoad):
+    """The same below the free surface of ``half_plane`` (Melan 1932), by the potentials of `image_kernels`. Where
+    displacement is zero is arbitrary, as it grows like a logarithm."""
+
+    half_plane: HalfPlane = field(kw_only=True)
+
+    def _image(self, points: np.ndarray) -> tuple[np.ndarray, ...]:
+        """κ, the strength q of the force, distance w from its image, its height times −2i, y, φ₁' at ``points``."""
+        rock, nu = self.half_plane, self.material.effective_poissons_ratio
+        z, t = (rock.frame(x) @ np.array([1.0, 1j]) for x in (points, self.point))
+        kappa, q = 3 - 4 * nu, complex(*rock.turned(self.force)) / (8 * np.pi * (1 - nu))
+        w, depth = z - np.conj(t), np.conj(t) - t
+        return kappa, q, w, depth, z.imag, -np.conj(q) * depth / w**2 - kappa * q / w
+
+    def stress(self, points: np.ndarray) -> np.ndarray:
+        """(n, 3) Pa."""
+        kappa, q, w, depth, y, half = self._image(points)
+        bent = 2 * np.conj(q) * depth / w**3 + kappa * q / w**2
+        deviator, trace = -2j * y * bent - half + np.conj(q) / w, 2 * half.real
+        own = np.column_stack([trace - deviator.real, trace + deviator.real, deviator.imag])
+        return super().stress(points) + self.half_plane.stress_of(own)
+
+    def displacement(self, points: np.ndarray) -> np.ndarray:
+        """(n, 2) m."""
+        kappa, q, w, depth, y, half = self._image(points)
+        # The image is above all points: no cut of the logarithm lies between them.
+        logs = np.log(1j * w / self.unit) - 0.5j * np.pi
+        moved = kappa * np.conj(q) * (1 + depth / w) - kappa**2 * q * logs - 2j * y * np.conj(half) - q * np.conj(logs)
+        own = np.column_stack([moved.real, moved.imag]) / (2 * self.material.shear_modulus)
+        return super().displacement(points) + own @ self.half_plane.turn
 
 
 @dataclass(frozen=True, eq=False)

@@ -206,7 +206,7 @@ class _Run:
         threshold = self.material.k_ic * ((1 - TOGETHER) * drive if self.controlled else 1.0)
 
         def grow() -> Growth:
-            return advance(cracks, lambda block: body.loops, tips, self.growth, np.full(len(tips), threshold), cycle)
+            return advance(cracks, lambda block: body.limits, tips, self.growth, np.full(len(tips), threshold), cycle)
 
         def look_ahead(tried: Cracks) -> np.ndarray:
             self.body = self._body(tried, self.body)
@@ -223,7 +223,7 @@ class _Run:
         """New cracks when whole rock fails; only where no tip grows, which would relieve it."""
         if not self.births or self.births[0].overstress < self.enough:
             return None, ()
-        cracks = bear(self.body.cracks, lambda block: self.body.loops, self.births, self.number + 1)
+        cracks = bear(self.body.cracks, lambda block: self.body.limits, self.births, self.number + 1)
         return Growth(cracks, np.zeros(len(tips)), ()), self.births
 
     # -- events --------------------------------------------------------------------------------------------------

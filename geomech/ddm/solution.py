@@ -229,7 +229,7 @@ class Solution:
         nu, net = body.nu, sum((p.force for p in self._applied.kelvin), np.zeros(2))
 
         def add(start, end, kind, density, tol, force, side=1.0):
-            add_fields(where, start, end, kind, density, nu, tol, side, force, stress, shift)
+            add_fields(where, start, end, kind, density, nu, tol, side, force, stress, shift, body.half_plane)
             if force:
                 constant, carried = _kelvin_constant(start, end, density, nu)
                 shift[:] += constant
@@ -257,6 +257,9 @@ class Solution:
             shift += net * (3 - 4 * nu) * np.log(body._extent) / (4 * np.pi * (1 - nu))
         shift /= 2 * body.material.shear_modulus
         stress, shift = stress + self._applied.stress(where), shift + self._applied.displacement(where)
+        if body.half_plane is not None:
+            outside = body.half_plane.frame(where)[:, 1] > 2 * OFF * body._extent
+            stress[outside] = shift[outside] = 0.0
         for field in (stress, shift):
             field[double] = 0.5 * (field[double] + field[n:])
         return stress[:n], shift[:n]

@@ -89,10 +89,11 @@ def _largest(value: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndar
 def _fitting(body: Body, length: float) -> np.ndarray:
     """(n_tips,) bool: tips that are farther than two kinks from all other cracks and from the boundary."""
     network, tips = body.cracks, body.tip_elements[0]
-    pieces = np.concatenate([network.nodes[network.segments], body.mesh.edges])
+    sides = body.sides
+    pieces = np.concatenate([network.nodes[network.segments], sides])
     out = np.ones(len(tips), bool)
     for j, tip in enumerate(tips):
-        own = np.concatenate([(network.segments == tip["node"]).any(axis=1), np.zeros(len(body.mesh.edges), bool)])
+        own = np.concatenate([(network.segments == tip["node"]).any(axis=1), np.zeros(len(sides), bool)])
         a, d = pieces[~own, 0], pieces[~own, 1] - pieces[~own, 0]
         rel = tip["point"] - a
         s = np.clip(np.sum(rel * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
@@ -121,6 +122,7 @@ def _body(body: Body, k: int, length: float, at: np.ndarray) -> Body:
             supports=body.supports,
             face_laws=body.face_laws,
             work=body.work,
+            half_plane=body.half_plane,
         )
     return kept[k]
 

@@ -11,7 +11,7 @@ from ..model import Material
 from .boundary import BoundarySystem
 from .influence import ElementSet, line_forces, project_jumps
 from .mesh import Mesh
-from .particular import Particular, edge_densities
+from .particular import GrowingWithDepth, Particular, edge_densities
 from .placing import OFF, onto_boundary
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class UnitLoads:
         units = self._unit_segments(applied.segments, applied.tractions)
         sizes: dict[str | int, np.ndarray] = {}
         if particular.force.any() or particular.gradient.any():
-            sizes["force"] = np.concatenate([particular.force, particular.gradient.ravel()])
+            sizes["force"] = particular.sizes
         if self.n_holes and particular.uniform.any():
             sizes["remote"] = particular.uniform
         for hole, pressure in enumerate(load.hole_pressures(self.n_holes)):
@@ -214,7 +214,7 @@ class UnitLoads:
     def _edge_load(self, name: str | int) -> UnitLoad:
         """What acts on whole edges.
 
-        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy; "remote": the three uniform stresses of the plane
+        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy, in a half-plane the three slopes; "remote": the three uniform stresses of the plane
         or the body, which holes leave without traction; a number: pressure in that hole, constant and growing with x and with y
         from its centre.
         """
@@ -241,9 +241,11 @@ class UnitLoads:
             densities[here, 1, 1, k + 1] = 0.5 * (b - a)[here, k]
         return densities
 
-    def _particular(self, name: str) -> list[Particular]:
+    def _particular(self, name: str) -> list[Particular | GrowingWithDepth]:
         """The particular fields of unit body forces or of unit remote stresses."""
-        none = np.zeros(2)
+        none, rock = np.zeros(2), self.faces.half_plane
+        if name == "force" and rock is not None:
+            return [GrowingWithDepth(rock, none, unit, np.zeros(3), self.material) for unit in np.eye(3)]
         if name == "remote":
             return [Particular(self.centroid, none, np.zeros((2, 2)), unit, self.material) for unit in np.eye(3)]
         return [

@@ -1,0 +1,299 @@
+"""The half-plane: cracks at, near and up to a free surface that has no elements, holes, weight and point loads below it."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from geomech import ddm
+from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
+from geomech.reference import crack_arrays, dislocations, holes
+from geomech.reference.dislocations import Arm
+
+ROCK = Material("rock", youngs_modulus=40e9, poissons_ratio=0.25, k_ic=1e6)
+SURFACE = ddm.HalfPlane()
+#: A surface that dips by 36.9° somewhere else.
+SLOPE = ddm.HalfPlane((30.0, -7.0), (0.6, 0.8))
+
+
+def slot(start, end, mouth=False):
+    return Cracks.from_polylines([np.array([start, end], dtype=float)], aperture=math.inf, surface=[(mouth, False)])
+
+
+def body(cracks, order=8, half_plane=SURFACE, **options):
+    settings = {name: options.pop(name) for name in ("elements_per_crack", "grading_layers") if name in options}
+    return ddm.Body([], cracks, ROCK, DdmSettings(order=order, **settings), half_plane=half_plane, **options)
+
+
+def factors(sol):
+    return np.column_stack([sol.tips["k_i"], sol.tips["k_ii"]])
+
+
+def along(half_plane, stress=1.0):
+    """A uniform stress parallel to the surface, as `BodyLoad` has it."""
+    t = half_plane.turn[0]
+    return stress * np.array([t[0] ** 2, t[1] ** 2, t[0] * t[1]])
+
+
+def test_edge_crack():
+    """Koiter's edge crack: every two orders, with a layer more at the mouth, are a factor of ten or more."""
+    exact = crack_arrays.EDGE_CRACK_HALF_PLANE
+    errors = {}
+    for order, layers in ((2, 2), (4, 2), (6, 2), (8, 3), (10, 4)):
+        crack = slot((0, 0), (0, -1), mouth=True)
+        sol = body(crack, order, elements_per_crack=1, grading_layers=layers).solve(
+            ddm.BodyLoad(remote_stress=[1, 0, 0])
+        )
+        errors[order] = abs(sol.tips["k_i"][0] / math.sqrt(math.pi) / exact - 1)
+    print("edge crack in a half-plane:", {p: f"{e:.1e}" for p, e in errors.items()})
+    assert errors[4] < 1e-6 and errors[6] < 5e-8
+    assert errors[8] < 3e-9 and errors[10] < 3e-10
+
+
+@pytest.mark.parametrize("target", [1e-4, 1e-6])
+def test_target_error(target):
+    """What is asked for is reached, and the estimate bounds the error."""
+    crack, load = slot((0, 0), (0, -2), mouth=True), ddm.BodyLoad(remote_stress=[3, 0, 0])
+    sol = ddm.solve_to([], crack, ROCK, load, target, half_plane=SURFACE)
+    exact = crack_arrays.EDGE_CRACK_HALF_PLANE * 3 * math.sqrt(2 * math.pi)
+    error = abs(sol.tips["k_i"][0] - exact)
+    assert error <= sol.tip_errors[0, 0] <= target * exact
+
+
+@pytest.mark.parametrize("angle_deg", [30.0, 60.0, 120.0])
+def test_slanted_edge_crack(angle_deg):
+    """Against distributed dislocations, which share nothing with displacement discontinuities. Mouths that are not upright
+    are singular; 1e-6 is asked for."""
+    a = math.radians(-angle_deg)
+    tip = np.array([math.cos(a), math.sin(a)])
+    arms = [Arm(0j, complex(*tip), start_is_tip=False, open=True)]
+    exact = dislocations.stress_intensity(arms, lambda p: np.tile([1.0, 0, 0], (len(p), 1)), "half-plane", 257)
+    sol = ddm.solve_to(
+        [], slot((0, 0), tip, True), ROCK, ddm.BodyLoad(remote_stress=[1, 0, 0]), 1e-6, half_plane=SURFACE
+    )
+    off = np.abs(factors(sol) - exact).max() / np.abs(exact).max()
+    print(f"edge crack at {angle_deg:g}°: {off:.1e}")
+    assert off < 3e-6
+
+
+@pytest.mark.parametrize("depth", [0.02, 0.2, 0.5, 2.0, 100.0])
+def test_pressurised_crack_parallel_to_the_surface(depth):
+    """Against distributed dislocations, which converge to ten digits (the least depth takes them more points)."""
+    ends = np.array([[-1.0, -depth], [1.0, -depth]])
+    exact = crack_arrays.near_surface(ends, 1.0, 513 if depth < 0.1 else 129)
+    off = []
+    for order in (4, 6, 8, 10):
+        sol = body(slot(*ends), order).solve(ddm.BodyLoad(crack_pressure=1.0))
+        off.append(np.abs(factors(sol) - exact).max() / np.abs(exact).max())
+    print(f"pressurised crack at depth {depth}: {[f'{e:.1e}' for e in off]} with {sol.body.faces.n} elements")
+    # Four elements 2.5 times as long as the cover is thick (0.2) converge more slowly than others.
+    assert off[0] < 1e-3 and off[2] < 2e-6 and off[3] < 1e-6
+    assert off[3] < 0.01 * off[0]
+
+
+def test_thin_cover_is_a_beam():
+    """K of a pressurised crack below a thin cover goes to that of a clamped beam, K_I ~ p a²/h^1.5 (Dyskin, Germanovich &
+    Ustinov 2000: the ends' rotation adds terms of h/a), so that halving the depth multiplies it by 2^1.5 in the limit."""
+    k = []
+    for depth in (0.02, 0.01):
+        sol = body(slot((-1, -depth), (1, -depth))).solve(ddm.BodyLoad(crack_pressure=1.0))
+        k.append(float(np.hypot(*factors(sol)[0])))
+    assert k[1] / k[0] == pytest.approx(2**1.5, rel=0.03)
+
+
+def test_any_surface_is_as_good():
+    """A slope, far from the origin: the same to the round-off of coordinates."""
+    load = ddm.BodyLoad(crack_pressure=1.0, remote_stress=along(SURFACE))
+    flat = body(slot((0, -0.3), (0.8, -1.1))).solve(load)
+    a, b = (np.array(p) @ SLOPE.turn + np.asarray(SLOPE.point) for p in ((0, -0.3), (0.8, -1.1)))
+    load = ddm.BodyLoad(crack_pressure=1.0, remote_stress=along(SLOPE))
+    slanted = body(slot(a, b), half_plane=SLOPE).solve(load)
+    assert np.allclose(factors(slanted), factors(flat), rtol=1e-11)
+    points = np.array([[0.2, -0.1], [0.5, 0.0], [-3.0, -2.0]])
+    stress = flat.stress(points)
+    moved = points @ SLOPE.turn + np.asarray(SLOPE.point)
+    assert np.allclose(slanted.stress(moved), SLOPE.stress_of(stress), atol=1e-11)
+    shift = flat.displacement(points) - flat.displacement(points[:1])
+    turned = slanted.displacement(moved) - slanted.displacement(moved[:1])
+    assert np.allclose(turned, shift @ SLOPE.turn, atol=1e-11 * np.abs(shift).max())
+
+
+def test_surface_of_a_cracked_half_plane_is_free():
+    """Fields at the surface and far below: no traction to 1e-12, and the remote stress."""
+    sol = body(slot((0, 0), (0.3, -1.0), True)).solve(ddm.BodyLoad(remote_stress=[1, 0, 0]))
+    x = np.array([-7.0, -0.4, -1e-3, 1e-3, 0.9, 50.0])
+    stress = sol.stress(np.column_stack([x, np.zeros(6)]))
+    assert np.abs(stress[:, 1:]).max() < 1e-11
+    assert np.allclose(sol.stress([[1e5, -1e5]]), [[1, 0, 0]], atol=1e-9)
+    # Nothing is told of what is not there.
+    assert not np.any(sol.stress([[0.0, 1.0]])) and not np.any(sol.displacement([[0.0, 1.0]]))
+
+
+def circle(n, centre, radius=1.0):
+    """A polygon of the circle's area."""
+    q = 2 * math.pi * (np.arange(n) + 0.5) / n
+    size = radius * math.sqrt(math.pi / (n / 2 * math.sin(2 * math.pi / n)))
+    return np.asarray(centre) + size * np.column_stack([np.cos(q), np.sin(q)])
+
+
+@pytest.mark.parametrize("depth", [1.25, 2.0, 5.0])
+def test_pressurised_tunnel_near_the_surface(depth):
+    """Jeffery (1920): pressure p in a hole of radius r at depth d pulls the surface above it by 4pr²/(d² − r²), along it by
+    4pr²(d² − r² − x²)/(d² − r² + x²)². The polygon's error is second order or better."""
+    x = np.array([0.0, 0.5, 2.0, 6.0])
+    q = depth**2 - 1
+    exact = 4 * (q - x**2) / (q + x**2) ** 2
+    found = []
+    for n in (32, 64):
+        tunnel = body(slot((40, -40), (41, -41)), 4, holes=[circle(n, (0, -depth))])
+        found.append(tunnel.solve(ddm.BodyLoad(hole_pressure=1.0)).stress(np.column_stack([x, 0 * x]))[:, 0])
+    off = [np.abs(f - exact).max() / exact[0] for f in found]
+    print(f"pressurised hole at depth {depth}: {[f'{e:.1e}' for e in off]}")
+    assert off[1] < 2e-4 and off[1] < 0.3 * off[0]
+
+
+def test_deep_hole_is_that_of_the_plane():
+    """At a depth of two hundred radii the surface adds (r/d)² of the stress."""
+    points = np.array([[1.6, -200.0], [0.4, -198.5]])
+    hole = circle(48, (0, -200.0))
+    load = ddm.BodyLoad(remote_stress=[1.0, 0, 0])
+    sol = body(slot((40, -240), (41, -241)), 4, holes=[hole]).solve(load)
+    exact = holes.kirsch_stress(points + [0, 200.0], np.array([1.0, 0, 0]))
+    alone = ddm.Body([], slot((40, -240), (41, -241)), ROCK, DdmSettings(order=4), holes=[hole]).solve(load)
+    assert np.allclose(sol.stress(points), alone.stress(points), atol=1e-4)
+    assert np.allclose(sol.stress(points), exact, atol=5e-3)
+
+
+def test_tunnel_under_its_own_weight():
+    """Excavating takes the weight of what was in it (Mindlin 1940): the stress is that of a block sixty radii to either side,
+    whose base bears that much less. What the block's sides take is some r/w of it."""
+    weight, k0, depth = 2.5e4, 0.5, 2.0
+    hole = circle(32, (0, -depth))
+    far = slot((7, -9), (7.5, -9.5))
+    load = ddm.BodyLoad(body_force=[0, -weight], k0=k0)
+    sol = body(far, 4, holes=[hole]).solve(load)
+    points = np.array([[0, -0.5], [1.3, -2.0], [2.5, -1.0], [0.0, 0.0]])
+    w, d = 60.0, 60.0
+    block = np.array([[-w, -d], [w, -d], [w, 0], [-w, 0]])
+    side = {1: [[-k0 * weight * d, 0], [0, 0]], 3: [[0, 0], [k0 * weight * d, 0]]}
+    uplift = math.pi * weight / (2 * w)
+    finite = ddm.Body([block], far, ROCK, DdmSettings(order=4), holes=[hole]).solve(
+        ddm.BodyLoad(body_force=[0, -weight], sides={**side, 0: [0, weight * d - uplift]})
+    )
+    size = weight * depth
+    off = np.abs(sol.stress(points) - finite.stress(points)).max() / size
+    print(f"tunnel under its own weight: {off:.1e} of the stress at its depth")
+    assert off < 0.02
+    assert np.abs(sol.stress(points[3:])[:, 1:]).max() < 1e-9 * size
+
+
+@pytest.mark.parametrize("half_plane", [SURFACE, SLOPE])
+def test_slot_with_water_in_heavy_ground(half_plane):
+    """A vertical slot from the surface with water in it, in ground with K0: the load is linear in depth, K_I that of
+    distributed dislocations. On the slope the same, turned."""
+    weight, water, k0 = 2.2e4, 1e4, 0.3
+    arms = [Arm(0j, -3j, start_is_tip=False, open=True)]
+
+    def field(points):
+        y = points[:, 1]
+        return np.column_stack([(k0 * weight - water) * y, 0 * y, 0 * y])
+
+    exact = dislocations.stress_intensity(arms, field, "half-plane", 257)
+    mouth = np.asarray(half_plane.point) + 4 * half_plane.turn[0]
+    down = -np.asarray(half_plane.outward)
+    pressure = ddm.Pressure(0.0, tuple(water * down), half_plane.point)
+    load = ddm.BodyLoad(body_force=weight * down, k0=k0, crack_pressure=pressure)
+    sol = body(slot(mouth, mouth + 3 * down, True), half_plane=half_plane).solve(load)
+    assert factors(sol)[0, 0] == pytest.approx(exact[0, 0], rel=1e-6)
+    # Balance: the field's divergence is minus the weight, by central differences.
+    at, h = mouth + 2.0 * down + 3.0 * half_plane.turn[0], 1e-3
+    s = sol.stress(np.array([at + [h, 0], at - [h, 0], at + [0, h], at - [0, h]]))
+    div = (s[0, [0, 2]] - s[1, [0, 2]] + s[2, [2, 1]] - s[3, [2, 1]]) / (2 * h)
+    assert np.allclose(div, -weight * down, rtol=1e-5, atol=1e-5 * weight)
+
+
+def test_point_loads():
+    """Flamant's load on the surface and Melan's in the rock open an edge crack as dislocations in their fields do; the
+    field of the one is linear elasticity's limit of the other."""
+    arms = [Arm(0j, -1j, start_is_tip=False, open=True)]
+    crack = slot((0, 0), (0, -1), True)
+    on, inside = np.array([0.7, 0.0]), np.array([0.8, -0.6])
+    force = np.array([3.0, 2.0])
+
+    def flamant(points):
+        rel = points - on
+        r2 = np.sum(rel**2, axis=1)
+        return (-2 / math.pi * (rel @ force) / r2**2)[:, None] * np.stack(
+            [rel[:, 0] ** 2, rel[:, 1] ** 2, rel[:, 0] * rel[:, 1]], 1
+        )
+
+    sol = body(crack).solve(ddm.BodyLoad(points=[on], forces=[force]))
+    exact = dislocations.stress_intensity(arms, flamant, "half-plane", 257)
+    assert np.allclose(factors(sol), exact, rtol=1e-6)
+    deep = body(crack).solve(ddm.BodyLoad(points=[inside], forces=[force]))
+    x = np.column_stack([np.array([-2.0, 0.3, 5.0]), np.zeros(3)])
+    assert np.abs(deep.stress(x)[:, 1:]).max() < 1e-10
+    # A load that comes up to the surface is Flamant's.
+    near = body(crack).solve(ddm.BodyLoad(points=[on - [0, 1e-4]], forces=[force]))
+    assert np.allclose(factors(near), exact, rtol=1e-3)
+    # The resultant through a circle about the force, and its displacement's strain.
+    q = 2 * math.pi * np.arange(64) / 64
+    n = np.column_stack([np.cos(q), np.sin(q)])
+    s = deep.stress(inside + 0.3 * n)
+    pull = np.column_stack([s[:, 0] * n[:, 0] + s[:, 2] * n[:, 1], s[:, 2] * n[:, 0] + s[:, 1] * n[:, 1]])
+    assert np.allclose(pull.mean(axis=0) * 2 * math.pi * 0.3, -force, rtol=1e-9)
+    at, h = np.array([2.0, -1.5]), 1e-5
+    u = deep.displacement(np.array([at + [h, 0], at - [h, 0], at + [0, h], at - [0, h]]))
+    slope = np.array([(u[0] - u[1]) / (2 * h), (u[2] - u[3]) / (2 * h)])
+    strain = [slope[0, 0], slope[1, 1], slope[0, 1] + slope[1, 0]]
+    assert np.allclose(strain, ROCK.compliance() @ deep.stress([at])[0], rtol=1e-6)
+
+
+def test_crack_grows_up_to_the_surface():
+    """A pressurised crack below the surface turns up and daylights; what is unchanged is reused to the bit of a fresh body."""
+    crack = Cracks.from_polylines([np.array([[-1.0, -0.8], [1.0, -0.8]])])
+    growth = GrowthSettings(increment=0.15, min_increment=0.15)
+    steps = list(
+        ddm.propagate(
+            [], crack, ROCK, ddm.BodyLoad(crack_pressure=1e6), growth, DdmSettings(order=4),
+            control="toughness", max_steps=30, half_plane=SURFACE,
+        )
+    )  # fmt: skip
+    events = [event.kind for step in steps for event in step.events]
+    assert events.count("daylighting") == 2
+    # Steadily less pressure: the cover gets easier to lift.
+    factor = [step.load_factor for step in steps[:5]]
+    assert all(b < a for a, b in pairwise(factor))
+    # Mirror symmetry of what was not asked to be symmetric.
+    tips = steps[3].tips
+    assert tips["k_i"][0] == pytest.approx(tips["k_i"][1], rel=1e-6)
+    grown = steps[4]
+    fresh = body(grown.cracks, 4).solve(ddm.BodyLoad(crack_pressure=grown.load_factor * 1e6))
+    assert np.allclose(factors(fresh), factors(grown.solution), rtol=1e-9, atol=1e-6 * fresh.tips["k_i"].max())
+
+
+def test_what_a_half_plane_refuses():
+    crack = slot((0, -1), (1, -1))
+    with pytest.raises(ValueError, match="bears none of the traction"):
+        body(crack).solve(ddm.BodyLoad(remote_stress=[0, 1.0, 0]))
+    with pytest.raises(ValueError, match="above the surface"):
+        body(slot((0, -1), (0, 0.5)))
+    with pytest.raises(ValueError, match="not marked as a mouth"):
+        body(slot((0, -1), (0, 0)))
+    with pytest.raises(ValueError, match="off the boundary"):
+        body(slot((0, -0.1), (0, -1), mouth=True))
+    with pytest.raises(ValueError, match="along the boundary|less than 3°"):
+        body(slot((0, 0), (1, -0.01), mouth=True))
+    with pytest.raises(ValueError, match="hole 1: reaches the free surface"):
+        body(crack, holes=[circle(16, (0, -5.0), 5.5)])
+    with pytest.raises(ValueError, match="has an outline"):
+        ddm.Body([np.array([[-5, -5], [5, -5], [5, 0], [-5, 0]])], crack, ROCK, half_plane=SURFACE)
+    with pytest.raises(ValueError, match="direction out of the rock"):
+        ddm.HalfPlane((0, 0), (0, 0))
+    with pytest.raises(ValueError, match="k0"):
+        ddm.Body([], crack, ROCK).solve(ddm.BodyLoad(k0=0.5, crack_pressure=1.0))
+    with pytest.raises(ValueError, match="body_force_gradient"):
+        body(crack).solve(ddm.BodyLoad(body_force_gradient=np.eye(2)))
+    with pytest.raises(ValueError, match="not on the body"):
+        body(crack).solve(ddm.BodyLoad(points=[[0, 1.0]], forces=[[0, 1.0]]))
