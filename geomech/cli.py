@@ -177,6 +177,11 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument(
         "--against", type=Path, metavar="FILE", help="figures of an earlier run: say what got slower or less accurate"
     )
+    bench.add_argument(
+        "--seeds", metavar="FIRST-LAST",
+        help="of slopes: run these, one on each core, and leave rows and a picture in outputs/bench_slopes; seeds that have been "
+        "run before, by the same program, are not run again",
+    )  # fmt: skip
 
     verb("doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
          "geomech doctor")  # fmt: skip
@@ -432,10 +437,16 @@ def _bench(options: argparse.Namespace) -> int:
         before = figures.read(options.against) if options.against else None
     except (OSError, ValueError) as error:
         raise BadInput(f"--against: {error}") from error
+    seeds = _seeds(options)
     unit, found = figures.yardstick(), {}
     print(figures.said(figures.machine()), end="\n\n")
     for name in options.topics or TOPICS:
-        found[name] = topic(name)(options.quick)
+        if name == "slopes" and seeds:
+            from .bench.fuzzed_slopes import measure_many
+
+            found[name] = measure_many(seeds)
+        else:
+            found[name] = topic(name)(options.quick)
         print(found[name].text, end="\n\n", flush=True)
     print(figures.write(options.out or Path("outputs/bench/figures.json"), found, quick=options.quick, unit=unit))
     if before is None:
@@ -443,6 +454,18 @@ def _bench(options: argparse.Namespace) -> int:
     changes = figures.changes(before, found, unit)
     print(figures.compared(changes, before, options.against))
     return FAILED if figures.less_accurate(changes) else DONE
+
+
+def _seeds(options: argparse.Namespace) -> range:
+    """The seeds of slopes that are asked for; none: the benchmark's own."""
+    if options.seeds is None:
+        return range(0)
+    if "slopes" not in options.topics:
+        raise BadInput("--seeds belongs to slopes: geomech bench slopes --seeds 0-299")
+    first, _, last = options.seeds.partition("-")
+    if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
+        raise BadInput(f"--seeds takes two numbers that ascend, as 0-299, not {options.seeds!r}")
+    return range(int(first), int(last or first) + 1)
 
 
 def _doctor(options: argparse.Namespace) -> int:

@@ -12,7 +12,7 @@ from .. import dda
 from ..dda import StepResult
 from ..model import TIP, State
 from .bodies import boundary_loads, threads_for, tip_rows
-from .compliance import crack_response
+from .compliance import crack_response, passive
 from .cracked_blocks import CrackedBlocks
 from .settling import Settling
 from .side_by_side import side_by_side
@@ -62,9 +62,8 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     for attempt in range(COMPLIANCE_PASSES):
         with now.timed("dda"):
             result = now.system.step(now.state, now.problem.loads, dt, now.response, load_time, result)
-            if not static:
-                # Passes that took steps of unlike lengths would never agree. (In statics they share their load instead.)
-                dt = min(dt, result.dt)
+            # Passes that took steps of unlike lengths, and so in statics bore unlike loads, would never agree.
+            dt = min(dt, result.dt)
             if load_time is not None and result.state.time != load_time:
                 result = replace(result, state=replace(result.state, time=load_time))
         iterations += result.statistics["open_close_iterations"]
@@ -142,5 +141,5 @@ def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:
     if now.problem.run.skip and known is not None and known[0] is body.crack_system and known[1] == states:
         body.work.compliances_kept += 1
         return known
-    s = body.compliance(solution)
+    s = passive(body.compliance(solution))
     return body.crack_system, states, s

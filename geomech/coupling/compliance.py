@@ -12,6 +12,9 @@ import math
 
 import numpy as np
 
+#: Negative eigenvalues below this part of the largest are none.
+_ROUND_OFF = 1e-12
+
 
 def stress_rotation(angle: float) -> np.ndarray:
     """Q (3, 3): components of a stress carried along by a rotation of ``angle`` rad, σ' = Q σ."""
@@ -30,6 +33,21 @@ def turned_compliance(compliance: np.ndarray, angle: float) -> np.ndarray:
         return compliance
     back = stress_rotation(-angle)
     return back.T @ compliance @ back
+
+
+def passive(compliance: np.ndarray) -> np.ndarray:
+    """``compliance`` (3, 3) without what would give energy back: the nearest positive semidefinite one, whatever the axes.
+
+    Faces that slide under Coulomb's friction answer a normal stress with slip, but no shear stress with opening; the symmetric
+    part of such a response has a negative direction, in which a block, as soft as the rock or softer, would have no stiffness.
+    What is left out stays in the offset, and passes find it.
+    """
+    size = np.array([1.0, 1.0, np.sqrt(0.5)])  # of Mandel's components, in which axes turn without change of length
+    values, vectors = np.linalg.eigh(size[:, None] * compliance * size)
+    if values[0] >= -_ROUND_OFF * values[-1]:
+        return compliance
+    kept = vectors / size[:, None]
+    return (kept * np.maximum(values, 0.0)) @ kept.T
 
 
 def crack_response(

@@ -178,9 +178,16 @@ def _centroids(system: BlockSystem, state: State) -> np.ndarray:
     return block_moments(state.vertices, blocks.next_vertex, blocks.vertex_start)[:, 1:3]
 
 
+def rounding_force(system: BlockSystem) -> float:
+    """What springs like the stiffest contacts' give for the rounding of coordinates, N/m."""
+    modulus = max((m.plane_modulus for m in system.materials if not m.rigid), default=0.0)
+    return _PENALTY * modulus * system.slack
+
+
 def unbalanced_force(system: BlockSystem, result: StepResult) -> float:
     """Largest force (or moment over √area) out of balance on a free block in a static step: its inertia 2M d/dt², over the
-    mean of all forces on free blocks, contact forces and loads by their magnitudes; 0 where no force acts."""
+    mean of all forces on free blocks, contact forces and loads by their magnitudes; 0 where no force acts. What contacts make
+    of the rounding of coordinates is no force: blocks that have come apart without weight are at rest."""
     free = ~system.blocks.fixed
     f, a = result.forces, result.acceleration
     h2 = f.area
@@ -194,5 +201,5 @@ def unbalanced_force(system: BlockSystem, result: StepResult) -> float:
     push = np.hypot(closed["normal_force"], closed["shear_force"])
     for side in ("block", "other"):
         np.add.at(acting, closed[side], push)
-    mean = float(acting[free].mean())
+    mean = max(float(acting[free].mean()), rounding_force(system))
     return float(out[free].max()) / mean if mean > 0 else 0.0

@@ -71,9 +71,10 @@ class LaggedFriction:
             strength = np.where(self._bonded, np.inf, springs.friction * force + springs.sliding)
             self._minimise(strength)
             gap, trial = self._forces(self._contact_motion)
-            new = np.where(self._closed(gap), -springs.normal * gap, 0.0)
-            change = float(np.abs(new - force).max() / max(float(np.abs(new).max()), 1e-300))
-            force = force + _WAY * (np.maximum(new, 0.0) - force)
+            # (A bond that pulls has no friction.)
+            new = np.where(self._closed(gap), np.maximum(0.0, -springs.normal * gap), 0.0)
+            change = float(np.abs(new - force).max() / max(float(new.max(initial=0.0)), 1e-300))
+            force = force + _WAY * (new - force)
             slides = np.abs(trial) > strength
             state = np.where(self._closed(gap), np.where(slides, SLIP, STICK), OPEN)
             yield state, np.where(state == SLIP, np.sign(trial), 0.0), change

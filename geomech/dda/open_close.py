@@ -339,6 +339,8 @@ def settle(
             # Bonds are lost for good: none breaks before all else is right, and the most strained break first.
             wrong = bonds & _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 0.5)
             states, caution, fewest, tries = states.switched(wrong, answer.called), _ALL, np.inf, 0
+            # What was tried knew of bonds that are gone.
+            slower = None
             continue
         wrong &= ~bonds
         closing = wrong & (states.state == OPEN) & (answer.called.state == STICK)

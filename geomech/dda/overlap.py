@@ -94,27 +94,36 @@ def _worst_pair(vertices, next_vertex, start, box, order, centroid, size):
     return worst_a, worst_b, worst
 
 
-def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> None:
-    """Look for blocks that overlap at ``vertices``; ``moments`` (n_blocks, ≥ 3) with area and centroid first.
-
-    Raises ValueError naming the worst two when they overlap by more than `REFUSED` of the smaller one's size; what exceeds
-    `REPORTED` is logged.
-    """
+def deepest_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> tuple[int, int, float, float]:
+    """The two blocks that overlap most at ``vertices`` (−1, −1 for none), by how much, m, and over the smaller one's size, √area;
+    ``moments`` (n_blocks, ≥ 3) with area and centroid first."""
     start = np.ascontiguousarray(blocks.vertex_start, np.int64)
     first = start[:-1]
     box = np.hstack([np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)])
     size = np.sqrt(moments[:, 0])
     a, b, depth = _worst_pair(
-        vertices, np.ascontiguousarray(blocks.next_vertex, np.int64), start, box,
+        np.ascontiguousarray(vertices), np.ascontiguousarray(blocks.next_vertex, np.int64), start, box,
         np.argsort(box[:, 0], kind="stable"), np.ascontiguousarray(moments[:, 1:3]), size,
     )  # fmt: skip
-    if a < 0 or depth <= REPORTED * min(size[a], size[b]):
+    return a, b, depth, depth / min(size[a], size[b]) if a >= 0 else 0.0
+
+
+def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> None:
+    """Look for blocks that overlap at ``vertices``; ``moments`` as in `deepest_overlap`.
+
+    Raises ValueError naming the worst two when they overlap by more than `REFUSED` of the smaller one's size; what exceeds
+    `REPORTED` is logged.
+    """
+    a, b, depth, share = deepest_overlap(blocks, vertices, moments)
+    if share <= REPORTED:
         return
+    start = blocks.vertex_start
+    low, high = ([limit(vertices[start[k] : start[k + 1]], axis=0) for k in (a, b)] for limit in (np.min, np.max))
+    x, y = 0.5 * (np.maximum(*low) + np.minimum(*high))
     names = blocks.names or tuple(f"block {k}" for k in range(blocks.n_blocks))
-    x, y = 0.5 * (np.maximum(box[a, :2], box[b, :2]) + np.minimum(box[a, 2:], box[b, 2:]))
     what = (
         f"{names[a]!r} and {names[b]!r} overlap by {depth:.3g} m near x = {x:.6g}, y = {y:.6g} m before they have moved"
     )
-    if depth > REFUSED * min(size[a], size[b]):
+    if share > REFUSED:
         raise ValueError(f"{what}: draw them apart, or cut one out of the other")
     log.warning("%s; their contact pushes them apart", what)

@@ -113,6 +113,11 @@ class BlockSystem:
         return max(share * size, _FINEST * self._slack)
 
     @property
+    def slack(self) -> float:
+        """The rounding of coordinates, m: less is no motion."""
+        return self._slack
+
+    @property
     def allowed_ratio(self) -> float:
         """The largest displacement that a step may bring, in units of half the height."""
         return self._limit / self.half_height

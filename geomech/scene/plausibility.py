@@ -26,6 +26,7 @@ def check_plausible(c: Check) -> None:
     _size(c)
     _near_misses(c)
     _strain(c)
+    _weightless(c)
 
 
 def _materials(c: Check) -> None:
@@ -42,6 +43,16 @@ def _materials(c: Check) -> None:
                 f"the fracture toughness of {name!r} is {m.k_ic_pa_sqrt_m:g} Pa √m, far below that of any rock",
                 "the unit is Pa √m: 1.2 MPa √m is 1.2e6",
             )
+
+
+def _weightless(c: Check) -> None:
+    loads = c.tables.loads
+    if loads.in_situ is not None and loads.gravity_ramp_s > 0:
+        c.warn(
+            ("loads", "gravity_ramp_s"),
+            "blocks take their in-situ stress at time 0, when gravity is still 0: nothing bears it, and weight comes on afterwards",
+            "leave `gravity_ramp_s` out",
+        )
 
 
 def _size(c: Check) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geomech.coupling.compliance import crack_response, strain_rotation, stress_rotation, turned_compliance
+from geomech.coupling.compliance import crack_response, passive, strain_rotation, stress_rotation, turned_compliance
 from geomech.model import Material
 
 
@@ -28,3 +28,19 @@ def test_response_reproduces_the_crack_strain_it_was_made_from():
     compliance, strain, stress = np.diag([2.0, 1.0, 3.0]), np.array([0.3, 0.1, -0.2]), np.array([1.0, -2.0, 0.5])
     s, offset = crack_response(compliance, strain, stress, 0.4)
     assert offset + s @ stress == pytest.approx(strain_rotation(0.4) @ strain, rel=1e-13)
+
+
+def test_no_direction_gives_energy_back():
+    """A face that slides under friction tan 40° answers pressure with less slip, but shear with no opening: half of that is
+    symmetric, and negative somewhere. What is left is positive, the same in whatever axes, and nothing is taken from others."""
+    shear, friction = 2.0, np.tan(np.radians(40.0))
+    response = np.array(
+        [[0, 0, 0], [0, 1e-3, 0], [0, shear * friction, shear]]
+    )  # a face along x; σy drives slip by friction
+    symmetric = 0.5 * (response + response.T)
+    assert np.linalg.eigvalsh(symmetric)[0] < -0.1
+    kept = passive(symmetric)
+    assert np.linalg.eigvalsh(kept)[0] > -1e-15
+    for angle in (0.3, 1.2):
+        assert passive(turned_compliance(symmetric, angle)) == pytest.approx(turned_compliance(kept, angle), abs=1e-14)
+    assert passive(np.diag([1.0, 0.0, 2.0])) == pytest.approx(np.diag([1.0, 0.0, 2.0]), abs=0)

@@ -85,3 +85,30 @@ def test_what_cannot_rest_is_said():
         dda.in_situ_state(
             system_of(blocks, 0.5), InSituStress(np.zeros(3)), Loads(gravity=History.constant([1.0, 0.0]))
         )
+
+
+@pytest.mark.parametrize("contact", ["penalty", "augmented"])
+def test_blocks_that_nothing_presses_on_come_apart_and_are_at_rest(contact):
+    """A stress without the weight that would bear it, and nothing at the sides: blocks part, and the forces left are what contacts
+    make of rounding, 1e-10 of those that the stress would be (1 MPa on 1 m); no share of them is a force out of balance."""
+    polygons = [rectangle(-1, -1, 4, 0)] + [rectangle(x, y, x + 1, y + 1) for x in range(3) for y in range(2)]
+    blocks = Blocks.from_polygons(polygons, fixed=[True] + [False] * 6)
+    field = InSituStress(np.array([-1e6, -0.5e6, 0.1e6]))
+    rest = dda.in_situ_state(system_of(blocks, 0.6, contact=contact), field, Loads())
+    assert np.abs(rest.state.stress[1:]).max() < 1e-3 and rest.deviation == pytest.approx(1.0)
+    # Each has let go of its strain, σ/E' of its size, and no more.
+    assert rest.settled < 3 * 1e6 / ROCK.plane_modulus * 3
+
+
+def test_a_force_out_of_balance_is_told_beside_the_smallest_weight():
+    """Rounding is no excuse where there are forces: light blocks, a gram each, find an equilibrium in which the
+    floor bears them all (the walls are smooth; the springs' rounding is a tenth of a block's weight)."""
+    light = Material("light", 10e9, 0.25, density=1e-3)
+    blocks = ground()
+    found = dda.equilibrium(
+        dda.BlockSystem(blocks, [light], [JointLaw("smooth")], settings=DdaSettings(time_step=1.0)),
+        State.at_rest(blocks), Loads(gravity=GRAVITY), tolerance=1e-6,
+    )  # fmt: skip
+    assert found.converged
+    floor = np.flatnonzero((found.result.contacts["block"] == 0) | (found.result.contacts["other"] == 0))
+    assert found.result.contacts["normal_force"][floor].sum() == pytest.approx(30 * 1e-3 * 9.81, rel=1e-3)

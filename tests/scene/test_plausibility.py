@@ -125,3 +125,12 @@ def test_titles_name_the_variant(scene_file):
     scene = load_scene(scene_file(text), variant="slow")
     assert scene.problem().title == scene.resolved()["title"] == "A plate between two loads, slow"
     assert load_scene(scene_file(text)).problem().title == "A plate between two loads"
+
+
+@pytest.mark.parametrize(("ramp", "told"), [(0.0, 0), (2.0, 1)])
+def test_in_situ_stress_before_there_is_weight_is_told(scene_file, ramp, told):
+    stress = [f"loads.in_situ.{key}" for key in ("surface_m=2.0", "unit_weight_n_per_m3=25000", "k0=0.5")]
+    found = warnings_of(
+        scene_file, overrides=["loads.gravity_m_s2=[0, -9.81]", f"loads.gravity_ramp_s={ramp}", *stress]
+    )
+    assert ["leave `gravity_ramp_s` out" in w.way_out for w in found] == [True] * told

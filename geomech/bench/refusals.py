@@ -1,0 +1,60 @@
+"""The reasons for which a slope may be refused. What is refused with any other message is counted as wrong."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from .. import dda, ddm
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Errors of ``kind`` whose message has ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence."""
+
+    name: str
+    kind: type[Exception]
+    pattern: str
+    meaning: str
+
+
+REASONS = (
+    Reason(
+        "no rest in situ",
+        dda.NoInSituEquilibrium,
+        r"no equilibrium: blocks have moved",
+        "joints of this strength do not hold the stress asked for: blocks move on, and are named",
+    ),
+    Reason(
+        "in-situ stress not found",
+        dda.NoInSituEquilibrium,
+        r"after \d+ (steps|cuts)",
+        "the search for rest under the stress asked for did not end: force out of balance, or contact, are named",
+    ),
+    Reason(
+        "contact states not found",
+        dda.NotConverged,
+        r"the block step at t = \S+ s failed after \d+ cuts",
+        "contacts find no consistent states at any length of the step: the contact, or how far a vertex moves, is named",
+    ),
+    Reason(
+        "block crushed",
+        dda.NotConverged,
+        r"is crushed to nothing at t = ",
+        "a block's loads are beyond its stiffness: it would have no area",
+    ),
+    Reason(
+        "crack faces not found",
+        ddm.NotConverged,
+        r"crack faces did not settle",
+        "the faces of a block's cracks find no consistent states: the block is named",
+    ),
+)
+
+
+def reason_of(error: Exception) -> str | None:
+    """The name of the reason that ``error`` gives; None: it is none of `REASONS`."""
+    for reason in REASONS:
+        if type(error) is reason.kind and re.search(reason.pattern, str(error)):
+            return reason.name
+    return None
