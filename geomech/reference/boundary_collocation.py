@@ -20,7 +20,7 @@ def centre_crack(
 ) -> tuple[float, float]:
     """K_I, K_II of a crack 2·``half_length`` at ``angle`` (rad) from x in the middle of a plate pulled in y by unit
     tractions on its two ends. ``terms`` of each series."""
-    a, w, h = half_length, half_width, half_height
+    w, h = half_width, half_height
     n = 10 * terms
     # Points crowd to the corners, where the series converge worst; a half turn makes the other half of the outline.
     s = np.cos((np.arange(n) + 0.5) * np.pi / n)
@@ -28,6 +28,22 @@ def centre_crack(
     z = np.concatenate([s * w + 1j * h, w + 1j * h * s]) * turn
     along = np.repeat([turn, 1j * turn], n)
     weight = np.repeat(np.sqrt([w, h]), n) * np.tile((1 - s**2) ** 0.25, 2)
+    return _fitted(half_length, z, along, weight, np.repeat([1.0, 0.0], n), terms)
+
+
+def crack_in_disc(half_length: float, power: int, shear: bool = False, terms: int = 24) -> float:
+    """K_I (K_II with ``shear``) of a crack 2·``half_length`` in the middle of a free disc of radius 1 whose faces a traction
+    x^``power``, even, pulls apart (shears). Less a field with that traction along the whole x-axis (Φ = 0, Ψ = z^power) the
+    faces are free and the outline bears the field's."""
+    angle = (np.arange(10 * terms) + 0.5) * np.pi / (10 * terms)
+    z = np.exp(1j * angle)
+    right = (1j * z) ** 2 * (1j if shear else 1.0) * z**power
+    return _fitted(half_length, z, 1j * z, np.ones(len(z)), right, terms)[int(shear)]
+
+
+def _fitted(a: float, z, along, weight, right, terms: int) -> tuple[float, float]:
+    """K_I, K_II from ``right`` (n,), normal plus i times minus shear traction at points ``z`` of half the outline, which runs
+    ``along``; each counts by its ``weight``."""
     root = np.sqrt(z - a) * np.sqrt(z + a)
     columns, tip = [], []
     for p, dp, p_tip in _orthogonal(z, a, terms):
@@ -40,8 +56,9 @@ def centre_crack(
                 tip.append(c * a * p_tip if sign > 0 else 0.0)
     # A constant imaginary G turns the plate and is without stress.
     del columns[3], tip[3]
-    matrix, right = np.array(columns).T, np.concatenate([weight[:n], np.zeros(3 * n)])
-    coefficients = np.linalg.lstsq(np.concatenate([matrix.real, matrix.imag]), right, rcond=1e-14)[0]
+    matrix, right = np.array(columns).T, weight * right
+    both = np.concatenate([matrix.real, matrix.imag])
+    coefficients = np.linalg.lstsq(both, np.concatenate([right.real, right.imag]), rcond=1e-14)[0]
     k = 2 * np.sqrt(np.pi / a) * (np.array(tip) @ coefficients)
     return float(k.real), float(-k.imag)
 

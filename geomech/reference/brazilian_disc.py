@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
+from .boundary_collocation import crack_in_disc
 from .dislocations import Arm, stress_intensity
 
-#: Atkinson, Smelser & Sanchez 1982, quoted from later literature (T_1 confirmed by `central_crack` to 3e-6): a/R → coefficients T_1 … T_5 and S_1 … S_5 of the series of `atkinson`.
-T = {
-    0.1: (1.014998, 0.503597, 0.376991, 0.376991, 0.314159),
-    0.2: (1.060049, 0.514907, 0.382430, 0.383392, 0.318086),
-    0.3: (1.135551, 0.533477, 0.391640, 0.393835, 0.325033),
-}
-S = {
-    0.1: (1.009987, 0.502341, 0.376991, 0.376991, 0.314159),
-    0.2: (1.039864, 0.509959, 0.379956, 0.380584, 0.316245),
-    0.3: (1.089702, 0.522272, 0.384867, 0.386253, 0.319495),
-}
+#: Terms of the series that `atkinson` sums: as many as their paper.
+TERMS = 5
 
 
 def whole_disc(points: np.ndarray, load: float, angle: float = math.pi / 2) -> np.ndarray:
@@ -55,20 +48,32 @@ def small_crack(ratio: float, angle: float) -> tuple[float, float]:
     return first, (2 + (8 * c * c - 5) * ratio**2) * math.sin(2 * angle)
 
 
-def atkinson(ratio: float, angle: float) -> tuple[float, float]:
-    """N_I and |N_II| by the series in (a/R)², ``ratio`` = a/R a key of `T` (Atkinson, Smelser & Sanchez 1982); four terms
-    of the second, whose fifth is below 2e-3 there. The paper was not at hand: signs in the fourth term of N_II are those that
-    agree with `central_crack` to what the series leaves out."""
-    c2 = math.cos(angle) ** 2
-    s2, k = 1 - c2, 2 * c2 - 1
-    first = (
-        1 - 4 * s2,
-        8 * s2 * (1 - 4 * c2),
-        -4 * s2 * (3 - 36 * c2 + 48 * c2**2),
-        -16 * s2 * (-1 + 24 * c2 - 80 * c2**2 + 64 * c2**3),
-        -20 * s2 * (1 - 40 * c2 + 240 * c2**2 - 448 * c2**3 + 256 * c2**4),
-    )
-    second = (1, 8 * c2 - 5, -3 - 8 * k * (2 - 3 * c2), 3 - 16 * k - 12 * k**2 + 32 * k**3)
-    n_i = sum(t * ratio ** (2 * i) * a for i, (t, a) in enumerate(zip(T[ratio], first)))
-    n_ii = 2 * math.sin(2 * angle) * sum(t * ratio ** (2 * i) * b for i, (t, b) in enumerate(zip(S[ratio], second)))
-    return n_i, abs(n_ii)
+@lru_cache
+def power_factors(ratio: float, terms: int = TERMS) -> tuple[np.ndarray, np.ndarray]:
+    """(terms,) T_i and S_i: K_I and K_II, in units of √(πa), of a crack a/R = ``ratio`` whose faces bear the traction
+    (x/a)^(2i−2). They are the coefficients of Atkinson, Smelser & Sanchez (1982), computed by `boundary_collocation` (not taken
+    from their table, which later literature prints with errors beyond the second column); `dislocations` has the same ten digits."""
+    out = [
+        [crack_in_disc(ratio, 2 * j, shear) / ratio ** (2 * j) / math.sqrt(math.pi * ratio) for j in range(terms)]
+        for shear in (False, True)
+    ]
+    return np.array(out[0]), np.array(out[1])
+
+
+def hertz_powers(angle: float, terms: int = TERMS) -> tuple[np.ndarray, np.ndarray]:
+    """(terms,) what pulls and what shears the line of the crack in the whole disc, as coefficients of (x/R)^(2j), P/πR = 1:
+    −4 (j+1) sin θ sin (2j+1)θ (+1 for a uniform part that j = 0 has: 1 − 4 sin²θ) and 2j sin 2jθ − 2 (j+1) sin 2(j+1)θ, by
+    expanding `whole_disc`; θ = ``angle`` between crack and load."""
+    j = np.arange(terms)
+    pull = -4 * (j + 1) * math.sin(angle) * np.sin((2 * j + 1) * angle)
+    pull[0] += 1
+    return pull, 2 * j * np.sin(2 * j * angle) - 2 * (j + 1) * np.sin(2 * (j + 1) * angle)
+
+
+def atkinson(ratio: float, angle: float, terms: int = TERMS) -> tuple[float, float]:
+    """N_I and |N_II| by the series in (a/R)², ``ratio`` = a/R (Atkinson, Smelser & Sanchez 1982), with `power_factors`. What is
+    left out is of order 4 ``terms`` (a/R)^(2 terms) T."""
+    reach = ratio ** (2.0 * np.arange(terms))
+    pull, shear = hertz_powers(angle, terms)
+    opened, slid = power_factors(ratio, terms)
+    return float(np.sum(opened * reach * pull)), abs(float(np.sum(slid * reach * shear)))

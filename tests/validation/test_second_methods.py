@@ -67,16 +67,42 @@ def test_stack_of_cracks():
     assert crack_arrays.stacked_array(1.0, 40.0) == pytest.approx(math.sqrt(math.pi), rel=5e-3)
 
 
-def test_brazilian_disc_against_its_published_series():
-    """Atkinson, Smelser & Sanchez (1982). N_I on the load's line: the digits of their T_1 (3e-6). Inclined: what the
-    series leave out, of order (a/R)^8 (2e-3 at 0.3, 2e-5 at 0.1)."""
-    for ratio, row in brazilian_disc.T.items():
-        straight = brazilian_disc.normalised(brazilian_disc.central_crack(ratio, 0.0), ratio)
-        assert straight == pytest.approx([row[0], 0.0], abs=3e-6)
-        for angle in (0.1, 0.3, 0.5, 0.9, 1.3):
-            found = brazilian_disc.normalised(brazilian_disc.central_crack(ratio, angle), ratio)
-            series = brazilian_disc.atkinson(ratio, angle)
-            assert np.abs(found) == pytest.approx(np.abs(series), abs=2e-5 + 30 * ratio**8)
+def test_brazilian_disc_against_its_series():
+    """The series of Atkinson, Smelser & Sanchez (1982) with factors by boundary collocation against dislocations in the whole
+    field: 1e-6 with ten terms (of the order of (a/R)^20 are left out); with their five what they leave out, of order (a/R)^10."""
+    for ratio in (0.2, 0.4):
+        for angle in (0.0, 0.1, 0.3, 0.5, 0.9, 1.3):
+            found = np.abs(brazilian_disc.normalised(brazilian_disc.central_crack(ratio, angle), ratio))
+            ten, five = (np.abs(brazilian_disc.atkinson(ratio, angle, n)) for n in (10, 5))
+            assert found == pytest.approx(ten, abs=1e-9 + 40 * ratio**20)
+            assert found == pytest.approx(five, abs=1e-9 + 20 * ratio**10)
+
+
+def test_factors_of_powers_in_a_disc():
+    """T_i and S_i by two methods that share nothing, boundary collocation and dislocations: 1e-10. In a large disc they are those
+    of the plane, (2j)!/(4^j j!²); T_1, T_2 and S_1 of a/R = 0.3 as Atkinson, Smelser & Sanchez (1982) are quoted: to their digits
+    (T_2 is quoted 2e-5 off)."""
+    for ratio in (0.3, 0.5, 0.7):
+        found = brazilian_disc.power_factors(ratio, 4)
+        for column in (0, 1):
+            for j in range(4):
+
+                def pull(points, j=j, column=column, ratio=ratio):
+                    out = np.zeros((len(points), 3))
+                    out[:, 1 + column] = (points[:, 0] / ratio) ** (2 * j)
+                    return out
+
+                own = stress_intensity([Arm(-ratio, ratio)], pull, "disc", 65)[1, column]
+                assert found[column][j] == pytest.approx(own / math.sqrt(math.pi * ratio), abs=1e-10)
+    plane = [math.comb(2 * j, j) / 4**j for j in range(3)]
+    assert brazilian_disc.power_factors(0.01, 3)[0] == pytest.approx(plane, rel=2e-3)
+    opened, slid = brazilian_disc.power_factors(0.3)
+    assert opened[0] == pytest.approx(1.135551, abs=1e-6) and slid[0] == pytest.approx(1.089702, abs=2e-6)
+    assert opened[1] == pytest.approx(0.533477, abs=2e-5)
+
+
+def test_brazilian_disc_with_a_small_crack():
+    """The two terms of small cracks: what they leave out."""
     near, ratio = np.array(brazilian_disc.small_crack(0.1, 0.5)), 0.1
     exact = np.abs(brazilian_disc.normalised(brazilian_disc.central_crack(ratio, 0.5), ratio))
     assert near == pytest.approx(exact, abs=2.5 * ratio**2)
