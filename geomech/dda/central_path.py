@@ -6,11 +6,12 @@ a force N > 0 and a gap w > 0, and sliding contacts slip rates α, β > 0 beside
 
     w = g + N/kₙ,   N w = ε,       (μN + c ∓ S) (α, β) = ε,   Δs + (S − S₀)/kₛ = β − α,
 
-and ε is driven to zero by Newton's method with Mehrotra's (1992) predictor and corrector, for the linear complementarity
-problem of Coulomb friction in an implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring
-between stiff and none, so that each iteration is one factorisation of the matrix of the open–close iterations. Friction on
-the present normal force is no gradient of an energy and nothing guarantees the end; what comes out is only a proposal, and
-the open–close iterations go on from it.
+and ε is driven to zero by Newton's method with Mehrotra's (1992) predictor and corrector and Gondzio's (1996) further
+correctors, which bring products far from ε back towards it, for the linear complementarity problem of Coulomb friction in an
+implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring between stiff and none, so that each
+iteration is one factorisation of the matrix of the open–close iterations. Where steps become short the contacts are centred
+again about the motion at hand, with a larger ε. Friction on the present normal force is no gradient of an energy and nothing
+guarantees the end; what comes out is only a proposal, and the open–close iterations go on from it.
 """
 
 from __future__ import annotations
@@ -25,8 +26,19 @@ from . import assembly, contact_states
 from .contact_springs import Springs
 from .contacts import ContactSet
 
-#: ε at the start, in units of the squared load on a contact's blocks over its stiffness.
-_START = 10.0
+#: ε is counted in units of the squared load on a contact's blocks over its stiffness. It starts at so many times the mean of N²/kₙ
+#: in the last open–close iteration (slopes of 400 to 1 000 blocks: 1 takes a third more iterations, 1 000 walls a tenth more),
+#: and not below the second number.
+_START, _LEAST_START = 100.0, 0.1
+#: Further correctors of a step at most, sought while it goes less far than this (with four, paths of slopes come to an end
+#: sooner; with none they take a quarter more iterations), …
+_CORRECTORS, _FAR = 3, 0.9
+#: … that bring products to within this factor of their target, for steps longer by a factor and an amount, and are worth while
+#: where a step gets so much of this.
+_SPREAD, _FARTHER, _FURTHER, _GAIN = 10.0, 1.2, 0.1, 0.1
+#: So often contacts are centred again where steps have become short, with so much larger an ε than then (with the same one
+#: the path ends where it did).
+_AGAIN, _LARGER = 4, 10.0
 #: No step goes farther than this part of the way to where a force or a gap vanishes.
 _SHORT_OF = 0.99
 #: A contact is undecided while its force and its gap, in units of its stiffness, differ by less than this factor.
@@ -125,7 +137,8 @@ def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
 
 
 class CentralPath:
-    """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which hold.
+    """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which hold,
+    ``forces`` (n,) N normal forces of the size to be expected.
 
     Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins. ``missed``: what is
     left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their stiffness.
@@ -141,6 +154,7 @@ class CentralPath:
         springs: Springs,
         gap: np.ndarray,
         bonded: np.ndarray,
+        forces: np.ndarray,
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
@@ -169,10 +183,10 @@ class CentralPath:
         self._unknowns = np.zeros(right.size)
         # Motions: what makes the gap and the motion along the edge 0 where no force acts.
         self._g, self._s = gap[some] - self._pull / self._kn, -found.shear[some] / self._ks
-        self._centre(_START * self._unit)
         self._load = max(float(np.abs(right).max()), 1e-300)
-        self.epsilon = _START
-        self.missed, self.ended, self._blocked = 1.0, False, 0
+        self.epsilon = max(_START * float(np.mean(forces[some] ** 2 / self._kn / self._unit)), _LEAST_START)
+        self._centre(self.epsilon * self._unit)
+        self.missed, self.ended, self._blocked, self._again = 1.0, False, 0, 0
 
     @property
     def blocked(self) -> bool:
@@ -257,8 +271,23 @@ class CentralPath:
         left = float(self._products(*ahead_of).sum()) / float(self._products(*numbers).sum())
         target = epsilon * left**3 * unit
         dn, dw, db, da, d_above, d_below = changes
-        step, moved, d_shear, changes = newton(target - dn * dw, target - db * d_above, target - da * d_below)
+        goals = [target - dn * dw, target - db * d_above, target - da * d_below]
+        step, moved, d_shear, changes = newton(*goals)
         far = reach(changes)
+        for _ in range(_CORRECTORS):
+            if far > _FAR:
+                break
+            wanted = min(1.0, _FARTHER * far + _FURTHER)
+            n, w, b, a, up, low = (number + wanted * change for number, change in zip(numbers, changes, strict=True))
+            nearer = [
+                goal + np.maximum(np.clip(product, target / _SPREAD, target * _SPREAD) - product, -target * _SPREAD)
+                for goal, product in zip(goals, (n * w, b * up, a * low), strict=True)
+            ]
+            tried = newton(*nearer)
+            reached = reach(tried[-1])
+            if reached < far + _GAIN * (wanted - far):
+                break
+            far, goals, (step, moved, d_shear, changes) = reached, nearer, tried
         self._unknowns += far * step
         self._g, self._s = self._g + far * moved[:, 0], self._s + far * moved[:, 1]
         self._normal, self._width = normal + far * changes[0], width + far * changes[1]
@@ -267,6 +296,11 @@ class CentralPath:
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
         self._blocked = self._blocked + 1 if far < _SHORT else 0
         self.epsilon = epsilon
+        if epsilon > _END and self._again < _AGAIN and (self.blocked or not far > _STUCK):
+            self._again += 1
+            self._blocked, self.epsilon = 0, _LARGER**self._again * epsilon
+            self._centre(self.epsilon * unit)
+            return len(self._g)
         self.ended = not (epsilon > _END and far > _STUCK)
         return int(self._undecided().sum())
 

@@ -362,7 +362,7 @@ def settle(
             if slower is None:
                 if path is None or not np.array_equal(path.bonded, states.bonded):
                     path = CentralPath(
-                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded
+                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded, normal_force
                     )
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration
