@@ -96,13 +96,14 @@ def exponent(costs: list[Cost]) -> float:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``cost_of_size.json`` and ``cost_of_size.png`` in `FOLDER`. ``quick`` leaves out the largest size."""
+    """The table; leaves ``cost_of_size.json`` and ``cost_of_size.png`` in `FOLDER`. ``quick`` leaves out the largest size and takes
+    each of the others once."""
     from ..render.cost_of_size import draw_cutting
 
     # The first cut imports what all need.
     cost("two sets", 10, 1)
     costs = [
-        cost(network, n, 1 if n > 10_000 else 2 if quick else 3)
+        cost(network, n, 1 if quick or n > 10_000 else 3)
         for n in (SIZES[:-1] if quick else SIZES)
         for network in NETWORKS
     ]

@@ -53,7 +53,7 @@ def _rows(quick: bool) -> Iterator[tuple[str, float, float, float]]:
     label = "bodies, factors and compliances of what has not changed: a wall with 20 cracked bricks, 5 steps"
     yield label, *_twice(lambda skip: _coupled(replace(cracked, run=replace(cracked.run, skip=skip))))
     if SPECIMEN.exists():
-        specimen = _specimen(0.3 if quick else 1.0)
+        specimen = _specimen(0.2 if quick else 1.0)
         label = "the same while cracks grow: the two-crack specimen"
         yield label, *_twice(lambda skip: _coupled(replace(specimen, run=replace(specimen.run, skip=skip))))
         yield (

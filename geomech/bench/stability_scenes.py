@@ -128,11 +128,12 @@ def _off_travel(system, slid: float, seconds: float, friction: float, side: floa
     return abs(slid - exact) / (exact + 3 * (shortening + sunk))
 
 
-def incline(friction: float, penalty: float, dt: float) -> Outcome:
+def incline(friction: float, most: int, penalty: float, dt: float) -> Outcome:
+    """Half a second, or ``most`` steps."""
     modulus = Material("rock", 10e9, 0.25).plane_modulus
     system, down = _inclined(friction, 1.0, normal_penalty=penalty * modulus)
     watch = _Watch(system)
-    slid, seconds = _slid(system, down, 0.5, dt, 1000, watch)
+    slid, seconds = _slid(system, down, 0.5, dt, most, watch)
     return watch.outcome(_off_travel(system, slid, seconds, friction, 1.0))
 
 

@@ -56,11 +56,11 @@ class Point:
 
 def measure(quick: bool = False) -> Measured:
     """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` stops each method after
-    about a second; else constant elements are given `RATIO` times this solver's time to `ERROR` at least."""
+    about a quarter of a second; else constant elements are given `RATIO` times this solver's time to `ERROR` at least."""
     from ..render.work_precision import draw
 
-    points = [point for name in PROBLEMS for point in _curves(name, *((0.6, 0.0) if quick else (8.0, RATIO)))]
-    growth = growth_run.measure(10 if quick else 40)
+    points = [point for name in PROBLEMS for point in _curves(name, *((0.15, 0.0) if quick else (8.0, RATIO)))]
+    growth = growth_run.measure(5 if quick else 40)
     goals = _goals(points)
     FOLDER.mkdir(parents=True, exist_ok=True)
     written = {
