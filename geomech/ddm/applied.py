@@ -11,7 +11,7 @@ from .distributed import LineForces, approximate, pieces
 from .influence import ElementSet
 from .loads import BodyLoad, OutOfEquilibrium, resultants
 from .particular import GrowingWithDepth, Particular
-from .placing import OFF, onto_boundary
+from .placing import OFF, onto_boundary, sides_for
 from .point_loads import KelvinLoad, MelanLoad, WedgeLoad
 from .unit_loads import on_elements
 
@@ -102,17 +102,20 @@ def apply(load: BodyLoad, body: Body) -> Applied:
     edges, boundary = body.mesh.edges, body.boundary
     for number, (where, value) in enumerate(load.sides):
         name = f"side {where}" if isinstance(where, int) else f"side load {number}"
-        if not len(edges):
+        if not len(edges) and (body.half_plane is None or isinstance(where, int)):
             raise ValueError(f"{name}: the body has no boundary")
         if isinstance(where, int):
             if not 0 <= where < len(edges):
                 raise ValueError(f"{name}: there is no such edge, the body has {len(edges)}")
             segment, edge = edges[where], where
         else:
-            segment, against, edge = onto_boundary(edges, np.array(where), name, body._extent)
+            segment = np.array(where)
+            segment, against, edge = onto_boundary(sides_for(body.mesh, segment), segment, name, body._extent)
             value = value[::-1] if against and not callable(value) and value.ndim == 2 else value
         if callable(value):
-            functions.append(approximate(value, *pieces(boundary, edge, segment), name))
+            # A free surface has no elements that the load could be cut at.
+            parts = pieces(boundary, edge, segment) if edge < len(edges) else (segment[:1], segment[1:])
+            functions.append(approximate(value, *parts, name))
         else:
             segments.append(segment[None])
             tractions.append(np.broadcast_to(value, (2, 2))[None])

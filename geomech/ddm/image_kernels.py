@@ -130,7 +130,8 @@ def _moments(kind, distance, zp, zm, highest, table, w):
 def tractions(points, tangents, per, first, last, start, end, kind, order, nu, tol, force, table, nodal, out):
     """Add to ``out`` what the free surface y = 0 adds to `kernels.tractions`.
 
-    ``points`` are the mirror images of the rock's, all else as there; everything in the frame of the surface.
+    ``points`` are the mirror images of the rock's, all else as there; everything in the frame of the surface. An element that
+    lies on the surface, as forces may, has the rock on its left and the images of points on it on its right.
     """
     n1 = order + 1
     w, parts = np.empty(_ROOM), np.empty(_ROOM)
@@ -148,7 +149,7 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
         for i in range(n):
             places[i] = (begin + i) // per * per + begin + i
         for e in range(len(start)):
-            c, tx, ty = _sort(points, begin, n, start, end, e, tol, 1.0, tile, chosen, count)
+            c, tx, ty = _sort(points, begin, n, start, end, e, tol, -1.0, tile, chosen, count)
             eta = 0.5 * (start[e, 1] + end[e, 1]) / c
             source = kind[e]
             conj = both(splat(tx), splat(-ty))
@@ -229,7 +230,7 @@ def fields(points, first, last, start, end, kind, order, density, nu, tol, force
         for i in range(5 * _TILE):
             total[i] = 0.0
         for e in range(len(start)):
-            c, tx, ty = _sort(points, begin, n, start, end, e, tol, 1.0, tile, chosen, count)
+            c, tx, ty = _sort(points, begin, n, start, end, e, tol, -1.0, tile, chosen, count)
             eta = 0.5 * (start[e, 1] + end[e, 1]) / c
             source = kind[e]
             own, conj = both(splat(tx), splat(ty)), both(splat(tx), splat(-ty))

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from .mesh import Mesh
 
 #: A segment may stand this far off the boundary, in units of the extent; it is put onto it.
 OFF = 1e-6
+
+
+def sides_for(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    """(m, 2, 2) the edges of ``mesh`` and, in a half-plane, a piece of its surface that goes beyond all of ``points`` (..., 2)."""
+    rock = mesh.cracks.half_plane
+    if rock is None:
+        return mesh.edges
+    points = np.concatenate([x.reshape(-1, 2) for x in (mesh.edges, mesh.cracks.start, mesh.cracks.end, points)])
+    return np.concatenate([mesh.edges, rock.edge(points)])
 
 
 def onto_boundary(edges: np.ndarray, segment: np.ndarray, name: str, extent: float) -> tuple[np.ndarray, bool, int]:

@@ -16,7 +16,7 @@ from .beside_ends import ElementEnds
 from .boundary import middle_of
 from .face_laws import FaceStates
 from .influence import add_fields
-from .placing import OFF, onto_boundary
+from .placing import OFF, onto_boundary, sides_for
 from .reactions import Reactions, reactions
 
 if TYPE_CHECKING:
@@ -268,8 +268,9 @@ class Solution:
     def _line_forces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         body = self.body
         start, end, density = [], [], []
+        edges = sides_for(body.mesh, self._applied.segments)
         for k, (segment, ends) in enumerate(zip(self._applied.segments, self._applied.tractions)):
-            (a, b), against, _ = onto_boundary(body.mesh.edges, segment, f"load segment {k}", body._extent)
+            (a, b), against, _ = onto_boundary(edges, segment, f"load segment {k}", body._extent)
             ends = ends[::-1] if against else ends
             t = (b - a) / np.hypot(*(b - a))
             local = ends @ np.column_stack([t, normal_of(t)])

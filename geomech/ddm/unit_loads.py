@@ -12,7 +12,7 @@ from .boundary import BoundarySystem
 from .influence import ElementSet, line_forces, project_jumps
 from .mesh import Mesh
 from .particular import GrowingWithDepth, Particular, edge_densities
-from .placing import OFF, onto_boundary
+from .placing import OFF, onto_boundary, sides_for
 
 if TYPE_CHECKING:
     from .anchors import Anchors
@@ -164,17 +164,16 @@ class UnitLoads:
         """The ``segments`` (m, 2, 2) and their (4,) tractions."""
         if not len(segments):
             return []
-        if not len(self.mesh.edges):
-            raise ValueError("load segments need a body with an outline")
+        edges = sides_for(self.mesh, segments)
+        if not len(edges):
+            raise ValueError("load segments need a body with an outline, a hole or a free surface")
         keys = [segment.tobytes() for segment in segments]
         missing = [k for k, key in enumerate(keys) if key not in self._segments]
         if missing:
             if len(self._segments) > _REMEMBERED:
                 self._segments.clear()
                 return self._unit_segments(segments, tractions)
-            placed = [
-                onto_boundary(self.mesh.edges, segments[k], f"load segment {k}", self.extent)[:2] for k in missing
-            ]
+            placed = [onto_boundary(edges, segments[k], f"load segment {k}", self.extent)[:2] for k in missing]
             for first in range(0, len(missing), _AT_ONCE):
                 here = placed[first : first + _AT_ONCE]
                 straight = np.array([segment for segment, _ in here])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
-from geomech.reference import crack_arrays, dislocations, holes
+from geomech.model import Cracks, DdmSettings, GrowthSettings, JointLaw, Material
+from geomech.reference import crack_arrays, dislocations, fracture, holes
 from geomech.reference.dislocations import Arm
 
 ROCK = Material("rock", youngs_modulus=40e9, poissons_ratio=0.25, k_ic=1e6)
@@ -248,6 +248,91 @@ def test_point_loads():
     slope = np.array([(u[0] - u[1]) / (2 * h), (u[2] - u[3]) / (2 * h)])
     strain = [slope[0, 0], slope[1, 1], slope[0, 1] + slope[1, 0]]
     assert np.allclose(strain, ROCK.compliance() @ deep.stress([at])[0], rtol=1e-6)
+
+
+def strip(points, half=1.0):
+    """Stress below a unit pressure on |x| < ``half`` of the surface (Michell 1902; Timoshenko & Goodier 1951, §37)."""
+    x, y = points.T
+    one, two = np.arctan2(x + half, -y), np.arctan2(x - half, -y)
+    angle, sine, turn = one - two, np.sin(one - two), one + two
+    return np.column_stack([angle - sine * np.cos(turn), angle + sine * np.cos(turn), -sine * np.sin(turn)]) / -math.pi
+
+
+@pytest.mark.parametrize("half_plane", [SURFACE, SLOPE])
+def test_pressure_on_the_surface(half_plane):
+    """A footing, as a segment, as a side and as a function: stress below and beside it, and K of an edge crack against
+    dislocations in its field."""
+
+    def place(points):
+        return np.asarray(points) @ half_plane.turn + np.asarray(half_plane.point)
+
+    ends, down = place([[-1.0, 0.0], [1.0, 0.0]]), -np.asarray(half_plane.outward)
+    name = tuple(map(tuple, ends))
+    loads = [
+        ddm.BodyLoad(segments=[ends[::-1]], tractions=[[down, down]]),
+        ddm.BodyLoad(sides=[(name, down)]),
+        ddm.BodyLoad(sides=[(name, lambda points: np.tile(down, (len(points), 1)))]),
+    ]
+    points = np.array([[0.3, 0.0], [-2.0, 0.0], [0.5, -0.7], [3.0, -1e-3], [0.0, -30.0]])
+    closed = Cracks.from_polylines([place([[0.0, -400.0], [1.0, -400.0]])])
+    for load in loads:
+        sol = body(closed, half_plane=half_plane).solve(load)
+        assert np.allclose(sol.stress(place(points)), half_plane.stress_of(strip(points)), atol=1e-10)
+    arms = [Arm(1.5 + 0j, 1.5 - 1j, start_is_tip=False, open=True)]
+    exact = dislocations.stress_intensity(arms, strip, "half-plane", 257)
+    for load in loads:
+        found = factors(body(slot(*place([[1.5, 0.0], [1.5, -1.0]]), True), half_plane=half_plane).solve(load))
+        assert np.allclose(found, exact, atol=1e-6 * np.abs(exact).max())
+
+
+def test_sizes_offsets_and_poissons_ratios():
+    """From 1 mm to 10 km, at 1e7 m from the origin (where coordinates end at 2e-9 m) and nearly incompressible: K/√size stays,
+    to round-off or what coordinates leave."""
+    exact = None
+    for scale, shift, poisson, tolerance in (
+        (1, 0, 0.25, 0), (1e-3, 0, 0.25, 1e-12), (1e4, 0, 0.25, 1e-12), (1, 1e7, 0.25, 1e-5), (1, 0, 0.499, 1e-12)
+    ):  # fmt: skip
+        rock = Material("rock", youngs_modulus=40e9, poissons_ratio=poisson)
+        lines = [np.array([[0.0, 0.0], [0.3, -1.0]]), np.array([[0.5, -0.2], [1.2, -0.25]])]
+        cracks = Cracks.from_polylines(
+            [scale * line + shift for line in lines], aperture=math.inf, surface=[(True, False), (False, False)]
+        )
+        half_plane = ddm.HalfPlane((0.0, shift))
+        sol = ddm.Body([], cracks, rock, half_plane=half_plane).solve(ddm.BodyLoad(remote_stress=[1, 0, 0]))
+        found = factors(sol) / math.sqrt(scale)
+        exact = found if exact is None else exact
+        assert np.abs(found - exact).max() <= tolerance * np.abs(exact).max(), (scale, shift, poisson)
+        assert sol.residual < 1e-9
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
+def test_a_tip_that_nearly_reaches_the_surface(gap):
+    """Default settings against a mesh for 1e-5; what is left to break grows by much, the far tip is as that of an edge crack."""
+    ends, load = ((0, -gap), (0, -1 - gap)), ddm.BodyLoad(remote_stress=[1, 0, 0])
+    k = factors(body(slot(*ends), 4).solve(load))[:, 0]
+    fine = factors(ddm.solve_to([], slot(*ends), ROCK, load, 1e-5, half_plane=SURFACE))[:, 0]
+    assert np.allclose(k, fine, rtol=1e-4)
+    # The ligament pulls like 1/log: the far tip's factor is still a few per cent short at 1e-6.
+    assert 1.0 < k[1] / math.sqrt(math.pi / 2) < crack_arrays.EDGE_CRACK_HALF_PLANE * math.sqrt(2)
+
+
+def test_closed_faces_below_the_surface():
+    """A joint that dips 60° slips in ground with K0 = 0.2: faces shut and rub, K_I is zero, and the traction on them obeys
+    Coulomb. So deep that the surface is far, K_II is that of the plane in the local stress, with its gradient."""
+    weight, k0, depth = 2.5e4, 0.2, 400.0
+    law = JointLaw("faces", friction_angle=math.radians(25))
+    way = np.array([math.cos(math.radians(60)), -math.sin(math.radians(60))])
+    joint = Cracks.from_polylines([np.array([[0, -depth] - way, [0, -depth] + way])])
+    load = ddm.BodyLoad(body_force=[0, -weight], k0=k0)
+    sol = ddm.Body([], joint, ROCK, DdmSettings(order=6), face_laws=[law], half_plane=SURFACE).solve(load)
+    stress = -weight * depth * np.array([k0, 1.0, 0.0])
+    _, exact = fracture.closed(stress, math.radians(-60), 1.0, math.tan(law.friction_angle))
+    k = factors(sol)
+    assert np.abs(k[:, 0]).max() == 0
+    # The two tips differ by the gradient; their mean is the middle's.
+    assert k[:, 1].mean() == pytest.approx(exact, rel=1e-4)
+    rub, press = sol.faces.traction[..., 1], sol.faces.traction[..., 0]
+    assert np.all(np.abs(rub) <= math.tan(law.friction_angle) * np.abs(press) * (1 + 1e-9))
 
 
 def test_crack_grows_up_to_the_surface():

@@ -95,10 +95,14 @@ def test_three_point_bending(ratio):
     assert k == pytest.approx(exact, rel=1.2e-2)
 
 
-@pytest.mark.parametrize(("ratio", "degrees"), [(0.3, 0), (0.5, 0), (0.5, 10), (0.3, 45)])
+#: Degrees between crack and load at which a crack of a/R = 0.5 is in pure shear (the root of `brazilian_disc.atkinson`'s N_I).
+PURE_SHEAR = 22.891084
+
+
+@pytest.mark.parametrize(("ratio", "degrees"), [(0.3, 0), (0.5, 0), (0.5, 10), (0.3, 45), (0.5, PURE_SHEAR)])
 def test_brazilian_disc(ratio, degrees):
     """A disc as a polygon of the same area, point loads spread over one facet each: both errors are of second order in
-    1/n; n = 32 and 64 extrapolated leave 2e-4."""
+    1/n; n = 32 and 64 extrapolated leave 2e-4. Open, sheared, and both."""
     exact = brazilian_disc.central_crack(ratio, math.radians(degrees))
     found, sizes = [], (32, 64)
     turn = math.radians(90 - degrees)
