@@ -28,7 +28,7 @@ _ALIGNED = 0.9986
 #: … if they are off its line by less than this part of their distance (sine of the same angle, about 3°).
 _OFF_LINE = 0.053
 #: The tributary lengths of a face's contacts add up to its length but for this part: otherwise it has gaps.
-_WITHOUT_GAPS = 1e-2
+WITHOUT_GAPS = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,22 +56,31 @@ class BondedFaces:
         )
         if len(some) < 2:
             return None
-        first, last = np.minimum(block[some], other[some]), np.maximum(block[some], other[some])
-        order = np.lexsort((last, first))
-        some = some[order]
-        swapped = block[some] > other[some]
-        face, along = _on_one_line(first[order], last[order], swapped, np.ascontiguousarray(geometry[some]))
-        by_face = np.argsort(face, kind="stable")
-        some, face, along = some[by_face], face[by_face], along[by_face]
-        start = np.append(np.flatnonzero(np.diff(face, prepend=-1)), len(face))
+        some, start, along = on_lines(block, other, geometry, some)
         low, high = np.minimum.reduceat(along, start[:-1]), np.maximum.reduceat(along, start[:-1])
         length, tributary = high - low, np.add.reduceat(geometry[some, 4], start[:-1])
-        keep = (np.diff(start) > 1) & (np.abs(tributary - length) <= _WITHOUT_GAPS * length)
+        keep = (np.diff(start) > 1) & (np.abs(tributary - length) <= WITHOUT_GAPS * length)
         if not keep.any():
             return None
         members = np.repeat(keep, np.diff(start))
         arm = along - np.repeat(0.5 * (low + high), np.diff(start))
         return cls(np.append(0, np.cumsum(np.diff(start)[keep])), some[members], arm[members], length[keep])
+
+
+def on_lines(
+    block: np.ndarray, other: np.ndarray, geometry: np.ndarray, some: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The contacts ``some`` (k,) of a `ContactSet`, face by face: their rows, where each face begins among them and ends, and
+    where they lie along it (m)."""
+    first, last = np.minimum(block[some], other[some]), np.maximum(block[some], other[some])
+    order = np.lexsort((last, first))
+    some = some[order]
+    swapped = block[some] > other[some]
+    face, along = _on_one_line(first[order], last[order], swapped, np.ascontiguousarray(geometry[some]))
+    by_face = np.argsort(face, kind="stable")
+    face = face[by_face]
+    start = np.append(np.flatnonzero(np.diff(face, prepend=-1)), len(face))
+    return some[by_face], start, along[by_face]
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)

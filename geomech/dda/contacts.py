@@ -14,6 +14,7 @@ from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
+from .face_points import FacePoints
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 
@@ -40,7 +41,8 @@ class ContactSet:
     vertex, edge, block, other, law   as in CONTACT rows
     partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
     rounding    (n,)     m, radius of corners: lines that miss each other by less still hold
-    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2)
+    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the faces in
+                ``points``, where their springs stand
     springs              stiffness and strengths
     state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
     normal, shear, slip        forces N and sliding m
@@ -50,6 +52,8 @@ class ContactSet:
                 count yet: what multipliers have left of it, and what given motion makes of it in the step
     relies_on_glue             corners have been left out that hold as long as all bonds do
     faces                      those that bonds hold at both ends; None without any
+    by_length   (n,)           contacts whose shear stiffness is that of a law
+    points, lumped             faces whose springs stand inside them, and the contacts with theirs at the corners; None without any
     tried                      state and direction that open–close iterations begin with, where these are others
     """
 
@@ -73,6 +77,9 @@ class ContactSet:
     stretch: np.ndarray
     relies_on_glue: bool = False
     faces: BondedFaces | None = None
+    by_length: np.ndarray | None = None
+    points: FacePoints | None = None
+    lumped: ContactSet | None = None
     tried: tuple[np.ndarray, np.ndarray] | None = None
 
     def trying(self, rows: np.ndarray) -> ContactSet:
@@ -87,6 +94,27 @@ class ContactSet:
         known = (self.bonded == 0) | (rows["bonded"] == self.bonded)
         known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
         return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
+
+    def placed(self, points: FacePoints | None) -> ContactSet:
+        """These contacts, found at the corners, with the springs of faces where ``points`` say."""
+        if points is None:
+            return self
+        return replace(
+            self,
+            geometry=points.geometry(),
+            springs=points.springs(self.springs, self.by_length),
+            normal=points.at_points(self.normal),
+            faces=None if self.faces is None else points.on_bonded(self.faces),
+            points=points,
+            lumped=self,
+        )
+
+    def misplaced(self, settled: Settled) -> ContactSet | None:
+        """The contacts with the springs of faces where the step, so ``settled``, has left them in contact; None if they stand so."""
+        if self.points is None:
+            return None
+        better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
+        return None if better is None else self.lumped.placed(better)
 
     @cached_property
     def gap(self) -> np.ndarray:
@@ -103,12 +131,13 @@ class ContactSet:
             rows[name] = getattr(self, name)
         for name in ("state", "bonded", "gap", "normal_force", "shear_force"):
             rows[name] = getattr(settled, name)
-        rows["position"], rows["normal"], rows["point"] = (
-            self.geometry[:, 0],
-            self.geometry[:, 1:3],
-            self.geometry[:, 5:7],
-        )
-        rows["length"] = self.geometry[:, 4]
+        geometry = self.geometry
+        if (points := self.points) is not None:
+            geometry = points.corners
+            rows["normal_force"] = points.at_corners(settled.normal_force)
+            rows["gap"] = points.gap_at_corners(settled.gap)
+        rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
+        rows["length"] = geometry[:, 4]
         rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
         # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
         rows["lift"] = np.maximum(self.lift + settled.lifted, np.minimum(self.lift, 0.0))
@@ -137,6 +166,8 @@ class ContactFinder:
         self._settings = settings
         self._modulus, self._area = modulus, blocks.areas()
         self._table = JointTable.of(joints)
+        self._stiff = ~np.isnan(self._table.normal_stiffness)
+        self._stiff_along = ~np.isnan(self._table.shear_stiffness)
         self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
         self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
@@ -153,9 +184,12 @@ class ContactFinder:
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
         self._near = NearPairs(self._start, self._fixed)
 
-    def find(self, state: State, vertices: np.ndarray, window: float, glue_holds: bool = True) -> ContactSet:
+    def find(
+        self, state: State, vertices: np.ndarray, window: float, glue_holds: bool = True, lumped: bool = False
+    ) -> ContactSet:
         """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it; without
-        corners that are held to each other by the glue around them, if that ``glue_holds``."""
+        corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of faces that have a
+        stiffness of their own at their corners, if ``lumped``."""
         old = state.contacts
         if len(old):
             # Faces that slid apart press at a distance, those that do not fit pass each other by as much.
@@ -200,7 +234,7 @@ class ContactFinder:
         bonded, faces = remembered["bonded"], None
         if bonded.any():
             faces = BondedFaces.of(block, other, partner, geometry, bonded)
-        return ContactSet(
+        found = ContactSet(
             vertex=vertex,
             edge=edge,
             block=block,
@@ -214,6 +248,11 @@ class ContactFinder:
             faces=faces,
             **remembered,
         )
+        if lumped or not self._stiff.any():
+            return found
+        found = replace(found, by_length=self._stiff_along[law])
+        holds = (bonded == 1) & (springs.tension > 0)
+        return found.placed(FacePoints.of(block, other, partner, found.geometry, self._stiff[law], found.gap, holds))
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty

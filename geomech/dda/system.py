@@ -38,6 +38,8 @@ _WINDOW = 2.2
 _BLOCK_SHARE = 0.1
 #: Gaps below this many times the largest coordinate, its round-off, decide nothing.
 _SLACK = 5e-16
+#: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
+_PLACED = 20
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
 
@@ -183,16 +185,21 @@ class BlockSystem:
         if like is not None:
             found = found.trying(like.contacts)
         reason, before = "", np.inf
-        cuts = 0
+        cuts, placed = 0, 0
         while True:
             try:
-                result, largest = self._attempt(
+                result, largest, better = self._attempt(
                     state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
                 )
+                if better is not None and placed == _PLACED:
+                    raise Unsettled("faces do not settle on the part of them that touches")
             except Unsettled as failure:
                 reason = f"{failure}{self._finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
             else:
+                if better is not None:
+                    found, placed = better.trying(result.contacts), placed + 1
+                    continue
                 if found.relies_on_glue and (result.contacts["bonded"] < found.bonded).any():
                     found = self._finder.find(state, vertices, _WINDOW * limit, glue_holds=False)
                     continue
@@ -213,12 +220,13 @@ class BlockSystem:
                 raise NotConverged(
                     f"the block step at t = {state.time:g} s failed after {cuts - 1} cuts (dt = {dt:.3g} s): {reason}"
                 )
+            placed = 0
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
 
     def contacts_near(self, state: State) -> ContactSet:
-        """The contacts that a step from ``state`` would begin with."""
-        return self._finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self._limit)
+        """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
+        return self._finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self._limit, lumped=True)
 
     def told(self, found: ContactSet, forces: ToldContacts) -> np.ndarray:
         """CONTACT rows of ``found``, those that ``forces`` tell of as these say: for a `State` whose next step begins so."""
@@ -320,7 +328,8 @@ class BlockSystem:
 
     def _attempt(
         self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
-    ) -> tuple[StepResult, float]:
+    ) -> tuple[StepResult, float, ContactSet | None]:
+        """The step, its largest displacement (m), and contacts with which it has to be done again."""
         scheme = self.scheme
         time = state.time + dt
         acting = state.time + scheme.weight * dt if load_time is None else load_time
@@ -487,7 +496,11 @@ class BlockSystem:
             "unbalanced_ratio": ratio,
             **acted,
         }
-        return StepResult(new_state, dt, rows, forces, acceleration, energy, statistics), largest
+        return (
+            StepResult(new_state, dt, rows, forces, acceleration, energy, statistics),
+            largest,
+            found.misplaced(settled),
+        )
 
 
 def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:

@@ -248,12 +248,12 @@ def test_joint_stiffness_replaces_the_penalty():
     system = dda.BlockSystem(
         blocks, [Material("rock", 10e12, 0.25)], [joint], settings=DdaSettings(max_displacement_ratio=1.0)
     )
-    loads = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.5e5, -1e5])),))
+    loads = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.3e5, -1e5])),))
     result = system.step(State.at_rest(blocks), loads, 1.0)
-    # Closure p/kₙ; the shear couple tilts the block, so the mean over both contacts is compared.
+    # Closure p/kₙ; the shear couple tilts the block within the kern, so the mean over both contacts is compared.
     assert -result.contacts["gap"].mean() == pytest.approx(1e5 / 1e9, rel=1e-6)
     drag = result.contacts["shear_force"].sum() / (0.5e9 * 2)
-    assert abs(drag) == pytest.approx(0.5e5 / 0.5e9, rel=1e-6)
+    assert abs(drag) == pytest.approx(0.3e5 / 0.5e9, rel=1e-6)
 
 
 def test_the_largest_displacement_of_a_step_is_bounded():

@@ -1,0 +1,177 @@
+"""Where the springs of a joint face stand, so that it resists being turned as it resists being closed.
+
+Blocks that strain evenly part along a straight line, the gap g(s) along their face. A joint of stiffness kₙ (Pa/m) that
+cannot pull presses by −kₙ g where g < 0, on the part c of the face's length ℓ:
+
+    N = −kₙ ∫ g ds,    M = −kₙ ∫ g s ds    over that part; c = ℓ or c = 3 (ℓ/2 − e), e = M/N (a triangle of pressure).
+
+Two springs kₙ c/2 at the Gauss points of the part give both exactly; at the ends of the face they would resist rotation by
+kₙ ℓ³/4 instead of kₙ ℓ³/12. Where the part ends follows from the gap at the end of the step: a step whose faces end elsewhere than
+was taken is done again (Newton's method; the pressure is zero there, so that N changes with the square of what is missed).
+
+Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and moment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model import OPEN
+from .bonded_faces import WITHOUT_GAPS, BondedFaces, on_lines
+from .contact_springs import Springs
+
+#: Gauss points of an interval, in parts of it.
+_GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+#: A part in contact that is known but for this much of its length is known: forces but for its square. The next step begins
+#: from the geometry, so that statics go on to the end.
+_KNOWN = 5e-3
+#: No part is taken to be shorter than this share of the face: springs of none would let everything in.
+_SHORTEST = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class FacePoints:
+    """Faces (m,) with a contact at either end and a stiffness of their own, as a step takes them to touch.
+
+    ends      (m, 2)  rows of the step's `ContactSet`
+    corners   (n, 7)  geometry of all its rows, at the corners
+    length    (m,)    m
+    part      (m, 2)  where the part in contact begins and ends, in parts of the face from its first end
+    held      (m,)    bonds may pull: the part is the whole face
+    """
+
+    ends: np.ndarray
+    corners: np.ndarray
+    length: np.ndarray
+    part: np.ndarray
+    held: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        block: np.ndarray,
+        other: np.ndarray,
+        partner: np.ndarray,
+        geometry: np.ndarray,
+        stiff: np.ndarray,
+        gap: np.ndarray,
+        holds: np.ndarray,
+    ) -> FacePoints | None:
+        """Faces among contacts (n,) with laws that are ``stiff``, ``gap`` m, ``holds`` a bond that may pull; None without any."""
+        some = np.flatnonzero(stiff & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
+        if len(some) < 2:
+            return None
+        some, start, along = on_lines(block, other, geometry, some)
+        two = np.flatnonzero(np.diff(start) == 2)
+        ends, places = some[start[two, None] + [0, 1]], along[start[two, None] + [0, 1]]
+        length = np.abs(places[:, 1] - places[:, 0])
+        whole = np.abs(geometry[ends, 4].sum(axis=1) - length) <= WITHOUT_GAPS * length
+        if not whole.any():
+            return None
+        ends, length = ends[whole], length[whole]
+        held = holds[ends].all(axis=1)
+        part = np.tile([0.0, 1.0], (len(ends), 1))
+        return cls(ends, geometry, length, _touching(gap[ends], held, part), held)
+
+    @property
+    def place(self) -> np.ndarray:
+        """(m, 2) where along the face the springs of its contacts stand, in parts of it."""
+        low, high = self.part[:, :1], self.part[:, 1:]
+        return low + (high - low) * _GAUSS
+
+    def geometry(self) -> np.ndarray:
+        """(n, 7) of the contacts, moved to where their springs stand."""
+        out = self.corners.copy()
+        near, far = self.ends, self.ends[:, ::-1]
+        vertex, across = self.corners[near, 5:7], self.corners[near, 1:3]
+        # The far end of the own face: the far vertex, or its foot on the own edge where that belongs to the other block.
+        gap, beyond = self.corners[near, 3], self.corners[far, 3]
+        along = vertex[:, 1] - vertex[:, 0]
+        same = np.einsum("mi,mi->m", across[:, 0], across[:, 1]) > 0
+        foot = np.where(same, 0.0, 1.0)[:, None, None] * beyond[..., None] * across[:, ::-1]
+        share = np.abs(self.place - [0.0, 1.0])
+        sense = np.array([1.0, -1.0])[None, :, None]
+        out[near, 5:7] = vertex + share[..., None] * (sense * along[:, None] - foot)
+        out[near, 3] = (1 - share) * gap + share * beyond
+        out[near, 4] = (0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length)[:, None]
+        return out
+
+    def springs(self, lumped: Springs, stiff_in_shear: np.ndarray) -> Springs:
+        """The springs ``lumped`` at the corners, by the lengths that they have where they stand; ``stiff_in_shear`` (n,) those
+        whose law has a shear stiffness."""
+        ratio = np.ones(len(self.corners))
+        lengths = 0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length
+        ratio[self.ends] = lengths[:, None] / self.corners[self.ends, 4]
+        return replace(
+            lumped,
+            normal=lumped.normal * ratio,
+            shear=np.where(stiff_in_shear, lumped.shear * ratio, lumped.shear),
+            cohesion=lumped.cohesion * ratio,
+            tension=lumped.tension * ratio,
+        )
+
+    def on_bonded(self, faces: BondedFaces) -> BondedFaces:
+        """Bonded ``faces`` found at the corners, with the arms of where their springs stand."""
+        arm = np.full(len(self.corners), np.nan)
+        arm[faces.rows] = faces.arm
+        first, second = arm[self.ends].T
+        arm[self.ends] = first[:, None] + self.place * (second - first)[:, None]
+        return replace(faces, arm=arm[faces.rows])
+
+    def at_points(self, force: np.ndarray) -> np.ndarray:
+        """(n,) N: normal ``force`` of CONTACT rows, at the corners, as the springs carry it."""
+        out, (first, second) = force.copy(), self.place.T
+        at_first, at_second = force[self.ends].T
+        out[self.ends[:, 0]] = (second * (at_first + at_second) - at_second) / (second - first)
+        out[self.ends[:, 1]] = (at_second - first * (at_first + at_second)) / (second - first)
+        return out
+
+    def at_corners(self, force: np.ndarray) -> np.ndarray:
+        """(n,) N at the corners: what has the resultant and the moment of the springs' normal ``force``."""
+        out, (first, second) = force.copy(), self.place.T
+        on_first, on_second = force[self.ends].T
+        out[self.ends[:, 0]] = on_first * (1 - first) + on_second * (1 - second)
+        out[self.ends[:, 1]] = on_first * first + on_second * second
+        return out
+
+    def gap_at_corners(self, gap: np.ndarray) -> np.ndarray:
+        """(n,) m at the corners, of the straight line through the ``gap`` at the springs."""
+        out, (first, second) = gap.copy(), self.place.T
+        at_first, at_second = gap[self.ends].T
+        slope = (at_second - at_first) / (second - first)
+        out[self.ends] = np.stack([at_first - first * slope, at_first + (1 - first) * slope], axis=1)
+        return out
+
+    def better(self, gap: np.ndarray, state: np.ndarray, holds: np.ndarray) -> FacePoints | None:
+        """The faces with the parts that a step has left in contact, ``gap`` (n,) m and ``state`` (n,) of the springs, ``holds`` (n,)
+        bonds that may pull; None where these are the parts taken.
+
+        A part of which one spring has parted bears no moment: its gaps tell nothing, and it is halved. None grows by more than
+        its length at either end, for on one that is too short the block turns too far. (A spring may be open and yet not parted:
+        its dashpot lets it go before.)
+        """
+        held = holds[self.ends].all(axis=1)
+        part = _touching(self.gap_at_corners(gap)[self.ends], held, self.part)
+        low, high = self.part.T
+        length = high - low
+        part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
+        first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T
+        lame = (first != second) & ~held & (length > _SHORTEST)
+        half = 0.5 * (low + high)
+        part[lame] = np.stack([np.where(first, low, half), np.where(first, half, high)], axis=1)[lame]
+        off = np.abs(part - self.part).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
+        return replace(self, part=np.where(off[:, None], part, self.part)) if off.any() else None
+
+
+def _touching(gap: np.ndarray, held: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face in contact, by the ``gap`` (m, 2) at its ends; faces that are all open keep that ``before``."""
+    first, second = gap.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zero = first / (first - second)
+    low = np.where((first > 0) & (second < 0), np.minimum(zero, 1 - _SHORTEST), 0.0)
+    high = np.where((first < 0) & (second > 0), np.maximum(zero, _SHORTEST), 1.0)
+    low, high = np.where(held, 0.0, low), np.where(held, 1.0, high)
+    out = ((first > 0) & (second > 0) & ~held)[:, None]
+    return np.where(out, before, np.stack([low, high], axis=1))
