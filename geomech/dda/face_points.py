@@ -157,6 +157,9 @@ class FacePoints:
         low, high = self.part.T
         length = high - low
         part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
+        # One that has come over to the other side is sought in both.
+        over = (part[:, 0] >= high) | (part[:, 1] <= low)
+        part[over] = np.stack([np.minimum(part[:, 0], low), np.maximum(part[:, 1], high)], axis=1)[over]
         first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T
         lame = (first != second) & ~held & (length > _SHORTEST)
         half = 0.5 * (low + high)
