@@ -252,7 +252,10 @@ class ContactFinder:
             return found
         found = replace(found, by_length=self._stiff_along[law])
         holds = (bonded == 1) & (springs.tension > 0)
-        return found.placed(FacePoints.of(block, other, partner, found.geometry, self._stiff[law], found.gap, holds))
+        least = least_face(block, other, self._area, self._fixed)
+        return found.placed(
+            FacePoints.of(block, other, partner, found.geometry, self._stiff[law], found.normal, holds, least)
+        )
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty

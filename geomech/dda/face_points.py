@@ -26,9 +26,7 @@ from .contact_springs import Springs
 _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 #: A part in contact that is known but for this much of its length is known: forces but for its square. The next step begins
 #: from the geometry, so that statics go on to the end.
-_KNOWN = 5e-3
-#: No part is taken to be shorter than this share of the face: springs of none would let everything in.
-_SHORTEST = 1e-3
+_KNOWN = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +38,7 @@ class FacePoints:
     length    (m,)    m
     part      (m, 2)  where the part in contact begins and ends, in parts of the face from its first end
     held      (m,)    bonds may pull: the part is the whole face
+    shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
     """
 
     ends: np.ndarray
@@ -47,6 +46,7 @@ class FacePoints:
     length: np.ndarray
     part: np.ndarray
     held: np.ndarray
+    shortest: np.ndarray
 
     @classmethod
     def of(
@@ -56,10 +56,12 @@ class FacePoints:
         partner: np.ndarray,
         geometry: np.ndarray,
         stiff: np.ndarray,
-        gap: np.ndarray,
+        normal: np.ndarray,
         holds: np.ndarray,
+        least: np.ndarray,
     ) -> FacePoints | None:
-        """Faces among contacts (n,) with laws that are ``stiff``, ``gap`` m, ``holds`` a bond that may pull; None without any."""
+        """Faces among contacts (n,) with laws that are ``stiff``, last known to press by ``normal`` N, ``holds`` a bond that may
+        pull, ``least`` m of face that the stiffness is at least that of; None without any."""
         some = np.flatnonzero(stiff & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
         if len(some) < 2:
             return None
@@ -71,9 +73,8 @@ class FacePoints:
         if not whole.any():
             return None
         ends, length = ends[whole], length[whole]
-        held = holds[ends].all(axis=1)
-        part = np.tile([0.0, 1.0], (len(ends), 1))
-        return cls(ends, geometry, length, _touching(gap[ends], held, part), held)
+        held, shortest = holds[ends].all(axis=1), np.minimum(2 * least[ends].max(axis=1) / length, 1.0)
+        return cls(ends, geometry, length, _pressed(normal[ends], held, shortest), held, shortest)
 
     @property
     def place(self) -> np.ndarray:
@@ -148,12 +149,13 @@ class FacePoints:
         """The faces with the parts that a step has left in contact, ``gap`` (n,) m and ``state`` (n,) of the springs, ``holds`` (n,)
         bonds that may pull; None where these are the parts taken.
 
-        A part of which one spring has parted bears no moment: its gaps tell nothing, and it is halved. None grows by more than
-        its length at either end, for on one that is too short the block turns too far. (A spring may be open and yet not parted:
-        its dashpot lets it go before.)
+        A part of which one spring has parted bears no moment, and its gaps tell nothing: the resultant acts beyond the other, so
+        that the part grows that way, or where it ends with the face is halved. None grows by more than its length at
+        either end, for on one that is too short the block turns too far. (A spring may be open and yet not parted: its dashpot
+        lets it go before.)
         """
         held = holds[self.ends].all(axis=1)
-        part = _touching(self.gap_at_corners(gap)[self.ends], held, self.part)
+        part = _touching(self.gap_at_corners(gap)[self.ends], held, self.shortest, self.part)
         low, high = self.part.T
         length = high - low
         part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
@@ -161,20 +163,31 @@ class FacePoints:
         over = (part[:, 0] >= high) | (part[:, 1] <= low)
         part[over] = np.stack([np.minimum(part[:, 0], low), np.maximum(part[:, 1], high)], axis=1)[over]
         first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T
-        lame = (first != second) & ~held & (length > _SHORTEST)
-        half = 0.5 * (low + high)
-        part[lame] = np.stack([np.where(first, low, half), np.where(first, half, high)], axis=1)[lame]
+        lame = (first != second) & ~held & (length > self.shortest)
+        half = np.maximum(0.5 * length, self.shortest)
+        to_low = np.where(low > 0, [np.maximum(low - length, 0.0), high], [low, low + half])
+        to_high = np.where(high < 1, [low, np.minimum(high + length, 1.0)], [high - half, high])
+        part[lame] = np.where(first, to_low, to_high).T[lame]
         off = np.abs(part - self.part).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
         return replace(self, part=np.where(off[:, None], part, self.part)) if off.any() else None
 
 
-def _touching(gap: np.ndarray, held: np.ndarray, before: np.ndarray) -> np.ndarray:
+def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: np.ndarray) -> np.ndarray:
     """(m, 2) the part of each face in contact, by the ``gap`` (m, 2) at its ends; faces that are all open keep that ``before``."""
     first, second = gap.T
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = first / (first - second)
-    low = np.where((first > 0) & (second < 0), np.minimum(zero, 1 - _SHORTEST), 0.0)
-    high = np.where((first < 0) & (second > 0), np.maximum(zero, _SHORTEST), 1.0)
+    low = np.where((first > 0) & (second < 0), np.minimum(zero, 1 - shortest), 0.0)
+    high = np.where((first < 0) & (second > 0), np.maximum(zero, shortest), 1.0)
     low, high = np.where(held, 0.0, low), np.where(held, 1.0, high)
     out = ((first > 0) & (second > 0) & ~held)[:, None]
     return np.where(out, before, np.stack([low, high], axis=1))
+
+
+def _pressed(normal: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face that the forces ``normal`` (m, 2) at its ends press on: c/ℓ = 3 (1/2 − e/ℓ), at most 1."""
+    total = normal.sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where((total > 0) & ~held, np.clip(normal[:, 1] / total, 0.0, 1.0), 0.5)
+    length = np.clip(3 * np.minimum(share, 1 - share), shortest, 1.0)
+    return np.stack([np.where(share > 0.5, 1 - length, 0.0), np.where(share > 0.5, 1.0, length)], axis=1)

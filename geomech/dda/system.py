@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -185,21 +186,16 @@ class BlockSystem:
         if like is not None:
             found = found.trying(like.contacts)
         reason, before = "", np.inf
-        cuts, placed = 0, 0
+        cuts = 0
         while True:
             try:
-                result, largest, better = self._attempt(
+                result, largest = self._attempt(
                     state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
                 )
-                if better is not None and placed == _PLACED:
-                    raise Unsettled("faces do not settle on the part of them that touches")
             except Unsettled as failure:
                 reason = f"{failure}{self._finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
             else:
-                if better is not None:
-                    found, placed = better.trying(result.contacts), placed + 1
-                    continue
                 if found.relies_on_glue and (result.contacts["bonded"] < found.bonded).any():
                     found = self._finder.find(state, vertices, _WINDOW * limit, glue_holds=False)
                     continue
@@ -220,7 +216,6 @@ class BlockSystem:
                 raise NotConverged(
                     f"the block step at t = {state.time:g} s failed after {cuts - 1} cuts (dt = {dt:.3g} s): {reason}"
                 )
-            placed = 0
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
 
@@ -287,7 +282,23 @@ class BlockSystem:
         self._sparse = pairs, pattern
         return pattern
 
-    def _settled(self, pattern, matrix, right, found, vectors, springs, gap, curved) -> Settled:
+    def _over_the_step(self, found: ContactSet, dt: float):
+        """What acts over a step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs, curved laws."""
+        curved = self._finder.curved(found)
+        # Multipliers are forces at the end of the step.
+        weight = 1.0 if self._tolerance else self.scheme.weight
+        if weight != 1.0 and curved is not None:
+            # The lines of a law that is curved are those of the end of the step.
+            weight = np.full(len(found), weight)
+            weight[curved.rows] = 1.0
+        mass = np.where(self._fixed, np.inf, self._mass)
+        springs, gap = over_a_step(
+            found.springs, np.ascontiguousarray(found.gap), (found.state != OPEN) & (found.bonded > 0),
+            np.minimum(mass[found.block], mass[found.other]), weight, self.scheme.block_damping, dt,
+        )  # fmt: skip
+        return springs, gap, weight, curved
+
+    def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray) -> Settled:
             most = self.settings.max_open_close_iterations
             return settle(pattern, matrix, right, contacts, vectors, stiff, start, self._slack, most, curved)
@@ -328,8 +339,7 @@ class BlockSystem:
 
     def _attempt(
         self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
-    ) -> tuple[StepResult, float, ContactSet | None]:
-        """The step, its largest displacement (m), and contacts with which it has to be done again."""
+    ) -> tuple[StepResult, float]:
         scheme = self.scheme
         time = state.time + dt
         acting = state.time + scheme.weight * dt if load_time is None else load_time
@@ -345,19 +355,7 @@ class BlockSystem:
         compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
         offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
         stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
-        curved = self._finder.curved(found)
-        # Multipliers are forces at the end of the step.
-        weight = 1.0 if self._tolerance else scheme.weight
-        if weight != 1.0 and curved is not None:
-            # The lines of a law that is curved are those of the end of the step.
-            weight = np.full(len(found), weight)
-            weight[curved.rows] = 1.0
-        mass = np.where(self._fixed, np.inf, self._mass)
-        springs, gap = over_a_step(
-            found.springs, np.ascontiguousarray(found.gap), (found.state != OPEN) & (found.bonded > 0),
-            np.minimum(mass[found.block], mass[found.other]), weight, scheme.block_damping, dt,
-        )  # fmt: skip
-        n_free = len(self._moving)
+        n_free, iterations = len(self._moving), 0
         end = time if load_time is None else load_time
         actions = StepActions.of(
             self.blocks, self._fixed, loads, state, self._load_map, moments, self._free, self._removed, end
@@ -377,32 +375,39 @@ class BlockSystem:
                 loads.viscous_boundaries, self.blocks, vertices, middle, self.density, self._stiffness, self._fixed
             )
             quiet.assemble(matrix, right, order, moments, dt)
-        vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
         held = self._held
         alone = static and self.blocks.n_blocks == 1 and n_free and actions is None
         if alone and balanced(load[0], points, edges, self._mass[0] * gravity, moments[0]):
             held = with_rigid_motion(held)
         if actions is not None:
             held = actions.held(held)
-        if held is not None and n_free:
-            hold(held, matrix, right, vectors, found.block, found.other, order)
-        if n_free:
-            if actions is None:
-                settled = self._settled(pattern, matrix, right, found, vectors, springs, gap, curved)
+        own = matrix, right
+        for _ in range(_PLACED):
+            if found.points is not None:
+                matrix, right = own[0].copy(), own[1].copy()
+            springs, gap, weight, curved = self._over_the_step(found, dt)
+            vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
+            if held is not None and n_free:
+                hold(held, matrix, right, vectors, found.block, found.other, order)
+            if not n_free:
+                zero = np.zeros(len(found))
+                settled = Settled(
+                    np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
+                )
+                unknowns = settled.unknowns
+            elif actions is None:
+                settled = self._settled(pattern, matrix, right, found, gap, vectors, springs, curved)
                 unknowns = settled.unknowns
             else:
-                settled, unknowns = actions.settle(
-                    pattern, matrix, right, vectors, found, gap,
-                    lambda pattern, matrix, right, found, gap: self._settled(
-                        pattern, matrix, right, found, vectors, springs, gap, curved
-                    ),
-                )  # fmt: skip
+                solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
+                settled, unknowns = actions.settle(pattern, matrix, right, vectors, found, gap, solve)
+            iterations += settled.iterations
+            better = found.misplaced(settled)
+            if better is None:
+                break
+            found = better.trying(found.rows(settled))
         else:
-            zero = np.zeros(len(found))
-            settled = Settled(
-                np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
-            )
-            unknowns = settled.unknowns
+            raise Unsettled("faces do not settle on the part of them that touches")
 
         increment = np.zeros((self.blocks.n_blocks, 6))
         increment[self._moving] = unknowns[order[self._moving]]
@@ -484,7 +489,7 @@ class BlockSystem:
         )
         closed = settled.state != OPEN
         statistics = {
-            "open_close_iterations": settled.iterations,
+            "open_close_iterations": iterations,
             "dt": dt,
             "step_cuts": cuts,
             "kinetic_energy": energy.kinetic,
@@ -496,11 +501,7 @@ class BlockSystem:
             "unbalanced_ratio": ratio,
             **acted,
         }
-        return (
-            StepResult(new_state, dt, rows, forces, acceleration, energy, statistics),
-            largest,
-            found.misplaced(settled),
-        )
+        return StepResult(new_state, dt, rows, forces, acceleration, energy, statistics), largest
 
 
 def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:

@@ -79,7 +79,8 @@ class JointLaw:
     softening_slip              m of slip over which tan φ and cohesion fall in a straight line to the residual; 0: at once
     dilation_angle              sliding lifts the faces by tan ψ times the slip, up to ``dilation_slip`` m from the start
     roughness                   curved strength of Barton and Bandis, with its own dilation and its own decay
-    normal_stiffness, shear_stiffness   Pa/m, or None for the solver's penalty springs
+    normal_stiffness, shear_stiffness   Pa/m, or None for the solver's penalty springs; a face with a normal stiffness resists
+                                rotation as a bed of springs that cannot pull
     max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J. Rock
                                 Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
 

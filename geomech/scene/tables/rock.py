@@ -80,7 +80,8 @@ class JointTable(Table):
         False, description="true: shear stiffness of a rough joint from its strength and the slip of its peak"
     )
     normal_stiffness_pa_per_m: Positive | None = Field(
-        None, description="normal stiffness, Pa/m (unset: the solver's penalty springs)"
+        None,
+        description="normal stiffness, Pa/m, against closure and rotation (unset: the solver's penalty springs)",
     )
     shear_stiffness_pa_per_m: Positive | None = Field(
         None, description="shear stiffness, Pa/m (unset: the solver's penalty springs)"
