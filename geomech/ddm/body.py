@@ -24,7 +24,7 @@ from ..model.polygon import area_moments
 from . import shapes
 from .applied import Applied, apply, check_equilibrium
 from .automatic import for_target
-from .bordered import SMALLEST, Base, Bordered
+from .bordered import SMALLEST, Bordered
 from .boundary import BoundarySystem
 from .boundary_iteration import is_iterated
 from .contact import settle_faces
@@ -269,7 +269,7 @@ class Body:
         known = old.crack_system.matrix if kept else None
         if known is None or self.rough or c.n_unknowns < SMALLEST:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
-            matrix = Bordered(c, Base(c, whole))
+            matrix = Bordered.whole(c, whole)
         else:
             matrix = known.grown(c, c_old, c_seen, schur)
         self.crack_system = CrackSystem(matrix, self.work)

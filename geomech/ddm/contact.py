@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import shapes
 from .face_laws import FaceMemory, FaceStates, carried_over
-from .faces import settle
+from .faces import NotConverged, Settled, settle
 from .friction import settle_rough
+from .network import nearest_on
 
 if TYPE_CHECKING:
     from .body import Body
     from .solution import Solution
+
+#: Faces that no state of contact satisfies may be this part of their crack: what happens at the end of a blade of rock is not felt
+#: by a tip that is far away.
+UNDECIDED = 0.03
+#: Rock between a tip and a side, over the body's extent, that is worth a word when faces do not settle.
+BY_A_THREAD = 1e-2
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +81,55 @@ def settle_faces(
         rows = np.zeros((c.n, 2 * c.per), bool)
         rows[at >= 0] = warm.closed.reshape(-1, 2 * c.per)[at[at >= 0]]
         closed = rows.ravel()
-    closed, solves = settle(respond, can_close, closed)
-    return FaceAnswer(state["w"], state["traction"], closed, solves)
+    try:
+        settled = settle(respond, can_close, closed)
+    except NotConverged as failure:
+        raise NotConverged(f"{failure}{_whereabouts(body, None)}") from None
+    if settled.undecided.any():
+        _judge(body, settled)
+    return FaceAnswer(state["w"], state["traction"], settled.closed, settled.solves)
+
+
+def _whereabouts(body: Body, node: int | None) -> str:
+    """The crack on which the ``node`` is, and what rock there is between its tips and the outline where that is next to
+    none: a piece that hangs by it rattles."""
+    c, cracks, edges = body.faces, body.cracks, body.mesh.edges
+    said = ""
+    if node is not None:
+        element = node // c.per
+        x, y = c.nodes[element, node % c.per]
+        said = f", one of {cracks.names[cracks.crack[c.source[element]]]!r} at ({x:.6g}, {y:.6g})"
+    if len(edges) and len(cracks.tips):
+        left = np.min(
+            [[nearest_on(tuple(cracks.nodes[tip]), tuple(a), tuple(b))[0] for a, b in edges] for tip in cracks.tips],
+            axis=1,
+        )
+        tip = int(np.argmin(left))
+        if left[tip] < BY_A_THREAD * body._extent:
+            (x, y), crack = cracks.nodes[cracks.tips[tip]], body.tip_elements[0]["crack"][tip]
+            said += f"; from the tip of {cracks.names[crack]!r} at ({x:.6g}, {y:.6g}) only {left[tip]:.2g} m of rock are left to a side"
+    return said
+
+
+def _judge(body: Body, settled: Settled) -> None:
+    """Log where the nodes are of which no state of contact was found. Raises NotConverged, which names the crack, when they
+    are more than a crack's last bit at a mouth or junction: then they matter."""
+    c, cracks = body.faces, body.cracks
+    at = np.flatnonzero(settled.undecided.reshape(c.n, -1).any(axis=1))
+    crack = cracks.crack[c.source]
+    for number in np.unique(crack[at]):
+        here = at[crack[at] == number]
+        length, own = float(c.length[here].sum()), float(c.length[crack == number].sum())
+        x, y = c.start[here[0]]
+        where = f"faces of {cracks.names[number]!r} beside ({x:.6g}, {y:.6g}) are open in no state that holds at all their points"
+        if length > UNDECIDED * own or (c.kind[here] != shapes.ORDINARY).any():
+            raise NotConverged(f"{where}, over {length:.3g} m: give it an aperture, friction, or a finer mesh")
+        _log.warning(
+            "%s, over %.3g m; they are left with a violation of %.1e of the largest stress",
+            where,
+            length,
+            settled.violation,
+        )
 
 
 def _rough(
@@ -86,7 +143,10 @@ def _rough(
     began = body.never_loaded if history is None else _memory(history, body)
     first = history if warm is None else warm
     guess: FaceStates | None = None if first is None else _memory(first, body).states
-    w, reaction, memory, solves = settle_rough(body.face_equations, right, began, guess)
+    try:
+        w, reaction, memory, solves = settle_rough(body.face_equations, right, began, guess)
+    except NotConverged as failure:
+        raise NotConverged(f"{failure}{_whereabouts(body, failure.node)}", failure.node) from None
     closed = np.zeros(len(right), bool)
     closed[laws.across] = memory.states.closed
     return FaceAnswer(w, applied - reaction, closed, solves, memory, began)

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .bordered import LOSS, SINGULAR, Base, Bordered, BorderedFactor
+from .bordered import LOSS, SINGULAR, Bordered, BorderedFactor
 from .factor import Factor
 from .work import Work
 
@@ -100,17 +100,17 @@ class CrackSystem:
     @cached_property
     def open_factor(self) -> Factor | BorderedFactor | None:
         """Factors of S with all faces open; None when only closed faces hold a part of the body."""
-        if self.matrix.border is not None:
+        if not self.matrix.is_whole:
             try:
                 self._work.crack_borderings += 1
-                self._work.crack_factorisations += self.matrix.base.unfactored
+                self._work.crack_factorisations += self.matrix.unfactored
                 factor = self.matrix.factored()
                 if factor.growth < LOSS * factor.rcond:
                     return factor
             except np.linalg.LinAlgError:
                 pass
             # Only pivoting in the whole matrix tells.
-            self.matrix = Bordered(self.matrix.elements, Base(self.matrix.elements, self.matrix.dense))
+            self.matrix = Bordered.whole(self.matrix.elements, self.matrix.dense)
         try:
             self._work.crack_factorisations += 1
             factor = self.matrix.factored()

@@ -168,10 +168,10 @@ class _Contact:
     def _respond(self, states: FaceStates, limit: np.ndarray | None):
         self.solves += 1
         if self.solves > _PASSES:
-            raise NotConverged(f"crack faces did not settle in {_PASSES} solves{self.report}")
+            raise NotConverged(f"crack faces did not settle in {_PASSES} solves{self.report}", self.node)
         return self.equations.solve(self.right, states, self._now, limit)
 
-    report = ""
+    report, node = "", None
 
     def _next(self, states: FaceStates, w: np.ndarray, reaction: np.ndarray, limit: np.ndarray | None) -> tuple:
         """The states that ``w`` and ``reaction`` ask for, the nodes that change, and the worst violation."""
@@ -227,6 +227,7 @@ class _Contact:
             self.report = f"; {n} nodes are in violation, by {worst:.1e} of the largest stress"
             if n == 0:
                 return states, w, reaction
+            self.node = int(np.flatnonzero(changed)[-1])
             if n < best:
                 best, patience = n, _PATIENCE
             else:
@@ -263,7 +264,7 @@ class _Contact:
                 if found is not None:
                     return found
             limit = now
-        raise NotConverged(f"crack faces did not settle under friction{self.report}")
+        raise NotConverged(f"crack faces did not settle under friction{self.report}", self.node)
 
 
 def settle_rough(
