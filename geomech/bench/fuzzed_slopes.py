@@ -212,6 +212,8 @@ def outcome(every: Sequence[Watched]) -> Iterator[str]:
         right = max((w.worst.get(name, 0.0) for w in every if w.verdict in (RIGHT, LONG)), default=0.0)
         most = max((w.worst.get(name, 0.0) for w in every), default=0.0)
         yield f"  {name:10s}{right:9.1e} {most:9.1e} {invariant.bound:9.0e}  {invariant.meaning}"
+    close = sum(w.worst.get("energy", 0.0) <= 1e-3 for w in every)
+    yield f"energy is accounted for within 1e-3 in {close} of {len(every)}"
     seconds = [w.seconds for w in every]
     total = Counter[str]()
     for w in every:

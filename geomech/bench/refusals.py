@@ -44,6 +44,12 @@ REASONS = (
         "a block's loads are beyond its stiffness: it would have no area",
     ),
     Reason(
+        "strained beyond elasticity",
+        dda.NotConverged,
+        r"is strained by \S+ % at t = \S+ s: no linear elastic body",
+        "a block that hangs by a thread, or is loaded beyond its stiffness, is no linear elastic body: it is named",
+    ),
+    Reason(
         "crack faces not found",
         ddm.NotConverged,
         r"crack faces did not settle",

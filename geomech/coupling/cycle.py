@@ -21,6 +21,7 @@ from ..model import TIP, Cycle, Event, Problem
 from .balance import balanced
 from .collapse import lost, relax
 from .cracked_blocks import CrackedBlocks
+from .elastic_range import ElasticRange
 from .event_steps import SETTLED, TOGETHER, EventSteps
 from .growing import births, growth_of_tips, initiations, part_here, take_growth
 from .record import event, record
@@ -77,6 +78,7 @@ class Coupling:
         #: What the growth that ended the last load step brought, where the load follows the cracks.
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
+        self.range = ElasticRange()
         self.under_way: UnderWay | None = None
         self.between: Callable[[], None] = _go_on
 
@@ -152,6 +154,8 @@ class Coupling:
                 yield self._still(pending, growth_pass)
                 return True
             result, solutions = found.result, found.solutions
+            if now.bodies:
+                self.range.check(now.motion(result.state), now.blocks, result.state.time)
             if static:
                 # The passes of a step share its load, also when one of them has to take a shorter step.
                 load_time = result.state.time

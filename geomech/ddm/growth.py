@@ -4,8 +4,8 @@ A step is straight, from the tip by its increment along its growth angle. In ord
 
 1. meets another driven tip that comes towards it half way (both end at one common node);
 2. is trimmed where it would cross a crack face or a boundary, and joins it there;
-3. otherwise, when its end comes near a crack or a boundary that lies ahead of it and can be reached without crossing
-   anything, goes there instead;
+3. otherwise, when its end comes near a crack or a boundary, nearer than its start, that lies ahead of it and can be reached
+   without crossing anything, goes there instead;
 4. otherwise ends in the rock, a tip again.
 
 The network stays a planar graph throughout: segments meet at common nodes and nowhere else.
@@ -34,8 +34,9 @@ SNAP_TO_TIP, SNAP_TO_NODE = 0.5, 0.1
 AHEAD = math.cos(math.radians(60.0))
 #: Two tips meet half way when each lies within this of the other's direction of growth.
 FACING = math.cos(math.radians(45.0))
-#: A way that would meet a boundary at a smaller angle goes straight across to it instead: the mouth would be too sharp to be
-#: resolved (a body is refused below 3°), and the rock between is as good as gone.
+#: A way that would meet a boundary or a crack at a smaller angle goes straight across to it instead: the mouth, now or once a
+#: block parts along the crack, would be too sharp to be resolved (a body is refused below 3°), and the rock between is as good as
+#: gone.
 GRAZES = math.sin(math.radians(5.0))
 #: A tip that would turn back along its own crack more sharply than this stands still.
 TURN_BACK = math.radians(170.0)
@@ -202,8 +203,10 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
         ways = _attracted(work, step)
     crack = network.crack_at(step.node)
     for obstacle, node, at in ways:
-        if obstacle.row is None and node is None and _grazes(step.start, at, obstacle):
+        if node is None and _grazes(step.start, at, obstacle):
             _, at = nearest_on(step.start, obstacle.a, obstacle.b)
+            if obstacle.row is not None and min(math.dist(at, obstacle.a), math.dist(at, obstacle.b)) < work.sliver:
+                continue  # past its end
         # So near already that a segment would be a sliver: then the tip itself is drawn onto what it meets.
         drawn = math.dist(step.start, at) < work.sliver
         allowed = set() if node is None else {node}
@@ -222,9 +225,9 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
         grown[step.row] = step.length
 
 
-def _grazes(start: Point, at: Point, edge: Obstacle) -> bool:
-    """Whether the way from ``start`` to ``at`` on a boundary's ``edge`` runs nearly along it."""
-    (x, y), (dx, dy) = (at[0] - start[0], at[1] - start[1]), (edge.b[0] - edge.a[0], edge.b[1] - edge.a[1])
+def _grazes(start: Point, at: Point, face: Obstacle) -> bool:
+    """Whether the way from ``start`` to ``at`` on the ``face`` of a crack or a boundary runs nearly along it."""
+    (x, y), (dx, dy) = (at[0] - start[0], at[1] - start[1]), (face.b[0] - face.a[0], face.b[1] - face.a[1])
     return abs(x * dy - y * dx) < GRAZES * math.hypot(x, y) * math.hypot(dx, dy)
 
 
@@ -267,7 +270,8 @@ def _attracted(work: _Work, step: _Step) -> list[_Way]:
         if obstacle.row is not None and obstacle.row in tail:
             continue
         distance, at = nearest_on(step.end, obstacle.a, obstacle.b)
-        if distance > work.reach:
+        # What a step leaves behind, as a crack that the tip has come past, does not draw it back.
+        if distance > work.reach or distance > nearest_on(step.start, obstacle.a, obstacle.b)[0]:
             continue
         is_own = obstacle.row is not None and obstacle.row.crack == own
         candidates = [(distance, None, at)]

@@ -328,3 +328,27 @@ def test_growth_is_deterministic():
     runs = [advance(cracks, lambda b: loops, tips, SETTINGS, np.ones(len(tips)), 1) for _ in range(2)]
     assert runs[0].cracks.nodes.tobytes() == runs[1].cracks.nodes.tobytes()
     assert runs[0].joins == runs[1].joins
+
+
+def test_a_crack_that_the_tip_has_come_past_does_not_draw_it_back():
+    """From just beside a crack away from it at 45°: the end is within reach of the crack (0.42 of 0.5), but the way leads off it."""
+    cracks = Cracks.from_polylines([[[-3.0, 0.0], [3.0, 0.0]], [[-2.0, 1.0], [0.0, 0.02]]])
+    tips = only(tips_of(cracks), (0.0, 0.02))
+    way = np.array([2.0, -0.98])
+    tips["angle"] = np.radians(45) - np.arctan2(way[1], way[0])
+    growth = grow(cracks, tips, settings=GrowthSettings(increment=0.6, min_increment=0.06, join_distance=0.75))
+    assert growth.joins == ()
+    assert growth.cracks.nodes[-1] == pytest.approx([0.6 * np.sqrt(0.5), 0.02 + 0.6 * np.sqrt(0.5)])
+
+
+@pytest.mark.parametrize("degrees", [0.5, 2.0, 4.0])
+def test_a_way_along_a_crack_goes_straight_across_to_it(degrees):
+    """Where a block parts along a crack its junctions become mouths, which no body can have at less than 3°."""
+    depth = 0.9 * np.sin(np.radians(degrees))
+    cracks = Cracks.from_polylines([[[-3.0, 0.0], [3.0, 0.0]], [[-1.0, 1.0], [0.0, depth]]])
+    tips = only(tips_of(cracks), (0.0, depth))
+    way = np.array([1.0, depth - 1.0])
+    tips["angle"] = np.radians(-degrees) - np.arctan2(way[1], way[0])
+    growth = grow(cracks, tips)
+    assert [join.kind for join in growth.joins] == ["coalescence"]
+    assert growth.joins[0].point == pytest.approx((0.0, 0.0), abs=1e-12)
