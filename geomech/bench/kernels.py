@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from ..ddm import HalfPlane, shapes
 from ..ddm import influence as matrices
-from ..ddm import shapes
 from ..ddm.influence import ElementSet, add_fields, influence
 from .figures import Measured
 
@@ -38,6 +39,11 @@ def _matrices(repeats: int) -> Iterator[tuple[str, float]]:
             f"matrix, p = {order}, ordinary elements in a ring of 200",
             _matrix(_elements(math.inf, 0, order), repeats),
         )
+    for order in (2, 4, 8):
+        yield (
+            f"matrix, p = {order}, the same below a free surface",
+            _matrix(_below(_elements(math.inf, 0, order)), repeats),
+        )
 
 
 def _matrix(elements: ElementSet, repeats: int) -> float:
@@ -55,6 +61,8 @@ def _fields(repeats: int) -> Iterator[tuple[str, float]]:
             ends = elements.start, elements.end, elements.kind
             work = partial(add_fields, points, *ends, density, 0.25, 1e-9, 1.0, force, stress, shift)
             yield f"stress and displacement at {n} points from {name}", _least(work, repeats) / (n * elements.n)
+        work = partial(work, half_plane=HalfPlane((0.0, 20.0)))
+        yield f"the same from {name} below a free surface", _least(work, repeats) / (n * elements.n)
 
 
 def _elements(spread: float, kind: int, order: int) -> ElementSet:
@@ -68,6 +76,11 @@ def _elements(spread: float, kind: int, order: int) -> ElementSet:
         middle, turn = spread * rng.random((n, 2)), 2 * math.pi * rng.random(n)
     half = size * np.column_stack([np.cos(turn), np.sin(turn)])
     return ElementSet(middle - half, middle + half, np.full(n, kind), np.arange(n), order, "chebyshev")
+
+
+def _below(elements: ElementSet) -> ElementSet:
+    """The same, half a unit below a free surface."""
+    return replace(elements, half_plane=HalfPlane((0.0, 1.5)))
 
 
 def _least(work: Callable[[], object], repeats: int) -> float:

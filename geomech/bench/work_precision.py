@@ -16,7 +16,7 @@ from pathlib import Path
 
 from ..model import DdmSettings
 from ..output.summary import write_json
-from . import constant_elements, crack_problems, finite_elements, growth_run
+from . import constant_elements, crack_problems, finite_elements, free_surface, growth_run
 from .crack_problems import CrackProblem, factors, with_reference
 from .figures import Measured, machine
 
@@ -60,17 +60,22 @@ def measure(quick: bool = False) -> Measured:
     from ..render.work_precision import draw
 
     points = [point for name in PROBLEMS for point in _curves(name, *((0.15, 0.0) if quick else (8.0, RATIO)))]
+    surface = [
+        Point(free_surface.PROBLEM, method, size, unknowns, error, _seconds(work))
+        for method, size, unknowns, error, work in free_surface.rows()
+    ]
     growth = growth_run.measure(5 if quick else 40)
     goals = _goals(points)
     FOLDER.mkdir(parents=True, exist_ok=True)
     written = {
-        "machine": machine(), "points": [asdict(p) for p in points], "growth": growth, "goals": goals, "quick": quick
+        "machine": machine(), "points": [asdict(p) for p in (*points, *surface)], "growth": growth, "goals": goals,
+        "quick": quick,
     }  # fmt: skip
     write_json(FOLDER / "work_precision.json", written)
     draw(points, METHODS, FOLDER / "work_precision.png")
-    own = [(f"{p.problem}, {p.method}: {p.size}", p) for p in points if p.method in (OURS, ASKED)]
+    own = [(f"{p.problem}, {p.method}: {p.size}", p) for p in (*points, *surface) if p.method not in METHODS[2:]]
     return Measured.of(
-        _table(points, growth, goals),
+        _table(points, surface, growth, goals),
         errors={name: p.error for name, p in own} | {"growth: K by increments": growth["difference"]},
         times={name: p.seconds for name, p in own} | {"growth: an increment": growth["incremental_s"]},
     )
@@ -262,7 +267,7 @@ def _goals(points: list[Point]) -> dict:
     return goals
 
 
-def _table(points: list[Point], growth: dict, goals: dict) -> str:
+def _table(points: list[Point], surface: list[Point], growth: dict, goals: dict) -> str:
     lines = ["Stress intensity factors: error and time of assembly and solution", ""]
     for name in PROBLEMS:
         lines.append(f"{name}")
@@ -275,6 +280,11 @@ def _table(points: list[Point], growth: dict, goals: dict) -> str:
                     f"  {label:<36}{what:>8}{p.unknowns:>8} unknowns   {p.error:8.1e}   {1e3 * p.seconds:10.2f} ms"
                 )
         lines.append("")
+    lines.append(free_surface.PROBLEM)
+    for p in surface:
+        what = f"{p.method} {'1e-' if p.method == free_surface.IN_KERNELS else ''}{p.size}"
+        lines.append(f"  {what:<44}{p.unknowns:>8} unknowns   {p.error:8.1e}   {1e3 * p.seconds:10.2f} ms")
+    lines.append("")
     if not finite_elements.available():
         lines += ["scikit-fem is not installed: finite elements left out (pip install 'geomech[bench]')", ""]
     g = growth

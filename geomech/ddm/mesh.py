@@ -75,7 +75,7 @@ def mesh(
     sides_of_rock = edges if half_plane is None else np.concatenate([edges, half_plane.edge(points)])
     mouths = [
         (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
-        for k in np.flatnonzero(cracks.surface & (cracks.valence > 0))
+        for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)) if len(edges) else ())
     ]
     key: tuple = float(extent), tuple((*point, deep) for point, deep in mouths)
     if known is not None and known.sides[0] == key:
