@@ -75,7 +75,7 @@ def measure(quick: bool = False) -> Measured:
     draw(points, METHODS, FOLDER / "work_precision.png")
     own = [(f"{p.problem}, {p.method}: {p.size}", p) for p in (*points, *surface) if p.method not in METHODS[2:]]
     return Measured.of(
-        _table(points, surface, growth, goals),
+        _table([*points, *surface], growth, goals),
         errors={name: p.error for name, p in own} | {"growth: K by increments": growth["difference"]},
         times={name: p.seconds for name, p in own} | {"growth: an increment": growth["incremental_s"]},
     )
@@ -267,7 +267,7 @@ def _goals(points: list[Point]) -> dict:
     return goals
 
 
-def _table(points: list[Point], surface: list[Point], growth: dict, goals: dict) -> str:
+def _table(points: list[Point], growth: dict, goals: dict) -> str:
     lines = ["Stress intensity factors: error and time of assembly and solution", ""]
     for name in PROBLEMS:
         lines.append(f"{name}")
@@ -281,7 +281,7 @@ def _table(points: list[Point], surface: list[Point], growth: dict, goals: dict)
                 )
         lines.append("")
     lines.append(free_surface.PROBLEM)
-    for p in surface:
+    for p in (p for p in points if p.problem == free_surface.PROBLEM):
         what = f"{p.method} {'1e-' if p.method == free_surface.IN_KERNELS else ''}{p.size}"
         lines.append(f"  {what:<44}{p.unknowns:>8} unknowns   {p.error:8.1e}   {1e3 * p.seconds:10.2f} ms")
     lines.append("")
