@@ -6,21 +6,15 @@
 import sys
 from pathlib import Path
 
-from geomech.output import standard_observers
-from geomech.pipeline import run
-from geomech.scene import load_scene
+from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
 from compare_flexural_toppling import Watch, check, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
-    names = list(variants) or list(load_scene(folder).variants)
-    scenes = {name: load_scene(folder, overrides, variant=name) for name in names}
-    seen, out = {}, Path(out)
-    for name, scene in scenes.items():
-        seen[name] = Watch()
-        run(scene, out / name, [*standard_observers(scene, quiet=quiet), seen[name]])
+    out = Path(out)
+    seen = {each.name: each.watcher for each in watched_runs(folder, out, Watch, variants, overrides, quiet)}
     text = report(seen)
     (out / "comparison.txt").write_text(text + "\n", encoding="utf-8")
     if not quiet:

@@ -6,20 +6,14 @@
 import sys
 from pathlib import Path
 
-from geomech.output import standard_observers
-from geomech.pipeline import run
-from geomech.scene import load_scene
+from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
 from compare_jointed_slope import Slide, draw, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
-    scenes = {name: load_scene(folder, overrides, variant=name) for name in (list(variants) or [None])}
-    for name, scene in scenes.items():
-        place = Path(out) / name if name and len(scenes) > 1 else Path(out)
-        slide = Slide()
-        summary = run(scene, place, [*standard_observers(scene, quiet=quiet), slide])
+    for _, place, slide, summary in watched_runs(folder, out, Slide, variants or [None], overrides, quiet):
         text = report(slide, summary)
         (place / "comparison.txt").write_text(text + "\n", encoding="utf-8")
         draw(slide, place / "jointed_slope.png")

@@ -6,20 +6,14 @@
 import sys
 from pathlib import Path
 
-from geomech.output import standard_observers
-from geomech.pipeline import run
-from geomech.scene import load_scene
+from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
 from compare_planar_slope import BridgedPlane, draw, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
-    scenes = {name: load_scene(folder, overrides, name) for name in list(variants) or load_scene(folder).variants}
-    seen = {}
-    for name, scene in scenes.items():
-        seen[name] = BridgedPlane()
-        run(scene, Path(out) / name, [*standard_observers(scene, quiet=quiet), seen[name]])
+    seen = {each.name: each.watcher for each in watched_runs(folder, out, BridgedPlane, variants, overrides, quiet)}
     draw(seen, Path(out) / "planar_slope.png")
     text = report(seen)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")

@@ -6,9 +6,7 @@
 import sys
 from pathlib import Path
 
-from geomech.output import standard_observers
-from geomech.pipeline import run
-from geomech.scene import load_scene
+from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
 from compare_single_flaw import Wings, report
@@ -16,13 +14,10 @@ from page_single_flaw import write_page
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
-    scenes = {name: load_scene(folder, overrides, variant=name) for name in (list(variants) or [None])}
     seen, places = {}, {}
-    for name, scene in scenes.items():
+    for name, place, wings, _ in watched_runs(folder, out, Wings, variants or [None], overrides, quiet):
         called = name or "this study's"
-        place = places[called] = Path(out) / name if name and len(scenes) > 1 else Path(out)
-        wings = seen[called] = Wings()
-        run(scene, place, [*standard_observers(scene, quiet=quiet), wings])
+        seen[called], places[called] = wings, place
         text = report(wings)
         (place / "comparison.txt").write_text(text + "\n", encoding="utf-8")
         if not quiet:

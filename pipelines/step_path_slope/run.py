@@ -6,22 +6,15 @@
 import sys
 from pathlib import Path
 
-from geomech.output import standard_observers
-from geomech.pipeline import run
-from geomech.scene import load_scene
+from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
 from compare_step_path_slope import StepPath, draw, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
-    scenes = {name: load_scene(folder, overrides, name) for name in list(variants) or [None]}
-    seen = {}
-    for name, scene in scenes.items():
-        called = name or "scene"
-        seen[called] = StepPath()
-        place = Path(out) / name if name and len(scenes) > 1 else Path(out)
-        run(scene, place, [*standard_observers(scene, quiet=quiet), seen[called]])
+    runs = watched_runs(folder, out, StepPath, variants or [None], overrides, quiet)
+    seen = {each.name or "scene": each.watcher for each in runs}
     draw(max(seen.values(), key=lambda path: (path.n_joints, path.follows)), Path(out) / "step_path_slope.png")
     text = report(seen)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")

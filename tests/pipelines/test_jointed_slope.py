@@ -60,9 +60,9 @@ def test_slips_like_a_sliding_block(tmp_path):
     assert table[-1, 1] == pytest.approx(expected[-1], rel=0.25)
     quiet = (table[:, 0] >= 0.5) & (table[:, 0] < 1.9)
     assert np.abs(table[quiet, 1]).max() < 0.02 * expected[-1]
-    text = (tmp_path / "comparison.txt").read_text(encoding="utf-8")
+    text = (tmp_path / "short" / "comparison.txt").read_text(encoding="utf-8")
     assert "Newmark's sliding block" in text and "by phase" in text and "nan" not in text
-    assert (tmp_path / "jointed_slope.png").stat().st_size > 50_000
+    assert (tmp_path / "short" / "jointed_slope.png").stat().st_size > 50_000
 
 
 def test_newmark_is_followed_on_its_own_times():
@@ -78,7 +78,7 @@ def test_newmark_is_followed_on_its_own_times():
 def cracked(tmp_path_factory):
     """The first steps with cracks."""
     out = tmp_path_factory.mktemp("slope")
-    return run_pipeline(out, "run.end_time_s=0.06", "output.checkpoint_every=2"), out
+    return run_pipeline(out, "run.end_time_s=0.06", "output.checkpoint_every=2"), out / "short"
 
 
 def test_cracked_blocks_take_their_weight(cracked):

@@ -79,7 +79,7 @@ def test_it_writes_its_files(four):
     out, _ = four
     assert "Einstein" in (out / "comparison.txt").read_text(encoding="utf-8")
     assert (out / "step_path_slope.png").stat().st_size > 20_000
-    assert {"initiation", "coalescence", "split"} <= set(Run(out).summary["first"])
+    assert {"initiation", "coalescence", "split"} <= set(Run(out / "four").summary["first"])
 
 
 @pytest.mark.slow
