@@ -125,6 +125,11 @@ class Body:
         holes_held = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
         many = is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
         self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns)
+        if half_plane is not None and self.boundary.n_unknowns + self.faces.n_unknowns > FACTORABLE:
+            raise ValueError(
+                f"half_plane: {self.boundary.n_unknowns + self.faces.n_unknowns} unknowns, but below a free surface no more than "
+                f"{FACTORABLE} are solved for: ask for a larger target_error, or draw the surface as a side of a large block"
+            )
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}

@@ -142,6 +142,8 @@ def _candidates(solution: Solution, material: Material, settings: GrowthSettings
     """All cracks that could be born, most overstressed first."""
     found: list[Birth] = []
     surfaces = [_on_curves(solution), _on_sides(solution), _on_faces(solution)]
+    if solution.body.half_plane is not None:
+        surfaces.append(_on_free_surface(solution, settings))
     if settings.initiation_distance > 0:
         surfaces.append(_at_corners(solution, settings.initiation_distance))
     for points, inward, segment, stress in surfaces:
@@ -200,6 +202,20 @@ def _on_faces(solution: Solution):
     beside = np.tile(np.repeat(_BESIDE * c.length, len(middle)), 2)[:, None] * inward
     segment = np.tile(np.repeat(c.source, len(middle)), 2)
     return points, inward, segment, lambda which: solution.stress((points + beside)[which])
+
+
+def _on_free_surface(solution: Solution, settings: GrowthSettings):
+    """The surface of a half-plane, as far as an extent beyond what stands below it, evenly."""
+    body, rock = solution.body, solution.body.half_plane
+    below = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
+    along = rock.frame(below)[:, 0] if len(below) else np.zeros(1)
+    low, high = along.min() - body._extent, along.max() + body._extent
+    n = min(GRID, math.ceil((high - low) / _spacing(settings)))
+    # An odd number, so that symmetric bodies are looked at in the middle.
+    x = low + (high - low) * (np.arange(2 * (n // 2) + 1) + 0.5) / (2 * (n // 2) + 1)
+    points = np.asarray(rock.point) + x[:, None] * rock.turn[0]
+    inward = np.broadcast_to(-np.asarray(rock.outward), points.shape)
+    return points, inward, np.full(len(points), -1), lambda which: solution.stress(points[which])
 
 
 def _at_corners(solution: Solution, distance: float):

@@ -358,6 +358,62 @@ def test_crack_grows_up_to_the_surface():
     assert np.allclose(factors(fresh), factors(grown.solution), rtol=1e-9, atol=1e-6 * fresh.tips["k_i"].max())
 
 
+def test_all_loads_together():
+    """Weight, remote stress, fluid in cracks and hole, a footing, point loads: the surface and the hole's wall bear what they
+    are to bear, and K is the same as a functional of the loads."""
+    hole = circle(24, (0.0, -2.0), 0.7)
+    cracks = Cracks.from_polylines(
+        [np.array([[1.5, 0.0], [1.2, -0.8]]), np.array([[-1.5, -1.0], [-2.0, -2.0]])],
+        aperture=math.inf, surface=[(True, False), (False, False)],
+    )  # fmt: skip
+    heavy = body(cracks, 6, holes=[hole])
+    load = ddm.BodyLoad(
+        body_force=[0, -1.0], k0=0.4, remote_stress=[2.0, 0, 0], hole_pressure=0.7, crack_pressure=0.2,
+        sides=[(((-3, 0), (-1, 0)), np.array([0, -3.0]))], points=[[0.3, -1.0], [2.5, 0.0]], forces=[[1.0, 2.0], [0.5, -1.0]],
+    )  # fmt: skip
+    sol = heavy.solve(load)
+    k = factors(sol)
+    assert np.abs(heavy.k_functionals(sol)(load) - k).max() < 1e-12 * np.abs(k).max()
+    x = np.array([-5.0, -3.5, -0.5, 0.4, 1.0, 6.0])
+    assert np.abs(sol.stress(np.column_stack([x, 0 * x]))[:, 1:]).max() < 1e-12
+    wall = 0.5 * (hole + np.roll(hole, -1, axis=0))
+    n = (wall - [0.0, -2.0]) / np.hypot(*(wall - [0.0, -2.0]).T)[:, None]
+    s = sol.stress(wall)
+    pull = np.column_stack([s[:, 0] * n[:, 0] + s[:, 2] * n[:, 1], s[:, 2] * n[:, 0] + s[:, 1] * n[:, 1]])
+    # Order 6 on sides between corners; 2e-3 is found.
+    assert np.abs(pull + 0.7 * n).max() < 1e-2
+    assert sol.residual < 1e-4
+
+
+def test_energy_release_rate():
+    """G = dU/da of Clapeyron's energy, by central differences, against (K_I² + K_II²)/E' of a slanted edge crack."""
+
+    def solved(a):
+        return body(slot((0, 0), (0.3 * a, -a), True)).solve(ddm.BodyLoad(remote_stress=[1e6, 0, 0]))
+
+    h = 1e-3
+    rate = (solved(1 + h).crack_energy - solved(1 - h).crack_energy) / (2 * h * math.hypot(1, 0.3))
+    assert rate == pytest.approx(np.sum(factors(solved(1.0)) ** 2) / ROCK.plane_modulus, rel=1e-6)
+
+
+def test_a_crack_is_born_at_the_surface():
+    """Above a pressurised crack the cover bends up: it tears from the surface, in the middle, at the load at which the stress
+    there is the strength, and straight down."""
+    rock = Material("rock", youngs_modulus=40e9, poissons_ratio=0.25, k_ic=1e9, tensile_strength=2e6)
+    crack = Cracks.from_polylines([np.array([[-1.0, -0.5], [1.0, -0.5]])])
+    growth = GrowthSettings(increment=0.05, min_increment=0.05, initiation="surface")
+    load = ddm.BodyLoad(crack_pressure=1e6)
+    step = next(
+        ddm.propagate([], crack, rock, load, growth, DdmSettings(order=6), control="toughness", half_plane=SURFACE)
+    )
+    born = [event for event in step.events if event.kind == "birth"]
+    assert len(born) == 1 and born[0].point == pytest.approx((0.0, 0.0), abs=1e-9)
+    top = step.solution.stress([[0.0, 0.0]])[0]
+    assert top[0] == pytest.approx(2e6, rel=1e-6)
+    nodes = step.growth.cracks.nodes[-2:]
+    assert np.allclose(nodes[1] - nodes[0], [0, -0.05], atol=1e-9)
+
+
 def test_what_a_half_plane_refuses():
     crack = slot((0, -1), (1, -1))
     with pytest.raises(ValueError, match="bears none of the traction"):
@@ -374,6 +430,11 @@ def test_what_a_half_plane_refuses():
         body(crack, holes=[circle(16, (0, -5.0), 5.5)])
     with pytest.raises(ValueError, match="has an outline"):
         ddm.Body([np.array([[-5, -5], [5, -5], [5, 0], [-5, 0]])], crack, ROCK, half_plane=SURFACE)
+    many = Cracks.from_polylines([np.array([[3.0 * k, -5.0], [3.0 * k + 1, -5.0]]) for k in range(700)])
+    with pytest.raises(ValueError, match="no more than 12000 are solved for"):
+        body(many)
+    with pytest.raises(ValueError, match='"compressed" knows the infinite plane only'):
+        ddm.Body([], crack, ROCK, DdmSettings(solver="compressed"), half_plane=SURFACE)
     with pytest.raises(ValueError, match="direction out of the rock"):
         ddm.HalfPlane((0, 0), (0, 0))
     with pytest.raises(ValueError, match="k0"):
