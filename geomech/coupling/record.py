@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..ddm.work import Work
-from ..model import Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
+from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
 
 if TYPE_CHECKING:
     from .cracked_blocks import CrackedBlocks
@@ -52,11 +52,12 @@ def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Ev
 
 def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[str, float]) -> float:
     """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one. Where the block
-    of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of the step."""
+    of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of the step. Where
+    the weight leads (`WEIGHT`), that of a column as high as the scene, ρ g h of the heaviest moving rock, Pa."""
     name = problem.load_edge
     edges = blocks.edges_named(name) if name else []
     if not len(edges):
-        return 0.0
+        return _weight_of_a_column(problem, now) if name == WEIGHT else 0.0
     outward = blocks.outward_normals[edges[0]]
     tractions = sum(
         -float(load.history.at(now) @ outward) for load in problem.loads.edge_tractions if load.edge_name == name
@@ -67,6 +68,15 @@ def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[st
         return tractions
     ends = blocks.vertices[blocks.next_vertex[edges]] - blocks.vertices[edges]
     return tractions - float(force.sum(axis=0) @ outward) / float(np.hypot(*ends.T).sum())
+
+
+def _weight_of_a_column(problem: Problem, now: float) -> float:
+    # Of the problem's blocks, not the present ones: cut and fallen blocks must not change what a load is called.
+    blocks = problem.blocks
+    moving = blocks.material[~blocks.fixed]
+    density = max((problem.materials[m].density for m in np.unique(moving).tolist()), default=0.0)
+    height = float(np.ptp(blocks.vertices[~blocks.fixed[blocks.vertex_block], 1])) if len(moving) else 0.0
+    return density * height * math.hypot(*problem.loads.gravity.at(now).tolist())
 
 
 def axial_strain(gauge, motion: Motion) -> float:

@@ -148,7 +148,9 @@ class _Work:
 
     def __init__(self, network: Network, settings: GrowthSettings):
         self.network = network
-        self.reach = settings.join_distance * settings.increment
+        self.reach = settings.join_length
+        if self.reach is None:
+            self.reach = settings.join_distance * settings.increment
         self.sliver = SLIVER * settings.min_increment
         self.clearance = CLEARANCE * self.sliver
         self.joins: list[Join] = []

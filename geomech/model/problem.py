@@ -91,7 +91,8 @@ class GrowthSettings:
     criterion: str = "mts"
     increment: float = 1e-3
     min_increment: float = 1e-4
-    join_distance: float = 0.5  # in units of the increment: nearer than that to a crack or surface, a tip joins it
+    join_distance: float = 0.5  # in units of the increment: nearer than that to a crack or surface, a tip joins it …
+    join_length: float | None = None  # … or m; loads at which cracks join and cut through then have a limit
     max_passes: int = 200  # growth passes at one load
     correct: bool = True  # predict a step, look how it would go on, and bend it (second order in the increment)
     initiation: str = ""
@@ -122,13 +123,17 @@ class RunSettings:
     skip: bool = True
 
 
+#: The ``load_edge`` of a problem whose weight leads.
+WEIGHT = "gravity"
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Everything a run needs. ``joint_of`` maps a pair of edge names to the law of contacts between such edges, the cracks'
     ``law`` counts in ``face_laws``.
 
     ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
-    compression), or what it takes to move their block; ``in_situ`` is the stress that the blocks have, at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
+    compression), or what it takes to move their block, or is `WEIGHT`; ``in_situ`` is the stress that the blocks have, at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
     """
 
     title: str

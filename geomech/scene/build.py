@@ -230,6 +230,7 @@ def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
         increment=increment,
         min_increment=0.1 * increment if g.min_increment_m is None else g.min_increment_m,
         join_distance=g.join_distance,
+        join_length=g.join_length_m,
         max_passes=g.max_passes,
         correct=g.correct,
         initiation=g.initiation if g.enabled else "",

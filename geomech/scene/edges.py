@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import fnmatch
 
+from ..model import WEIGHT
 from ..shapes.gmsh_model import CRACK
 from ..shapes.parts import JOINT
 from .drawing import Drawing
@@ -46,12 +47,17 @@ def _tractions(c: Check) -> None:
             )
     leading = c.tables.loads.leading_edge
     # Where a traction's own edge is wrong, it may be the one that leads.
-    if leading is not None and leading not in taken | _moved_edges(c) and taken <= set(known):
+    if leading == WEIGHT and leading not in known:
+        if not any(c.tables.loads.gravity_m_s2):
+            c.refuse(
+                ("loads", "leading_edge"), "there is no gravity that could lead", "set gravity_m_s2 and gravity_ramp_s"
+            )
+    elif leading is not None and leading not in taken | _moved_edges(c) and taken <= set(known):
         c.refuse(
             ("loads", "leading_edge"),
             f"no traction acts on the leading edge {leading!r}, and no zone that has it is moved",
-            "it must be the edge of one of [[loads.tractions]], or of a zone in [[loads.motions]]: "
-            + nearest(leading, sorted(taken | _moved_edges(c))),
+            'it must be the edge of one of [[loads.tractions]], or of a zone in [[loads.motions]], or "gravity": '
+            + nearest(leading, sorted(taken | _moved_edges(c) | {WEIGHT})),
         )
 
 

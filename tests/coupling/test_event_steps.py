@@ -8,8 +8,10 @@ import pytest
 from geomech import ddm
 from geomech.coupling import cycles, event_steps
 from geomech.coupling.cracked_blocks import CrackedBlocks
+from geomech.coupling.record import leading_load
 from geomech.ddm.criteria import maximum_tangential_stress
 from geomech.model import (
+    WEIGHT,
     Blocks,
     Cracks,
     DdaSettings,
@@ -66,6 +68,15 @@ def test_growth_starts_at_the_load_of_the_crack_solver_alone():
     found = first_growth(problem)
     assert found.tips["k_eq"].max() == pytest.approx(ROCK.k_ic, rel=1e-6)
     assert -found.load == pytest.approx(toughness_factor(problem), rel=2e-6)
+
+
+def test_weight_that_leads_is_that_of_a_column():
+    """ρ g(t) h of what moves, in place of the traction on an edge."""
+    problem = plate()
+    loads = Loads(gravity=History.ramp([0.0, -RATE]))
+    problem = replace(problem, loads=loads, load_edge=WEIGHT)
+    assert leading_load(problem, problem.blocks, 3.0, {}) == pytest.approx(2200.0 * 2 * H * 3.0 * RATE, rel=1e-12)
+    assert leading_load(replace(problem, load_edge=""), problem.blocks, 3.0, {}) == 0.0
 
 
 def test_growth_starts_at_the_same_load_whatever_the_steps():

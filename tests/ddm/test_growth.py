@@ -141,6 +141,18 @@ def test_end_near_a_face_goes_to_it_and_prefers_its_tip():
     assert growth.cracks.valence.max() == 2 and growth.cracks.n_segments == 3
 
 
+@pytest.mark.parametrize("increment", [1.0, 0.25, 0.05])
+def test_a_join_length_holds_for_every_increment(increment):
+    """A tip passes a face in front of it at 0.8 after its step: it goes there where the join length is 1, else on."""
+    wall = np.array([[increment + 0.8, -3.0], [increment + 0.8, 3.0]])
+    cracks = Cracks.from_polylines([np.array([[-2.0, 0.0], [0.0, 0.0]]), wall])
+    for length, joins in ((1.0, 1), (0.5, 0)):
+        settings = GrowthSettings(increment=increment, min_increment=0.1 * increment, join_length=length)
+        growth = grow(cracks, only(tips_of(cracks), (0.0, 0.0)), settings=settings)
+        assert len(growth.joins) == joins
+        assert growth.grown.max() == pytest.approx(increment + 0.8 if joins else increment)
+
+
 def test_what_is_not_near_or_not_ahead_is_left_alone():
     cracks = Cracks.from_polylines([[[-4, 0], [4, 0]], [[0.5, 3], [0.5, 1.6]]])
     assert grow(cracks, only(tips_of(cracks), (0.5, 1.6))).joins == ()

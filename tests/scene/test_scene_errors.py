@@ -516,6 +516,12 @@ def test_leading_edge_must_be_loaded(scene_file):
     assert "no traction acts on" in error.message and "did you mean 'load:bottom'?" in error.way_out
 
 
+def test_weight_can_lead_only_where_it_acts(scene_file):
+    text = GOOD.replace("[[loads.tractions]]", '[loads]\nleading_edge = "gravity"\n\n[[loads.tractions]]', 1)
+    (error,) = faults(scene_file, text)
+    assert "no gravity that could lead" in error.message and "gravity_ramp_s" in error.way_out
+
+
 def test_two_cracks_of_one_name(scene_file):
     again = '[[geometry.cracks]]\nname = "flaw"\npoints = [[0.2, 0.2], [0.3, 0.3]]\n\n[[geometry.edges]]'
     (error,) = faults(scene_file, GOOD.replace("[[geometry.edges]]", again, 1))

@@ -125,6 +125,11 @@ class GrowthTable(Table):
     join_distance: NotNegative = Field(
         0.5, description="nearer than this to a crack or a surface a tip joins it, in units of the increment"
     )
+    join_length_m: Positive | None = Field(
+        None,
+        description="the same in metres, such as a grain of the rock: loads at which cracks join and cut through then do not "
+        "depend on the increment (unset: join_distance)",
+    )
     max_passes: Annotated[int, Field(ge=1)] = Field(200, description="growth passes at one load")
     correct: bool = Field(
         True, description="predict each step, then bend it towards where it would go on: paths of second order"
