@@ -184,14 +184,17 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
                 row += [f"{off:+.2f}".replace("-0.00", "0.00") if run is not finest and np.isfinite(off) else None]
             away = apart(run, finest) if run is not finest else np.nan
             row += [f"{1e3 * away:.3f}" if np.isfinite(away) else None]
-            joined = run.load("coalescence")
-            rows.append([*row, f"{joined / MPA:.2f}" if np.isfinite(joined) else None, f"{run.seconds:.1f}"])
+            joined, limit = run.load("coalescence"), finest.load("coalescence")
+            row += [f"{joined / MPA:.2f}" if np.isfinite(joined) else None]
+            off = 100 * (joined / limit - 1)
+            row += [f"{off:+.2f}".replace("-0.00", "0.00") if run is not finest and np.isfinite(off) else None]
+            rows.append([*row, f"{run.seconds:.1f}"])
     headers = ["φ", told, "initiation, MPa", "off, %"]
     for length in LENGTHS:
         headers += [f"{1e3 * length:.0f} mm long, MPa", "off, %"]
-    headers += ["paths apart, mm", "joined, MPa", "computed in, s"]
+    headers += ["paths apart, mm", "joined, MPa", "off, %", "computed in, s"]
     note = (
-        "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is so long; runs"
-        " to 200 MPa. Paths apart: largest distance of a grown point from the finest one's cracks."
+        "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is so long;"
+        " increments run to coalescence, the others to 200 MPa. Paths apart: largest distance of a grown point from the finest one's cracks."
     )
     return Part(f"Convergence: {told.split(',')[0].split(' (')[0]}", headers, rows, [note])
