@@ -26,7 +26,19 @@ MAY_IMPORT = {
     "render": BASE | {"shapes", "scene", "output"},
 }
 #: The edge, where everything is put together; nothing above imports it.
-EDGE = {"__init__", "__main__", "bench", "cli", "doctor", "interruption", "pipeline", "report", "resumption", "study", "sweep"}
+EDGE = {
+    "__init__",
+    "__main__",
+    "bench",
+    "cli",
+    "doctor",
+    "interruption",
+    "pipeline",
+    "report",
+    "resumption",
+    "study",
+    "sweep",
+}
 
 #: Distributions that only these parts import; benchmarks time the writers of others.
 ONLY_IN = {

@@ -3,7 +3,6 @@ that the blocks assumed."""
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,12 +11,10 @@ from .. import dda
 from ..dda import StepResult
 from ..model import TIP, State
 from .bodies import boundary_loads, threads_for, tip_rows
-from .compliance import crack_response, passive
+from .compliance import crack_response, passive, strain_rotation, stress_rotation
 from .cracked_blocks import CrackedBlocks
 from .settling import Settling
 from .side_by_side import side_by_side
-
-log = logging.getLogger(__name__)
 
 #: A pass is repeated while the crack strain it assumed and the one it found differ by more than this part of the
 #: block's strain.
@@ -30,12 +27,16 @@ DYNAMIC_TOLERANCE = 1e-4
 #: free flight has hardly any.
 STILL = 1e-3
 
-#: Passes at one geometry; they agree after two to eight, or some more where faces of a block that is nearly cut through open and
-#: close. A lag that is left is corrected by the next step.
+#: Passes at one geometry; they agree after two to eight, or some more where faces open and close. A lag that is left is corrected by
+#: the next step.
 COMPLIANCE_PASSES = 20
 
-#: Larger lags than this are told of.
+#: After so many of them blocks whose forces and strain still chase each other are taken to hang (`hanging`).
+PATIENCE = 10
+
+#: Larger lags than this are no state: a shorter step is tried, in which inertia leaves strain less to do, so many times by half.
 NO_ANSWER = 0.1
+SHORTER = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +54,34 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds.
 
     ``load_time``: when the loads are those of that time, whatever step the blocks take; it then is the new time. Of ``now``
-    the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`.
+    the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`, also where blocks and cracks agree at no
+    step.
     """
+    begun = now.response
+    for _ in range(1 if now.problem.dda.dynamic_factor == 0.0 else 1 + SHORTER):
+        now.response = begun
+        found, differences = _passes(now, dt, load_time)
+        lost = np.flatnonzero(differences > NO_ANSWER)
+        if not len(lost):
+            return found
+        dt = 0.5 * found.result.dt
+    blocks = [now.blocks.names[b] for b in np.array(list(now.solutions), int)[lost]]
+    raise dda.NotConverged(
+        f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and the cracks in it find no common strain in "
+        f"{COMPLIANCE_PASSES} passes (they differ by {differences.max():.2g} of it): try a shorter time step, or finer elements in [ddm]"
+    )
+
+
+def _passes(now: CrackedBlocks, dt: float, load_time: float | None) -> tuple[Balance, np.ndarray]:
+    """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative strain)."""
     settling = Settling()
     static = now.problem.dda.dynamic_factor == 0.0
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
+    asked, response = dt, now.response
     result, iterations = None, 0
     for attempt in range(COMPLIANCE_PASSES):
         with now.timed("dda"):
-            result = now.system.step(now.state, now.problem.loads, dt, now.response, load_time, result)
+            result = now.system.step(now.state, now.problem.loads, dt, response, load_time, result)
             # Passes that took steps of unlike lengths, and so in statics bore unlike loads, would never agree.
             dt = min(dt, result.dt)
             if load_time is not None and result.state.time != load_time:
@@ -69,18 +89,19 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
         iterations += result.statistics["open_close_iterations"]
         now.acted = result.statistics
         if not now.bodies:
-            return Balance(result, {}, np.empty(0, TIP))
+            return Balance(result, {}, np.empty(0, TIP)), np.zeros(0)
+        now.hanging.find(now.bodies, now.system.compliance, result.contacts)
         _solve_bodies(now, result)
-        differences = _take_response(now, result.state, settling, tolerance)
+        response, differences = _take_response(now, result.state, settling, tolerance)
         mismatch = float(differences.max())
         if mismatch < tolerance:
             break
-    lost = np.array(list(now.solutions), int)[differences > NO_ANSWER]
-    if len(lost):
-        log.warning(
-            "t = %g s: %s and the cracks in it find no common strain in %d passes (they differ by %.2g of it): it hangs by little",
-            result.state.time, ", ".join(now.blocks.names[b] for b in lost[:3]), attempt + 1, mismatch,
-        )  # fmt: skip
+        chasing = np.array(list(now.solutions), int)[differences > NO_ANSWER]
+        if attempt + 1 == PATIENCE and len(chasing):
+            for block in chasing.tolist():
+                now.hanging.add(block)
+            # What has cut the step short may have been the chase.
+            dt, settling = asked, Settling()
     imbalance = max(load.imbalance for load in now.loads.values())
     statistics = {
         "open_close_iterations": iterations,
@@ -89,7 +110,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
         "traction_imbalance": imbalance,
     }
     tips = tip_rows(now.problem, now.blocks, now.solutions, now.nodes_of)
-    return Balance(result, now.solutions, tips, statistics)
+    return Balance(result, now.solutions, tips, statistics), differences
 
 
 def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
@@ -101,25 +122,32 @@ def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
     now.solved_from = now.history
 
 
-def _take_response(now: CrackedBlocks, state: State, settling: Settling, tolerance: float) -> np.ndarray:
-    """Set what DDA should assume next, and say how far off the last assumption was in each cracked block (relative strain)."""
-    solutions = now.solutions
-    blocks = np.array(list(solutions), int)
-    compliance, offset = now.response.compliance.copy(), now.response.offset.copy()
+def _take_response(
+    now: CrackedBlocks, state: State, settling: Settling, tolerance: float
+) -> tuple[dda.CrackResponse, np.ndarray]:
+    """What the next pass should assume, and how far off the last assumption was in each cracked block (relative strain). Sets what
+    the next step should begin with."""
+    blocks = np.array(list(now.solutions), int)
     with now.timed("compliance"):
-        own = side_by_side(lambda of: _compliance(now, *of), list(solutions.items()), threads_for(now.bodies))
-        now.compliances.update(zip(solutions, own))
-        for b, solution in solutions.items():
-            compliance[b], offset[b] = crack_response(
-                now.compliances[b][2],
-                solution.crack_strain,
-                state.stress[b],
-                float(state.rotation[b]),
-            )
-        stress = state.stress[blocks, :, None]
-        found = offset[blocks] + (compliance[blocks] @ stress)[..., 0]
-        residual = found - state.crack_strain[blocks]
-        elastic = (now.system.compliance[blocks] @ stress)[..., 0]
+        answers = _answers(now, state)
+        own = side_by_side(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
+        now.compliances.update(zip(answers, own))
+        again, after = (dda.CrackResponse(now.response.compliance.copy(), now.response.offset.copy()) for _ in range(2))
+        # Blocks assume what they do in the axes in which a step begins, and carry it along as they turn.
+        stress, assumed = np.empty((2, len(blocks), 3))
+        for k, (b, answer) in enumerate(answers.items()):
+            known, strain = now.compliances[b][2], answer.crack_strain
+            if b in now.hanging:
+                share = now.hanging.share(b, now.bodies[b], now.system.compliance[b])
+                known, strain = share * known, share * strain
+            began, ends = float(now.state.rotation[b]), float(state.rotation[b])
+            stress[k] = stress_rotation(began - ends) @ state.stress[b]
+            assumed[k] = strain_rotation(began - ends) @ state.crack_strain[b]
+            again.compliance[b], again.offset[b] = crack_response(known, strain, stress[k], began)
+            after.compliance[b], after.offset[b] = crack_response(known, strain, state.stress[b], ends)
+        found = again.offset[blocks] + (again.compliance[blocks] @ stress[..., None])[..., 0]
+        residual = found - assumed
+        elastic = (now.system.compliance[blocks] @ stress[..., None])[..., 0]
         size = np.abs(elastic).max(axis=1) + np.abs(found).max(axis=1)
         size = np.maximum(size, STILL * size.max())
         if not size.any():
@@ -127,9 +155,22 @@ def _take_response(now: CrackedBlocks, state: State, settling: Settling, toleran
         else:
             differences = np.abs(residual).max(axis=1) / size
             if differences.max() >= tolerance:
-                offset[blocks] = settling.next(offset[blocks] - residual, residual, compliance[blocks], size)
-    now.response = dda.CrackResponse(compliance, offset)
-    return differences
+                before = again.offset[blocks] - residual
+                again.offset[blocks] = settling.next(before, residual, again.compliance[blocks], size)
+    now.response = after
+    return again, differences
+
+
+def _answers(now: CrackedBlocks, state: State) -> dict:
+    """block → the solution whose crack strain the block is to take."""
+
+    def answer(block: int):
+        if block not in now.hanging:
+            return now.solutions[block]
+        body, began = now.bodies[block], now.history.get(block)
+        return now.hanging.answer(block, body, state.stress[block], float(state.rotation[block]), began)
+
+    return {block: answer(block) for block in now.solutions}
 
 
 def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:

@@ -12,6 +12,7 @@ from ..model import Blocks, Cracks, Motion, Problem, State
 from ..model.polygon import winding_number
 from .bodies import elastic_bodies, inherited, solve_bodies
 from .crack_energy import CrackEnergy
+from .hanging import Hanging
 from .inherited_loads import on_children, on_moved
 from .phases import Phases
 from .tractions import BoundaryLoad
@@ -23,7 +24,8 @@ class CrackedBlocks:
     ``state`` is that at the start of the step; ``problem`` has the loads as they are on the present blocks. ``number`` and
     ``load_step`` count cycles and load steps. ``bodies`` (block → elastic body), ``nodes_of`` (block → its nodes in the whole
     network), ``solutions``, ``loads`` and ``compliances`` are of the last pass; ``response`` is what the blocks are to
-    assume of their cracks, ``acted`` the statistics of the last step, with what it takes to move blocks.
+    assume of their cracks, ``hanging`` which of them feel only their mean stress, ``acted`` the statistics of the last step, with what it
+    takes to move blocks.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -41,6 +43,7 @@ class CrackedBlocks:
         self.solutions: dict[int, object] = {}
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
+        self.hanging = Hanging()
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
         self.solved_from: dict[int, object] = {}
@@ -102,12 +105,14 @@ class CrackedBlocks:
             {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
             for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
         )
+        self.hanging = self.hanging.inherited(parent, whole) if len(whole) else Hanging()
         self._take_bodies()
 
     def take_step(self, state: State, budget: dda.EnergyBudget) -> None:
         """Go on from ``state``, where the last pass has left the blocks, with what the faces of its cracks remember."""
         self.state, self.budget = state, budget
         self.history = {b: s.memory for b, s in self.solutions.items() if s.memory is not None}
+        self.hanging.take_step()
 
     def take_split(self, split) -> None:
         """Blocks, state and cracks of the `Split`; gauges and monitors go to the child that holds their point."""

@@ -10,7 +10,7 @@ DEPTH = 4
 #: Differences of residuals that are shorter than this part of the longest say nothing new.
 _RANK = 1e-8
 
-#: S whose change is below this part of it is the same: a block's rotation in a step turns it a little.
+#: S whose change is below this part of it is the same.
 _SAME = 1e-6
 
 #: Least relaxation factor.

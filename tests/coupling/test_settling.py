@@ -78,8 +78,8 @@ def test_answers_that_turn_about_with_the_states_of_faces_are_relaxed():
 @pytest.mark.slow
 def test_passes_settle_while_cracks_grow_through_shaken_bricks():
     """Closed rough cracks that grow, meet sides and part bricks under their sudden weight and 0.3 g: faces of nearly cut bricks
-    open in one pass and close in the next (and did so for ever, with three growing passes in four off). Four passes in five
-    agree to 1e-4; a block that hangs by a ligament may not, and is right in a step after."""
+    open in one pass and close in the next (and did so for ever, one growing pass in ten 0.5 to 0.9 off). All passes agree, most of them after
+    three or four."""
     given = wall(100, 10)
     times = np.linspace(0.0, 0.1, 401)
     shaking = np.column_stack([3.0 * np.sin(10 * np.pi * times), np.full(401, -9.81)])
@@ -93,6 +93,7 @@ def test_passes_settle_while_cracks_grow_through_shaken_bricks():
         dda=replace(given.dda, time_step=2e-3),
         run=replace(given.run, end_time=0.016, stop_at=()),
     )
-    off = np.array([cycle.statistics["compliance_mismatch"] for cycle in cycles(given) if cycle.number])
-    assert np.mean(off < 1e-4) > 0.85
-    assert off[-1] < 1e-4
+    seen = [cycle for cycle in cycles(given) if cycle.number]
+    assert sum(event.kind == "split" for cycle in seen for event in cycle.events) >= 2
+    assert max(cycle.statistics["compliance_mismatch"] for cycle in seen) < 1e-4
+    assert np.mean([cycle.statistics["compliance_passes"] for cycle in seen]) < 5

@@ -1,0 +1,91 @@
+"""Blocks that hang together by thin ligaments: their cracks answer to the mean stress alone.
+
+The block solver's blocks strain evenly. The strain that the forces on a block open its cracks by is that of their mean stress σ
+and what bending and uneven pressure add; what they add has no counterpart: forces that bend cracks open do no work on
+an even strain. While cracks are short that is a small part. In a block that is nearly cut through it is nearly all of it, forces and
+strain chase each other with a gain of up to hundreds, and there are states that no passes find, or that take energy from nowhere. So
+the cracks of these blocks bring the strain ε_c = κ ∂W/∂σ, with W(σ) the complementary energy, per area, that they add to the body under
+a uniform stress, faces closing or not. W is convex: blocks and cracks agree in a few passes, and no energy is gained. What drives the
+tips is solved under the actual forces as ever.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .compliance import stress_rotation
+
+if TYPE_CHECKING:
+    from ..ddm import Body, FaceMemory, Solution
+
+#: A block hangs from where its cracks, were they all open, make it so many times softer than its rock in some direction. (An
+#: edge crack through half of a square adds 4.)
+SOFT = 4.0
+
+#: … and is taken for no more than so many times softer. What hangs by less (an edge crack through three quarters of a square) is two
+#: blocks already: neighbours hold them in place, not the ligament, and the strain of the two as one would run into the neighbours.
+SOFTEST = 30.0
+
+
+@dataclass(eq=False)
+class Hanging:
+    """The blocks that hang, and the solutions of their bodies under the mean stress of the last pass (block →)."""
+
+    solutions: dict[int, Solution] = field(default_factory=dict)
+    #: What crack faces with friction remember of these solutions at the end of the last step.
+    _memory: dict[int, FaceMemory] = field(default_factory=dict)
+    #: Crack system, softness.
+    _softness: dict[int, tuple[object, float]] = field(default_factory=dict)
+    _blocks: set[int] = field(default_factory=set)
+
+    def __contains__(self, block: int) -> bool:
+        return block in self._blocks
+
+    def add(self, block: int) -> None:
+        """``block`` hangs, however soft it is, as long as it is whole."""
+        self._blocks.add(block)
+
+    def find(self, bodies: dict[int, Body], elastic: np.ndarray, contacts: np.ndarray) -> None:
+        """Add those of the ``bodies`` (block →) that are soft beside their ``elastic`` compliance (n_blocks, 3, 3) and that CONTACT rows
+        press: forces that go with a block's strain are those of contacts."""
+        pressed = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
+        for block in set(bodies).intersection(pressed["block"].tolist(), pressed["other"].tolist()) - self._blocks:
+            if self._soft(block, bodies[block], elastic[block]) > SOFT:
+                self._blocks.add(block)
+
+    def share(self, block: int, body: Body, elastic: np.ndarray) -> float:
+        """κ, the part of its cracks' compliance that ``block`` is to feel."""
+        return min(1.0, SOFTEST / max(self._soft(block, body, elastic), SOFT))
+
+    def answer(self, block: int, body: Body, stress: np.ndarray, rotation: float, began: FaceMemory | None) -> Solution:
+        """The solution of ``body``, which has turned by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current axes. Faces begin with what
+        they remember of such solutions, or with ``began`` where there is none. Raises `ddm.NotConverged`."""
+        from .. import ddm
+
+        load = ddm.BodyLoad(remote_stress=stress_rotation(-rotation) @ stress)
+        known = body.solve(load, warm=self.solutions.get(block), history=self._memory.get(block, began))
+        self.solutions[block] = known
+        return known
+
+    def take_step(self) -> None:
+        """Go on from the end of a step."""
+        self._memory = {b: known.memory for b, known in self.solutions.items() if known.memory is not None}
+
+    def inherited(self, parent: np.ndarray, whole: np.ndarray) -> Hanging:
+        """That of new blocks: of those that are their ``parent`` (n_blocks,), ``whole`` (k,) numbers, what is known stays."""
+        solutions, memory, softness = (
+            {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
+            for known in (self.solutions, self._memory, self._softness)
+        )
+        return Hanging(solutions, memory, softness, {b for b in whole.tolist() if parent[b] in self._blocks})
+
+    def _soft(self, block: int, body: Body, elastic: np.ndarray) -> float:
+        """How many times the ``elastic`` compliance (3, 3) open cracks add, in the direction in which they add most."""
+        known = self._softness.get(block)
+        if known is None or known[0] is not body.crack_system:
+            most = np.linalg.eigvals(np.linalg.solve(elastic, body.compliance())).real.max()
+            known = self._softness[block] = body.crack_system, float(most)
+        return known[1]
