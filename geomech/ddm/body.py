@@ -35,6 +35,7 @@ from .functionals import TipFunctionals
 from .half_plane import HalfPlane
 from .influence import ElementSet, influence, reuse
 from .iterative import FACTORABLE, NotSolved, compressed, is_compressed
+from .kept_rows import KeptRows
 from .loads import BodyLoad
 from .mesh import Mesh, mesh, outline_edges
 from .placing import OFF
@@ -228,9 +229,13 @@ class Body:
         self.work.elements_assembled += self.counts["elements_new"]
         self.work.bodies += 1
 
-        self._cg = reuse(
-            old._cg if old else None, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C"
-        )
+        width, before = 2 * c.per, old._cg if old else None
+        if same_boundary and isinstance(before, KeptRows) and not self.compressed:
+            self._cg = before.grown(c_seen, lambda r: system.influence_on(c.take(r), np.arange(g.n)))
+        else:
+            before = before.dense if isinstance(before, KeptRows) else before
+            rows = reuse(before, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C")
+            self._cg = rows if self.compressed else KeptRows.whole(rows, width)
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
         self._loads = UnitLoads(
@@ -250,26 +255,23 @@ class Body:
             return
         # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
         # make again, should the boundary change, than to carry along.
-        everything = np.arange(g.n)
         kept = same_boundary and not old.compressed
-        self._w = reuse(
-            old._w if kept else None,
-            everything,
-            c_old,
-            g,
-            c,
-            lambda r, k: system.solve(gc(k)),
-        )
 
-        def of(rows, elements):
-            return rows if len(elements) == c.n else rows[c.unknowns(elements)]
+        def follow(k):
+            return system.solve(gc(k)).T
+
+        every = np.arange(c.n)
+        w = old._w.rows.grown(c_old, follow) if kept else KeptRows.whole(follow(every), width)
+        self._w = w.T
 
         def schur(r, k):
             direct = influence(c.take(r), c.take(k), nu, tol)
             if not g.n:
                 return direct
             # Column-major like the first: a difference of both orders takes several times as long.
-            return direct - (of(self._w.T, k) @ of(self._cg, r).T).T
+            if len(r) == c.n:
+                return direct - (self._cg @ w.of(k).T if len(k) < c.n else (w.dense @ self._cg.dense.T).T)
+            return direct - ((w @ self._cg.of(r).T) if len(k) == c.n else w.of(k) @ self._cg.of(r).T).T
 
         known = old.crack_system.matrix if kept else None
         if known is None or self.rough or c.n_unknowns < SMALLEST:

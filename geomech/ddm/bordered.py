@@ -27,12 +27,12 @@ import numpy as np
 
 from . import shapes
 from .factor import Factor
-from .influence import ElementSet, copy_blocks
+from .influence import ElementSet, copy_blocks, unknowns_of
 
 #: All is factored anew when more than this part of the elements is gone: they take their share of time.
 GONE = 0.25
 #: All is factored anew as well when there are so many times the unknowns of the first panel.
-MOST = 3.0
+MOST = 2.0
 #: Panels are joined while the last but one is less than so many times as large as the last: there are few of them, and no
 #: unknown is joined often.
 ALIKE = 2.0
@@ -40,7 +40,7 @@ ALIKE = 2.0
 SMALLEST = 200
 #: Loss of accuracy, ‖L‖ ‖U‖ / ‖S‖ over the reciprocal condition, from which all is factored anew: K then still
 #: agrees with that of factors made anew to 1e-10.
-LOSS = 1e5
+LOSS = 5e6
 #: What it means when there are no factors.
 SINGULAR = "cracks cut a part of the body off"
 
@@ -88,6 +88,7 @@ class Panel:
     upper: np.ndarray | None = None
     t: np.ndarray | None = None
     factor: Factor | None = None
+    _columns_size: float | None = None
 
     @property
     def n(self) -> int:
@@ -121,9 +122,15 @@ class Panel:
         self.known, self.factor = None, Factor(self.t, SINGULAR)
 
     @cached_property
-    def sizes(self) -> tuple[np.ndarray, np.ndarray]:
-        """(first,) column sums of its rows of L and (n,) those of T, weighted."""
-        return self.weight @ np.abs(self.lower), self.weight @ np.abs(self.t)
+    def rows_size(self) -> np.ndarray:
+        """(first,) weighted column sums of its rows of L."""
+        return self.weight @ np.abs(self.lower)
+
+    def columns_size(self, weight: np.ndarray) -> float:
+        """The largest of the column sums of U over those of T, with the ``weight`` (first,) of the rows before."""
+        if self._columns_size is None:
+            self._columns_size = float((weight @ np.abs(self.upper) / (self.weight @ np.abs(self.t))).max())
+        return self._columns_size
 
     def joined(self, other: Panel) -> Panel:
         """This panel and the ``other``, which follows, as one."""
@@ -246,9 +253,13 @@ class Bordered:
         # Rows of elements that were at a tip in another kind are known, and columns of those that stay.
         old, fresh, old_c, new_c = (np.flatnonzero(x) for x in (row >= 0, row < 0, column >= 0, column < 0))
         every, present = np.arange(elements.n), np.flatnonzero(before >= 0)
-        r_old, r_fresh, c_old, c_new = (_spread(x, width) for x in (old, fresh, old_c, new_c))
-        from_r, from_c = _spread(row[old], width), _spread(column[old_c], width)
-        here, places, numbers = _spread(came, width), _spread(present, width), _spread(before[present], width)
+        r_old, r_fresh, c_old, c_new = (unknowns_of(x, width) for x in (old, fresh, old_c, new_c))
+        from_r, from_c = unknowns_of(row[old], width), unknowns_of(column[old_c], width)
+        here, places, numbers = (
+            unknowns_of(came, width),
+            unknowns_of(present, width),
+            unknowns_of(before[present], width),
+        )
         n, n_first = width * len(came), width * n_before
         down, right, corner = np.zeros((n, n_first)), np.zeros((n_first, n), order="F"), np.empty((n, n))
         if len(old):
@@ -288,7 +299,7 @@ class Bordered:
         """The panel of the unknowns that stand for the equations of the elements at ``places``, and of w = 0 there, after
         ``n_between`` others; with tractions of the size of the equations, so that these unknowns are of the size of jumps."""
         width = 2 * self.elements.per
-        at = _spread(places, width)
+        at = unknowns_of(places, width)
         n = len(at)
         down, right = np.zeros((n, n_first + n_between)), np.zeros((n, n_first + n_between)).T
         length = np.repeat(self.elements.length[self.at[places]], width)
@@ -310,7 +321,7 @@ class Bordered:
     @cached_property
     def places(self) -> np.ndarray:
         """(n_unknowns,) where the unknowns are in the order of the panels."""
-        return _spread(self._place, 2 * self.elements.per)
+        return unknowns_of(self._place, 2 * self.elements.per)
 
     @cached_property
     def dense(self) -> np.ndarray:
@@ -358,9 +369,8 @@ class BorderedFactor:
         weight = np.concatenate([panel.weight for panel in of.panels])
         across, size = np.zeros(len(weight)), 1.0
         for panel in of.panels[1:]:
-            rows, own = panel.sizes
-            across[: panel.first] += rows
-            size = max(size, float((weight[: panel.first] @ np.abs(panel.upper) / own).max()))
+            across[: panel.first] += panel.rows_size
+            size = max(size, panel.columns_size(weight[: panel.first]))
         self.growth = size * max(1.0, float((across / weight).max()))
 
     def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
@@ -394,8 +404,3 @@ def _known(last: Panel, rows, from_rows, columns, from_columns, first: int, end:
 def width_of(panels: Sequence[Panel]) -> int:
     """How many unknowns the ``panels`` have."""
     return panels[-1].first + panels[-1].n
-
-
-def _spread(elements: np.ndarray, width: int) -> np.ndarray:
-    """Indices of the unknowns of ``elements``."""
-    return (elements[:, None] * width + np.arange(width)).ravel()

@@ -143,8 +143,7 @@ class ElementSet:
 
     def unknowns(self, elements: np.ndarray) -> np.ndarray:
         """Indices of the unknowns (and rows) of ``elements``."""
-        width = 2 * self.per
-        return (np.asarray(elements)[:, None] * width + np.arange(width)).ravel()
+        return unknowns_of(np.asarray(elements), 2 * self.per)
 
     @cached_property
     def _inverse_weight(self) -> np.ndarray:
@@ -163,6 +162,11 @@ class ElementSet:
         """(n, p+1) integrals of the nodal shape functions, m."""
         table = np.array([shapes.integrals(self.family, self.order, kind) for kind in range(4)])
         return 0.5 * self.length[:, None] * table[self.kind]
+
+
+def unknowns_of(elements: np.ndarray, width: int) -> np.ndarray:
+    """Indices of the unknowns of ``elements`` (k,) that have ``width`` each."""
+    return (elements[:, None] * width + np.arange(width)).ravel()
 
 
 @lru_cache
