@@ -14,7 +14,7 @@ from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
-from .face_points import FacePoints
+from .face_points import FacePoints, give_by_bending
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 
@@ -50,6 +50,7 @@ class ContactSet:
                                come nearer than the geometry says to meet)
     stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact does not
                 count yet: what multipliers have left of it, and what given motion makes of it in the step
+    inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
     relies_on_glue             corners have been left out that hold as long as all bonds do
     faces                      those that bonds hold at both ends; None without any
     by_length   (n,)           contacts whose shear stiffness is that of a law
@@ -75,6 +76,7 @@ class ContactSet:
     wear: np.ndarray
     lift: np.ndarray
     stretch: np.ndarray
+    inset: np.ndarray
     relies_on_glue: bool = False
     faces: BondedFaces | None = None
     by_length: np.ndarray | None = None
@@ -127,7 +129,7 @@ class ContactSet:
     def rows(self, settled: Settled) -> np.ndarray:
         """CONTACT rows of the finished step, on the geometry on which it was assembled."""
         rows = np.zeros(len(self), CONTACT)
-        for name in ("vertex", "edge", "block", "other", "law"):
+        for name in ("vertex", "edge", "block", "other", "law", "inset"):
             rows[name] = getattr(self, name)
         for name in ("state", "bonded", "gap", "normal_force", "shear_force"):
             rows[name] = getattr(settled, name)
@@ -148,7 +150,8 @@ class ContactSet:
 class ContactFinder:
     """Finds the contacts of ``blocks`` and gives each its law and springs.
 
-    ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow.
+    ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow; ``rigid``
+    (n_blocks,) those that do not strain.
     """
 
     def __init__(
@@ -158,6 +161,7 @@ class ContactFinder:
         joint_index: Callable[[str, str], int | None],
         settings: DdaSettings,
         modulus: np.ndarray,
+        rigid: np.ndarray,
     ) -> None:
         self.names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
         self._edge_names = blocks.edge_names
@@ -174,6 +178,8 @@ class ContactFinder:
         self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
+        # Triangles follow a rock that bends; multipliers hold what springs would give.
+        self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.take_out(None)
         self._size = float(np.ptp(blocks.vertices, axis=0).max())
@@ -185,11 +191,17 @@ class ContactFinder:
         self._near = NearPairs(self._start, self._fixed)
 
     def find(
-        self, state: State, vertices: np.ndarray, window: float, glue_holds: bool = True, lumped: bool = False
+        self,
+        state: State,
+        vertices: np.ndarray,
+        window: float,
+        glue_holds: bool = True,
+        lumped: bool = False,
+        broken: np.ndarray | None = None,
     ) -> ContactSet:
         """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it; without
         corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of faces that have a
-        stiffness of their own at their corners, if ``lumped``."""
+        stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken`` (vertex·n_vertices + edge), too."""
         old = state.contacts
         if len(old):
             # Faces that slid apart press at a distance, those that do not fit pass each other by as much.
@@ -216,7 +228,7 @@ class ContactFinder:
             partner = _among(keep, partner)
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
-        remembered = self._remembered(old, parent, state.time, geometry, partner, springs)
+        remembered = self._remembered(old, parent, state.time, geometry, partner, springs, self._stiff[law])
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
         vertex, edge = table[:, 0].copy(), table[:, 1].copy()
@@ -248,14 +260,33 @@ class ContactFinder:
             faces=faces,
             **remembered,
         )
-        if lumped or not self._stiff.any():
+        if lumped or not (self._stiff.any() or found.inset.any()):
             return found
-        found = replace(found, by_length=self._stiff_along[law])
-        holds = (bonded == 1) & (springs.tension > 0)
-        least = least_face(block, other, self._area, self._fixed)
-        return found.placed(
-            FacePoints.of(block, other, partner, found.geometry, self._stiff[law], found.normal, holds, least)
-        )
+        inside = found.inset & (bonded == 1)
+        if broken is not None:
+            inside = inside & ~np.isin(vertex * len(vertices) + edge, broken)
+
+        def bend(ends, length):
+            """Part of its length that the springs of a face are apart: they give by its rotation what its blocks would bend."""
+            give = sum(
+                give_by_bending(
+                    owner[ends[:, 0]], found.geometry[ends[:, 0], 1:3], vertices, self._start, self._area, self._modulus, self._bends
+                )
+                for owner in (block, other)
+            )  # fmt: skip
+            own = 2.0 / (springs.normal[ends[:, 0]] * length**2)
+            return np.sqrt(own / np.maximum(own, give))
+
+        points = FacePoints.of(
+            block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal,
+            (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), bend,
+        )  # fmt: skip
+        if inside.any() or found.inset.any():
+            kept = np.zeros(len(found), bool)
+            if points is not None:
+                kept[points.ends] = True
+            found = _at_their_corners(found, found.inset & ~kept, inside & kept)
+        return replace(found, by_length=self._stiff_along[law]).placed(points)
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
@@ -272,7 +303,7 @@ class ContactFinder:
             normal if ks is None else np.full(len(block), float(ks)),
         )
 
-    def _remembered(self, old, parent, time, geometry, partner, springs):
+    def _remembered(self, old, parent, time, geometry, partner, springs, stiff):
         """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
         known = parent >= 0
 
@@ -292,12 +323,16 @@ class ContactFinder:
             contact_state[fresh & (partner < 0).all(axis=1)] = STICK
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
         direction = np.where(contact_state == SLIP, np.sign(shear), 0.0)
+        # Bonds of blocks that bend are there from the start, or never.
+        inset = of("inset")
+        if len(old) == 0 and time == 0.0 and self._bends.any():
+            inset = (bonded == 1) & (springs.tension > 0) & ~stiff
         rough = (springs.peak > 0) | (bonded > 0)
         contact_state[(contact_state == SLIP) & rough & (direction == 0)] = STICK
         contact_state[(contact_state == STICK) & ~rough] = SLIP
         return {
             "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
-            "slip": slip, "wear": wear, "lift": lift, "stretch": stretch,
+            "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset,
         }  # fmt: skip
 
     def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:
@@ -378,3 +413,12 @@ def _among(keep: np.ndarray, partner: np.ndarray) -> np.ndarray:
     """``partner`` (n, 2) of the rows ``keep`` (n,), counted among these; −1 for those that are left out, as for none."""
     number = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
     return number[partner[keep]]
+
+
+def _at_their_corners(found: ContactSet, out: np.ndarray, inset: np.ndarray) -> ContactSet:
+    """The contacts ``found``, the springs of those that come ``out`` (n,) of their faces at the corners with the forces that they
+    had: these are then where the faces, that do not fit any more, begin to press and to pull."""
+    gap, force = found.geometry[:, 3], found.normal / found.springs.normal
+    closed = (found.state != OPEN) | (found.bonded > 0)
+    told = np.where(closed, gap + force, np.minimum(gap, 0.0))
+    return replace(found, lift=np.where(out, told, found.lift), inset=inset)

@@ -9,29 +9,42 @@ Two springs kₙ c/2 at the Gauss points of the part give both exactly; at the e
 kₙ ℓ³/4 instead of kₙ ℓ³/12. Where the part ends follows from the gap at the end of the step: a step whose faces end elsewhere than
 was taken is done again (Newton's method; the pressure is zero there, so that N changes with the square of what is missed).
 
+Bonds of blocks that have no stiffness of their own, and hold at their extreme fibre too, are held in the mean by the solver's
+springs. At the corners these would hold every rotation as well; but a block of one strain cannot bend, and what it would give
+under the moment on its face has to be given at the face. Half of a block of the depth d behind a face that spans it turns by
+
+    θ = M (d/2) / (E' ℓ³/12)        (its share of a beam; Kawai 1978 has rigid blocks give so throughout),
+
+and so far inside their corners stand the two springs that give it. Otherwise rectangles glued together lock: between
+displacements that agree at four corners and are linear, none bends. A triangle's three do not lock.
+
 Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and moment.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
 from ..model import OPEN
 from .bonded_faces import WITHOUT_GAPS, BondedFaces, on_lines
 from .contact_springs import Springs
 
-#: Gauss points of an interval, in parts of it.
-_GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+#: Distance of the two Gauss points of an interval, in parts of it.
+_GAUSS = 1 / np.sqrt(3.0)
 #: A part in contact that is known but for this much of its length is known: forces but for its square. The next step begins
 #: from the geometry, so that statics go on to the end.
 _KNOWN = 1e-2
+#: Springs that are this much of their face apart are at its corners.
+_AT_CORNERS = 0.99
 
 
 @dataclass(frozen=True, eq=False)
 class FacePoints:
-    """Faces (m,) with a contact at either end and a stiffness of their own, as a step takes them to touch.
+    """Faces (m,) with a contact at either end whose springs stand inside them, as a step takes them to touch.
 
     ends      (m, 2)  rows of the step's `ContactSet`
     corners   (n, 7)  geometry of all its rows, at the corners
@@ -39,6 +52,7 @@ class FacePoints:
     part      (m, 2)  where the part in contact begins and ends, in parts of the face from its first end
     held      (m,)    bonds may pull: the part is the whole face
     shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
+    apart     (m,)    distance of the two springs, in parts of the part
     """
 
     ends: np.ndarray
@@ -47,6 +61,7 @@ class FacePoints:
     part: np.ndarray
     held: np.ndarray
     shortest: np.ndarray
+    apart: np.ndarray
 
     @classmethod
     def of(
@@ -59,10 +74,12 @@ class FacePoints:
         normal: np.ndarray,
         holds: np.ndarray,
         least: np.ndarray,
+        bends: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> FacePoints | None:
-        """Faces among contacts (n,) with laws that are ``stiff``, last known to press by ``normal`` N, ``holds`` a bond that may
-        pull, ``least`` m of face that the stiffness is at least that of; None without any."""
-        some = np.flatnonzero(stiff & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
+        """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its blocks, 0 for
+        neither, last known to press by ``normal`` N, ``holds`` a bond that may pull, ``least`` m of face that the stiffness is at
+        least that of; ``bends(ends, length)`` the ``apart`` of bonds. None without any."""
+        some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
         if len(some) < 2:
             return None
         some, start, along = on_lines(block, other, geometry, some)
@@ -70,17 +87,24 @@ class FacePoints:
         ends, places = some[start[two, None] + [0, 1]], along[start[two, None] + [0, 1]]
         length = np.abs(places[:, 1] - places[:, 0])
         whole = np.abs(geometry[ends, 4].sum(axis=1) - length) <= WITHOUT_GAPS * length
+        whole &= stiff[ends[:, 0]] == stiff[ends[:, 1]]
         if not whole.any():
             return None
         ends, length = ends[whole], length[whole]
         held, shortest = holds[ends].all(axis=1), np.minimum(2 * least[ends].max(axis=1) / length, 1.0)
-        return cls(ends, geometry, length, _pressed(normal[ends], held, shortest), held, shortest)
+        apart, glued = np.full(len(ends), _GAUSS), stiff[ends[:, 0]] == 2
+        if glued.any():
+            shortest[glued] = 1.0
+            apart[glued] = bends(ends[glued], length[glued])
+            some = apart < _AT_CORNERS
+            ends, length, held, shortest, apart = ends[some], length[some], held[some], shortest[some], apart[some]
+        return cls(ends, geometry, length, _pressed(normal[ends], held, shortest), held, shortest, apart)
 
     @property
     def place(self) -> np.ndarray:
         """(m, 2) where along the face the springs of its contacts stand, in parts of it."""
         low, high = self.part[:, :1], self.part[:, 1:]
-        return low + (high - low) * _GAUSS
+        return low + (high - low) * (0.5 + np.multiply.outer(self.apart, [-0.5, 0.5]))
 
     def geometry(self) -> np.ndarray:
         """(n, 7) of the contacts, moved to where their springs stand."""
@@ -170,6 +194,25 @@ class FacePoints:
         part[lame] = np.where(first, to_low, to_high).T[lame]
         off = np.abs(part - self.part).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
         return replace(self, part=np.where(off[:, None], part, self.part)) if off.any() else None
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def give_by_bending(owner, across, vertices, start, area, modulus, bends):
+    """(m,) rad/(N m): what half of the block ``owner`` (m,) turns by behind a face across the normal ``across`` (m, 2) that spans
+    it, 6 d/(E' w³), d = area over the width w along the face; 0 for blocks that do not bend. A face that is shorter than the
+    block is wide turns the whole of that width."""
+    out = np.zeros(owner.shape[0])
+    for f in range(owner.shape[0]):
+        b = owner[f]
+        if not bends[b]:
+            continue
+        low, high = np.inf, -np.inf
+        for v in range(start[b], start[b + 1]):
+            along = across[f, 0] * vertices[v, 1] - across[f, 1] * vertices[v, 0]
+            low, high = min(low, along), max(high, along)
+        width = high - low
+        out[f] = 6.0 * area[b] / (modulus[b] * width**4)
+    return out
 
 
 def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: np.ndarray) -> np.ndarray:

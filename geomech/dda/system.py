@@ -78,11 +78,12 @@ class BlockSystem:
         self._stiffness = np.ascontiguousarray(np.array([m.stiffness() for m in self.materials])[of])
         self.compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
         modulus = np.array([m.plane_modulus for m in self.materials])[of]
+        rigid = np.array([m.rigid for m in self.materials])[of]
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
-        self._finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus)
+        self._finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid)
         self._take_out(None, None)
-        rigid = np.array([m.rigid for m in self.materials])[of] & ~self._fixed
+        rigid = rigid & ~self._fixed
         self._rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
         self._held = with_rigid(blocks.held, rigid)
@@ -185,7 +186,7 @@ class BlockSystem:
         found = self._finder.find(state, vertices, _WINDOW * limit)
         if like is not None:
             found = found.trying(like.contacts)
-        reason, before = "", np.inf
+        reason, before, broken = "", np.inf, np.zeros(0, np.int64)
         cuts = 0
         while True:
             try:
@@ -196,8 +197,14 @@ class BlockSystem:
                 reason = f"{failure}{self._finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
             else:
-                if found.relies_on_glue and (result.contacts["bonded"] < found.bonded).any():
-                    found = self._finder.find(state, vertices, _WINDOW * limit, glue_holds=False)
+                bonded = result.contacts["bonded"]
+                lost = (bonded != found.bonded) & found.inset
+                unheld = found.relies_on_glue and (bonded < found.bonded).any()
+                if unheld or lost.any():
+                    # Corners that were left out, and springs that were moved, for the sake of a bond are back before it breaks.
+                    broken = np.append(broken, found.vertex[lost] * len(vertices) + found.edge[lost])
+                    holds = found.relies_on_glue and not unheld
+                    found = self._finder.find(state, vertices, _WINDOW * limit, holds, broken=broken)
                     continue
                 if largest <= 1.0001 * limit:
                     self._refuse_crushed(result.state)
@@ -207,7 +214,7 @@ class BlockSystem:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     limit = 1.1 * largest
-                    found = self._finder.find(state, vertices, _WINDOW * limit, found.relies_on_glue)
+                    found = self._finder.find(state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken)
                     continue
                 before = largest
                 shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
