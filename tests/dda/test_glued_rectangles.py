@@ -50,23 +50,24 @@ def test_a_cantilever_of_bricks_sags_as_timoshenkos():
 
 
 def test_pure_bending_turns_as_curvature_says():
-    """θ = M x/(E I) under a couple on the end, no matter how many bricks or courses."""
+    """θ = M x/(E I) under a couple on the end, no matter how many bricks."""
     moment = 1e3
-    for columns, rows, within in ((2, 1, 1e-4), (5, 1, 1e-4), (16, 2, 0.15), (32, 4, 0.06)):
-        system = glued_cantilever(columns, rows)
-        # A pair of forces on the last column, half of its depth apart.
-        force, last = moment / (0.5 * DEPTH), len(system.blocks.material) - 1
+    # A pair of forces, half of the depth apart.
+    force = moment / (0.5 * DEPTH)
+    for columns in (2, 5):
+        system = glued_cantilever(columns, 1)
         loads = Loads(
             point_loads=tuple(
-                PointLoad(block, (LENGTH, y), History.constant([sign * force, 0.0]))
-                for block, y, sign in ((last, 0.75 * DEPTH, 1.0), (last - rows + 1, 0.25 * DEPTH, -1.0))
+                PointLoad(columns, (LENGTH, y * DEPTH), History.constant([sign * force, 0.0]))
+                for y, sign in ((0.75, 1.0), (0.25, -1.0))
             )
         )
         found = dda.equilibrium(system, State.at_rest(system.blocks), loads)
         middle = LENGTH * (1 - 0.5 / columns)
         turn = found.state.rotation[-1] / (-12 * moment * middle / (MODULUS * DEPTH**3)) - 1
-        print(f"{columns} × {rows} bricks: rotation off by {turn:.1e}")
-        assert abs(turn) < within
+        print(f"{columns} bricks: rotation off by {turn:.1e}")
+        # Arms that the strain of the last brick lengthens, 1e-4 of it in the first step's geometry.
+        assert abs(turn) < 1e-4
 
 
 def test_a_cantilever_that_breaks_falls_and_is_not_thrown():
