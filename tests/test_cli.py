@@ -406,3 +406,11 @@ def test_safety_prints_trials_and_mechanism(tmp_path, capsys):
     assert main(["safety", str(scene), "--reduce", "bedding"]) == BAD_INPUT
     assert "no joint 'bedding' to reduce" in capsys.readouterr().err
     assert main(["safety", str(scene), "--set", "joints.default.friction_angle_deg=0.0"]) == BAD_INPUT
+
+
+@pytest.mark.parametrize(
+    "asked", [["dda", "--seeds", "0-3"], ["slopes", "--seeds", "3-0"], ["slopes", "--seeds", "some"]]
+)
+def test_seeds_are_two_numbers_and_belong_to_slopes(asked, capsys):
+    assert main(["bench", *asked]) == BAD_INPUT
+    assert "--seeds" in capsys.readouterr().err

@@ -50,6 +50,12 @@ REASONS = (
         "a block that hangs by a thread, or is loaded beyond its stiffness, is no linear elastic body: it is named",
     ),
     Reason(
+        "no common strain",
+        dda.NotConverged,
+        r"find no common strain in \d+ passes",
+        "blocks and the cracks in them agree on no strain at any length of the step: the blocks are named",
+    ),
+    Reason(
         "crack faces not found",
         ddm.NotConverged,
         r"crack faces did not settle",

@@ -17,11 +17,12 @@ from ..model import OPEN, Cycle, Problem
 @dataclass(frozen=True)
 class Invariant:
     """``bound`` of a quantity that is relative to what ``meaning`` says; a run that goes beyond it is wrong, unless a warning
-    with one of the words ``told`` says so."""
+    with one of the words ``told`` says so: in this step or the one before, or (``lasting``) in any before."""
 
     meaning: str
     bound: float
     told: tuple[str, ...] = ()
+    lasting: bool = True
 
 
 #: A block and cracks that do not agree strain too much, lie in their neighbours, and are out of balance by their strain.
@@ -34,14 +35,19 @@ INVARIANTS = {
     "motion": Invariant("equations of motion of all blocks, over the largest force", 1e-6),
     # Beyond the strain, see `Invariants._balance`.
     "balance": Invariant("loads of a cracked block out of balance, over their size", 1e-5, (_HANGS, _STRAINED)),
-    "agreement": Invariant("strain of a block's cracks found and assumed, over the block's", 1e-1, (_HANGS,)),
+    "agreement": Invariant(
+        "strain of a block's cracks found and assumed, over the block's", 1e-1, (_HANGS,), lasting=False
+    ),
     "energy": Invariant(
         "energy not accounted for, over what was turned over (steps of a hundredth of the height leave up to 1e-2)",
         GAIN,
         ("without work", _STRAINED),
     ),
     "toughness": Invariant(
-        "K_eq over K_Ic, less 1, of tips that stand in statics (event steps: to 1e-6)", 1e-5, ("tips still grow",)
+        "K_eq over K_Ic, less 1, of tips that stand in statics (event steps: to 1e-6)",
+        1e-5,
+        ("tips still grow",),
+        lasting=False,
     ),
     "faces": Invariant("overlap of crack faces, over the largest opening or slip", 1e-6),
     "pull": Invariant("pull between closed crack faces beyond their bond, over the pressure", 1e-6),
@@ -60,11 +66,12 @@ class Invariants:
         self._static = problem.dda.dynamic_factor == 0.0
         self._tough = np.array([material.k_ic for material in problem.materials])
         self._bond = max(law.tensile_strength for law in problem.face_laws)
-        self._follows = problem.run.control == "toughness"
         self._stop_at = problem.run.stop_at
         self._area = 0.0
         self._strain = 0.0
         self._standing: tuple[int, float, str] | None = None
+        # How many warnings there had been at the last cycle, and at the one before.
+        self._heard_at = (0, 0)
 
     def check(self, cycle: Cycle) -> None:
         broken = [*_nowhere(cycle), *_strayed(cycle)]
@@ -74,6 +81,7 @@ class Invariants:
         for of in (self._blocks, self._balance, self._growth, self._crack_faces):
             for name, value, where in of(cycle):
                 self._take(name, value, f"cycle {cycle.number}: {where}")
+        self._heard_at = (self._heard_at[1], len(self.heard()))
 
     def end(self) -> None:
         """After the last cycle of a run that came to its end: tips stand in it."""
@@ -85,7 +93,8 @@ class Invariants:
         invariant = INVARIANTS[name]
         bound = invariant.bound + (self._strain if name == "balance" else 0.0)
         if value > bound:
-            said = any(words in line for words in invariant.told for line in self.heard())
+            lines = self.heard()[0 if invariant.lasting else self._heard_at[0] :]
+            said = any(words in line for words in invariant.told for line in lines)
             (self.told if said else self.faults).append(f"{where}: {name} {value:.2g}")
 
     def _blocks(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:

@@ -19,7 +19,7 @@ MEANING = {
 }
 #: Squares in a row.
 ACROSS = 25
-#: What is smaller is drawn here.
+#: What is smaller is not drawn.
 LEAST = 1e-16
 
 
@@ -60,7 +60,7 @@ def _squares(figure, slopes: Sequence[Outcome], verdicts: Sequence[str], down: i
     axes.spines[:].set_visible(False)
     axes.set_title(f"What became of {len(slopes)} random slopes (their seeds)", fontsize=11, loc="left")
     counts = Counter(slope.verdict for slope in slopes)
-    reasons = Counter(slope.reason for slope in slopes if slope.reason)
+    reasons = Counter(slope.reason for slope in slopes if slope.verdict == "refused")
     handles, labels = [], []
     for verdict in verdicts:
         if counts[verdict] or verdict == "wrong":
@@ -76,16 +76,16 @@ def _squares(figure, slopes: Sequence[Outcome], verdicts: Sequence[str], down: i
 def _quantities(axes, slopes: Sequence[Outcome], bounds: Mapping[str, float]) -> None:
     for k, (name, bound) in enumerate(bounds.items()):
         for verdict, colour in COLOURS.items():
-            values = [max(s.worst.get(name, 0.0), LEAST) for s in slopes if s.verdict == verdict and s.worst]
+            values = [s.worst[name] for s in slopes if s.verdict == verdict and s.worst.get(name, 0.0) > LEAST]
             # Spread a little by their order, so that those which lie upon one another are seen.
             ys = [k + 0.3 * (((7 * j) % 11) / 5 - 1) for j in range(len(values))]
             axes.plot(
                 values, ys, "o", ms=3, color=colour, mec="#55555555", mew=0.3, zorder=3 if verdict == "wrong" else 2
             )
         axes.plot([bound, bound], [k - 0.42, k + 0.42], color="#222222", lw=1.6)
-    axes.set(xscale="log", ylim=(len(bounds) - 0.5, -0.5), xlim=(LEAST / 3, 10))
+    axes.set(xscale="log", ylim=(len(bounds) - 0.5, -0.5), xlim=(LEAST, 10))
     axes.set_yticks(range(len(bounds)), list(bounds), fontsize=9)
-    axes.set_title("Worst of each slope, and the bound (black); 0 at the left", fontsize=10, loc="left")
+    axes.set_title("Worst of each slope, and the bound (black)", fontsize=10, loc="left")
     axes.tick_params(axis="y", length=0)
     axes.spines[["top", "right", "left"]].set_visible(False)
 
