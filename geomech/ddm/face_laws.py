@@ -51,18 +51,19 @@ class FaceStates:
 class FaceMemory:
     """What the faces of crack ``elements`` keep from load to load: ``rest`` (n,) the slip (times 2μ) at which they are
     without shear, ``broken`` (n,) lost cement, ``work`` J/m done against friction since the beginning, ``states`` as they
-    were."""
+    were, ``pressure`` (n,) Pa between them."""
 
     elements: ElementSet
     rest: np.ndarray
     broken: np.ndarray
     work: float
     states: FaceStates
+    pressure: np.ndarray
 
     @classmethod
     def none(cls, elements: ElementSet) -> FaceMemory:
         n = elements.n * elements.per
-        return cls(elements, np.zeros(n), np.zeros(n, bool), 0.0, FaceStates.open(n))
+        return cls(elements, np.zeros(n), np.zeros(n, bool), 0.0, FaceStates.open(n), np.zeros(n))
 
 
 def all_smooth(laws: Sequence[JointLaw]) -> bool:
@@ -174,4 +175,4 @@ def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
 
     states = memory.states
     moved = FaceStates(taken(states.closed), taken(states.way), taken(states.pulled))
-    return FaceMemory(now, rest.ravel(), taken(memory.broken), memory.work, moved)
+    return FaceMemory(now, rest.ravel(), taken(memory.broken), memory.work, moved, taken(memory.pressure))

@@ -20,6 +20,8 @@ by how much not.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .crack_system import CrackSystem, Rows
@@ -148,7 +150,7 @@ class _Contact:
 
     @property
     def _now(self) -> FaceMemory:
-        return FaceMemory(self.memory.elements, self.memory.rest, self.broken, self.memory.work, self.memory.states)
+        return replace(self.memory, broken=self.broken)
 
     def first_guess(self) -> FaceStates:
         """What the faces would do were there no others: exact for a straight crack under uniform stress."""
@@ -294,7 +296,10 @@ def settle_rough(
     rest = np.where(holds, slip - contact._offset(states, reaction), slip)
     sticks = holds & (states.way == 0)
     rest[sticks] = memory.rest[sticks]
-    # Shear at the end of the step: what the implicit step dissipates, and exact while the limit stays what it is.
-    lost = np.where(states.way != 0, -reaction[laws.along] * (rest - memory.rest), 0.0)
+    # The limit between the loads is the mean of those before and after (0 before faces have met), as where both rise together:
+    # of second order in the load step, and exact while the limit stays what it is.
+    pressure = np.where(states.closed, reaction[laws.across], 0.0)
+    before = laws.limit(memory.pressure, contact.broken)
+    lost = np.where(states.way != 0, 0.5 * (states.way * before - reaction[laws.along]) * (rest - memory.rest), 0.0)
     work = memory.work + float(laws.elements.quadrature.ravel() @ lost) / laws.twice_mu
-    return w, reaction, FaceMemory(laws.elements, rest, contact.broken, work, states), contact.solves
+    return w, reaction, FaceMemory(laws.elements, rest, contact.broken, work, states, pressure), contact.solves

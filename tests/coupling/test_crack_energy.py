@@ -72,7 +72,8 @@ def last_told(problem: Problem, longest: float = np.inf) -> dict[str, float]:
 
 def test_sliding_and_wings_under_compression_add_up():
     """A closed crack at 45° that rubs and grows wings, pressed ever harder: what it stores, rubs off and releases, against
-    the work on it. What is left over is first order in the step (friction is taken at its end), and below 1 % with 34 steps."""
+    the work on it. What is left over is first order in the step (tips grow at its end, by what it has brought), and below 1 % with
+    34 steps."""
     left, share = [], []
     for dt in (0.2, 0.1):
         told = last_told(loaded(-2e6, 3.4, dt, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0, increment=0.02))
@@ -85,19 +86,31 @@ def test_sliding_and_wings_under_compression_add_up():
     assert 1.6 < left[0] / left[1] < 2.8
 
 
-def test_a_running_crack_adds_up_in_dynamics():
+@pytest.mark.parametrize("dt", [0.4, 0.1])
+def test_sliding_alone_adds_up_whatever_the_step(dt):
+    """Pressure and slip rise together, so that friction takes half of what its last force would over all of the slip: 5 to 8e-5 of
+    the work is left over with 3 as with 12 steps (of the strain that the load turns and shortens the plate by; taken at the
+    end of steps it was 9 and 3 %)."""
+    told = last_told(loaded(-2e6, 1.2, dt, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0))
+    assert told["fracture_energy"] == 0.0 and told["crack_friction"] > 0.3 * told["crack_elastic"]
+    assert abs(told["crack_residual"]) < 2e-4 * told["crack_work"]
+
+
+@pytest.mark.parametrize(("dt", "left"), [(1e-4, 0.02), pytest.param(2.5e-5, 0.006, marks=pytest.mark.slow)])
+def test_a_running_crack_adds_up_in_dynamics(dt, left):
     """A crack across a plate that is pulled within some ten passages of waves runs at 0.4 c_R to three times its length: load
-    work = elastic + kinetic + damping + scheme + stored at cracks + released at tips, to 2 %. What is left over is in the
-    crack's part: at its place inertia makes the stress other than the block's mean stress, and blocks feel the latter."""
-    told = last_told(loaded(4e8, 2e-2, 1e-4, [[-0.1, 0.0], [0.1, 0.0]], dynamic=1.0, increment=0.02), 0.7)
+    work = elastic + kinetic + damping + scheme + stored at cracks + released at tips. What is left over is in the crack's part and
+    of first order in the step, whatever the increment: 1.5, 1.0, 0.4 % of the load's work for 100, 50, 25 µs (a step's
+    acceleration, and so the inertia that loads the crack, is that of its middle)."""
+    told = last_told(loaded(4e8, 2e-2, dt, [[-0.1, 0.0], [0.1, 0.0]], dynamic=1.0, increment=0.02), 0.7)
     names = (
         "elastic_energy", "kinetic_energy", "damping_loss", "scheme_loss", "crack_elastic", "fracture_energy",
     )  # fmt: skip
     assert told["fracture_energy"] > 0.1 * told["load_work"]
     assert abs(told["energy_residual"]) < 1e-3 * told["load_work"]
-    assert abs(told["crack_residual"]) < 0.02 * told["load_work"]
+    assert abs(told["crack_residual"]) < left * told["load_work"]
     # Within a step the blocks' budget has the work on cracks at the stress of its end.
-    assert sum(told[name] for name in names) == pytest.approx(told["load_work"], rel=0.03)
+    assert sum(told[name] for name in names) == pytest.approx(told["load_work"], rel=1.5 * left)
 
 
 def test_what_parts_sets_free_what_was_stored_at_its_crack():
