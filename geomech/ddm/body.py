@@ -121,15 +121,15 @@ class Body:
         else:
             self.area, self.centroid = np.inf, np.zeros(2) if half_plane is None else np.array(half_plane.point)
         self._factored_after_all = previous is not None and previous._factored_after_all
-        solver = "dense" if self._factored_after_all or half_plane is not None else settings.solver
+        solver = "dense" if self._factored_after_all else settings.solver
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
         holes_held = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
-        many = is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
+        many = half_plane is None and is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
         self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns)
-        if half_plane is not None and self.boundary.n_unknowns + self.faces.n_unknowns > FACTORABLE:
+        if half_plane is not None and self.boundary.n_unknowns > FACTORABLE:
             raise ValueError(
-                f"half_plane: {self.boundary.n_unknowns + self.faces.n_unknowns} unknowns, but below a free surface no more than "
-                f"{FACTORABLE} are solved for: ask for a larger target_error, or draw the surface as a side of a large block"
+                f"half_plane: {self.boundary.n_unknowns} unknowns on holes, but below a free surface no more than {FACTORABLE} are "
+                "solved for: ask for a larger target_error, or draw the surface as a side of a large block"
             )
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
@@ -158,8 +158,6 @@ class Body:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""
         if self.outlined:
             raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
-        if self.settings.solver == "compressed":
-            raise ValueError('half_plane: the solver "compressed" knows the infinite plane only; use "auto" or "dense"')
         cracks = self.cracks
 
         def name(node: int) -> str:

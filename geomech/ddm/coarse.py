@@ -41,7 +41,7 @@ class CoarseLevel:
             [shapes.TIP_BOTH, shapes.TIP_START, shapes.TIP_END],
             shapes.ORDINARY,
         )
-        self._coarse = ElementSet(start, end, kind, np.arange(self.n), ORDER, elements.family)
+        self._coarse = ElementSet(start, end, kind, np.arange(self.n), ORDER, elements.family, elements.half_plane)
         self._matrix = influence(self._coarse, self._coarse, nu, tol)
         self._parts = [_Part(elements, run, int(k)) for run, k in zip(runs, kind)]
         self._held: np.ndarray | None = None

@@ -179,8 +179,12 @@ class Compressed:
         for group in np.split(self.near, starts[1:]) if len(self.near) else []:
             rows = np.sort(self.target_tree.elements(group[0, 0]))
             columns = np.sort(np.concatenate([self.source_tree.elements(s) for s in group[:, 1]]))
-            matrix = influence(self.targets.take(rows), self.sources.take(columns), nu, tol)
+            matrix = self._near(rows, columns, nu, tol)
             self.blocks.append((self.targets.unknowns(rows), self.sources.unknowns(columns), matrix))
+
+    def _near(self, rows: np.ndarray, columns: np.ndarray, nu: float, tol: float) -> np.ndarray:
+        """The matrix between some targets and some sources."""
+        return influence(self.targets.take(rows), self.sources.take(columns), nu, tol)
 
     def _outgoing(self, nu: float) -> np.ndarray:
         """(n, 4P, 2(p+1)) real: series of Φ and Ψ about the centre of the element's leaf from its nodal jumps."""

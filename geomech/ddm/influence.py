@@ -181,6 +181,20 @@ def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -
     return _between(targets, sources, nu, tol, 1.0, False)
 
 
+def image_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
+    """What the free surface of their half-plane adds to `influence`."""
+    nodal, out = _to_nodal(sources.family, sources.order), np.zeros((sources.n_unknowns, targets.n_unknowns))
+    if out.size:
+        tangents = np.repeat(targets.tangent, targets.per, axis=0)
+        kind = np.ascontiguousarray(sources.kind, dtype=np.int64)
+        at = targets.nodes.reshape(-1, 2), tangents, targets.per
+        work = _images(
+            targets.half_plane, *at, sources.start, sources.end, kind, sources.order, nu, tol, False, nodal, out
+        )
+        _spread(len(tangents), len(tangents) * sources.n, work)
+    return out.T
+
+
 def line_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float, side: float) -> np.ndarray:
     """As `influence`, from unit nodal line forces (per length) on ordinary ``sources``; points on one are seen from
     ``side`` of it."""
@@ -302,21 +316,32 @@ def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, 
         )
 
     if half_plane is not None:
-        from . import image_kernels
-
-        images = kernels.lanes_of(_mirrored(half_plane.frame(points)))
-        own, ends = half_plane.frame(start), half_plane.frame(end)
-        along_surface = kernels.lanes_of(half_plane.turned(tangents))
         plane = work
+        images = _images(half_plane, points, tangents, per, start, end, kind, order, nu, tol, force, nodal, out)
 
         def work(first, last):
             plane(first, last)
-            image_kernels.tractions(
-                images, along_surface, per, first, last, own, ends, kind, order, nu, tol, force, table, nodal, flat
-            )
+            images(first, last)
 
     _spread(n * per, n * per * len(start), work)
     return out.T
+
+
+def _images(half_plane, points, tangents, per, start, end, kind, order, nu, tol, force, nodal, out):
+    """What adds to ``out`` the tractions at points ``first`` … ``last`` that the free surface makes."""
+    from . import image_kernels
+
+    at = kernels.lanes_of(_mirrored(half_plane.frame(points)))
+    along = kernels.lanes_of(half_plane.turned(tangents))
+    start, end = (np.ascontiguousarray(half_plane.frame(x)) for x in (start, end))
+    table, flat = shapes.moments(), out.reshape(-1)
+
+    def work(first, last):
+        image_kernels.tractions(
+            at, along, per, first, last, start, end, kind, order, nu, tol, force, table, nodal, flat
+        )
+
+    return work
 
 
 def _mirrored(in_frame: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ from .influence import ElementSet, influence
 
 if TYPE_CHECKING:
     from .boundary_iteration import IteratedBoundary
+    from .mirrored import BelowSurface
 
 #: Elements of a patch. Larger ones cost more to factor than they save in products.
 PATCH = 60
@@ -231,7 +232,7 @@ class Following:
 class Reduced:
     """S = A_CC − A_CΓ A_ΓΓ⁻¹ A_ΓC as an operator."""
 
-    def __init__(self, cracks: Compressed, on_cracks: np.ndarray, following: Following):
+    def __init__(self, cracks: Compressed | BelowSurface, on_cracks: np.ndarray, following: Following):
         self.cracks, self._on_cracks, self._following = cracks, on_cracks, following
 
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
@@ -439,6 +440,12 @@ def compressed(
     transposed)`` applies A_ΓΓ⁻¹, ``on_boundary`` is A_ΓC and ``on_cracks`` is A_CΓ; ``boundary``: what stands for its
     factors where it is iterated on too."""
     following = Following(solve, on_boundary)
-    matrix = Reduced(Compressed(cracks, cracks, nu, tol), on_cracks, following)
+    if cracks.half_plane is None:
+        own = Compressed(cracks, cracks, nu, tol)
+    else:
+        from .mirrored import BelowSurface
+
+        own = BelowSurface(cracks, nu, tol)
+    matrix = Reduced(own, on_cracks, following)
     coupled = None if boundary is None else Coupled(matrix, boundary, on_boundary, on_cracks)
     return following, IterativeCrackSystem(matrix, cracks, crack, nu, tol, coupled)
