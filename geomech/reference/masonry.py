@@ -1,4 +1,4 @@
-"""Masonry that stands by its shape: the thinnest semicircular arch, and the thrust of voussoir beams.
+"""Masonry that stands by its shape: the thinnest semicircular arch, and the thrust and snap-through of voussoir beams.
 
 Lengths m, forces N per metre of thickness, densities kg/m³, angles rad unless a name says degrees.
 """
@@ -81,6 +81,26 @@ def thinnest_arch(n: int) -> float:
 def three_hinge_thrust(span: float, thickness: float, unit_weight: float) -> float:
     """Thrust (N) of a beam of two rigid halves that lean on each other: w S²/(8 T), hinges at the corners; w = γ T."""
     return unit_weight * thickness * span**2 / (8.0 * thickness)
+
+
+def voussoir_contact(span: float, thickness: float) -> float:
+    """Part of its faces on which a beam of two elastic halves bears at the crown and the abutments, n = 1/(0.22 S/T + 2.7):
+    fitted to finite elements by Sofianos (1996), "Analysis and design of an underground hard rock voussoir beam roof",
+    International Journal of Rock Mechanics 33, 153-166, values of 0.12 to 0.30; quoted in Brady & Brown (2004), "Rock mechanics for
+    underground mining", eq. 8.15. Diederichs & Kaiser (1999), Int. J. Rock Mech. 36, 97-117, take n near 0.75, from the least of
+    the greatest stresses, which no continuum bears out (ibid.)."""
+    return 1.0 / (0.22 * span / thickness + 2.7)
+
+
+def voussoir_thrust(span: float, thickness: float, unit_weight: float, sag: float = 0.0) -> float:
+    """Thrust (N) of that beam: w S²/(8 z), z = T (1 − 2 n/3) − ``sag`` (m), for triangles of pressure at both ends of the arm."""
+    arm = thickness * (1.0 - 2.0 / 3.0 * voussoir_contact(span, thickness)) - sag
+    return unit_weight * thickness * span**2 / (8.0 * arm)
+
+
+#: Sag at which it snaps through, over its arm before: w ∝ z (z₀² − z²) is greatest at z = z₀/√3 (Sofianos 1996; Brady & Brown
+#: 2004, eqs. 8.37 and 8.38).
+SNAP_THROUGH_SAG = 1.0 - 1.0 / math.sqrt(3.0)
 
 
 def two_block_beam(
