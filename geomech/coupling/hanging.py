@@ -52,7 +52,9 @@ class Hanging:
         """Add those of the ``bodies`` (block →) that are soft beside their ``elastic`` compliance (n_blocks, 3, 3) and that CONTACT rows
         press: forces that go with a block's strain are those of contacts."""
         pressed = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
-        for block in set(bodies).intersection(pressed["block"].tolist(), pressed["other"].tolist()) - self._blocks:
+        for block in np.unique([pressed["block"], pressed["other"]]).tolist():
+            if block not in bodies or block in self._blocks:
+                continue
             if self._soft(block, bodies[block], elastic[block]) > SOFT:
                 self._blocks.add(block)
 

@@ -1,0 +1,124 @@
+"""Blocks that hang by thin ligaments, against the compliance that the handbook's K gives, at rest and in motion."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from geomech import ddm
+from geomech.coupling import Coupling
+from geomech.coupling.hanging import SOFT, SOFTEST, Hanging
+from geomech.model import (
+    CONTACT,
+    Blocks,
+    Cracks,
+    DdaSettings,
+    DdmSettings,
+    GrowthSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+)
+from geomech.reference.plates import edge_crack_strip
+
+ROCK = Material("rock", 10e9, 0.2, density=2500.0, k_ic=1e12)
+HEIGHT = 2.0
+BAR = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, HEIGHT], [0.0, HEIGHT]])
+
+
+def edge_crack(ratio: float, aperture: float, block: int) -> Cracks:
+    line = np.array([[0.0, HEIGHT / 2], [ratio, HEIGHT / 2]])
+    return Cracks.from_polylines([line], block=block, aperture=aperture, surface=[(True, False)])
+
+
+def softness_by_k(ratio: float) -> float:
+    """E' S_yy of the bar: its stretch across the crack is 2 σ/E' ∫ F² π a da / W (Irwin 1957), F of Tada, Paris & Irwin's strip."""
+    return 2 * quad(lambda a: edge_crack_strip(a) ** 2 * math.pi * a, 0, ratio)[0] / HEIGHT
+
+
+def falls_on_its_base(ratio: float, aperture: float, steps: int, periods: float) -> Problem:
+    """The bar comes under its weight at once on a fixed base without friction, ``steps`` to the period of its bounce."""
+    base = np.array([[-1.0, -1.0], [2.0, -1.0], [2.0, 0.0], [-1.0, 0.0]])
+    step = period(ratio) / steps
+    return Problem(
+        title="a bar on its base",
+        blocks=Blocks.from_polygons([base, BAR], fixed=[True, False]),
+        cracks=edge_crack(ratio, aperture, 1),
+        materials=(ROCK,),
+        joints=(JointLaw("joint"),),
+        loads=Loads(gravity=History.constant([0.0, -9.81])),
+        dda=DdaSettings(time_step=step, dynamic_factor=1.0, newmark=(0.25, 0.5), damping=0.0),
+        ddm=DdmSettings(),
+        growth=GrowthSettings(increment=0.05),
+        run=RunSettings(end_time=periods * period(ratio), stop_at=()),
+    )
+
+
+def period(ratio: float) -> float:
+    """s, of an even strain ε on a fixed base, ρ H² ε̈ / 3 = −E' ε / (1 + E' S)."""
+    return 2 * math.pi * HEIGHT * math.sqrt(ROCK.density / 3 / ROCK.plane_modulus * (1 + softness_by_k(ratio)))
+
+
+def test_a_hanging_block_bounces_as_its_ligament_s_compliance_has_it():
+    """An edge crack through three quarters, 16 times as soft as the bar: mean and largest strain and the period of the bounce are those
+    of the compliance by K; passes agree at once, and the energy of the motion stays."""
+    ratio = 0.75
+    soft, given = softness_by_k(ratio), falls_on_its_base(ratio, np.inf, 100, 1.6)
+    run = Coupling(given)
+    seen = [cycle for cycle in run.cycles() if cycle.number]
+    assert 1 in run.now.hanging and SOFT < soft < SOFTEST
+    height = np.array([cycle.state.vertices[6:, 1].mean() for cycle in seen]) - HEIGHT
+    time = np.array([cycle.state.time for cycle in seen]) / period(ratio)
+    still = 9.81 * ROCK.density * HEIGHT**2 / 2 * (1 + soft) / ROCK.plane_modulus
+    # F is known to 0.5 %, the bar is twice as high as wide, the contacts give a little.
+    assert -height.min() == pytest.approx(2 * still, rel=0.02)
+    assert abs(height.max()) < 0.02 * still
+    lows = time[1:-1][(height[1:-1] < height[:-2]) & (height[1:-1] <= height[2:])]
+    assert lows[:2] == pytest.approx([0.5, 1.5], abs=0.025)
+    statistics = [cycle.statistics for cycle in seen]
+    assert max(told["compliance_mismatch"] for told in statistics) < 1e-6
+    assert max(told["compliance_passes"] for told in statistics[1:]) <= 2
+    turned = max(abs(told["gravity_work"]) for told in statistics)
+    assert max(abs(told["energy_residual"]) for told in statistics) < 1e-4 * turned
+
+
+def test_faces_that_close_under_the_mean_stress_carry_it():
+    """A closed crack: in compression the hanging bar is as stiff as a whole one."""
+    seen = [cycle for cycle in Coupling(falls_on_its_base(0.75, 0.0, 400, 0.1)).cycles() if cycle.number]
+    strain = np.abs(np.array([cycle.state.crack_strain[1] for cycle in seen])).max()
+    elastic = np.abs(np.array([cycle.state.stress[1] for cycle in seen])).max() / ROCK.plane_modulus
+    assert max(cycle.statistics["compliance_mismatch"] for cycle in seen) < 1e-4
+    assert strain < 1e-3 * elastic
+
+
+@pytest.mark.parametrize(("ratio", "hangs"), [(0.3, False), (0.75, True)])
+def test_softness_is_that_by_k_and_only_what_is_touched_hangs(ratio, hangs):
+    body = ddm.Body([BAR], edge_crack(ratio, np.inf, 0), ROCK)
+    elastic = ROCK.compliance()[None]
+    hanging = Hanging()
+    touch = np.zeros(1, CONTACT)
+    touch["block"], touch["other"] = 0, 5
+    hanging.find({0: body}, elastic, touch)
+    assert 0 not in hanging
+    touch["normal_force"] = 1.0
+    hanging.find({0: body}, elastic, touch)
+    assert (0 in hanging) == hangs
+    # In one direction, σ_yy but for a little of the others: no less than that of σ_yy, and not much more.
+    assert 1.0 <= hanging._soft(0, body, elastic[0]) / softness_by_k(ratio) < 1.12
+
+
+def test_what_hangs_by_less_than_a_quarter_is_taken_for_no_softer():
+    """… and the answer in tension is its share of that compliance."""
+    ratio = 0.95
+    body, elastic = ddm.Body([BAR], edge_crack(ratio, np.inf, 0), ROCK), ROCK.compliance()
+    hanging = Hanging()
+    answer = hanging.answer(0, body, np.array([0.0, 1e6, 0.0]), 0.0, None)
+    whole = answer.crack_strain[1] * ROCK.plane_modulus / 1e6
+    assert whole == pytest.approx(softness_by_k(ratio), rel=0.02)
+    assert hanging.share(0, body, elastic) * whole == pytest.approx(SOFTEST, rel=0.1)
