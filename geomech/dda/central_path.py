@@ -10,8 +10,9 @@ and ε is driven to zero by Newton's method with Mehrotra's (1992) predictor and
 correctors, which bring products far from ε back towards it, for the linear complementarity problem of Coulomb friction in an
 implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring between stiff and none, so that each
 iteration is one factorisation of the matrix of the open–close iterations. Where steps become short the contacts are centred
-again about the motion at hand, with a larger ε. Friction on the present normal force is no gradient of an energy and nothing
-guarantees the end; what comes out is only a proposal, and the open–close iterations go on from it.
+again about the motion at hand, with a larger ε. Bonds hold, as springs: whether they break is asked when all else is right.
+Friction on the present normal force is no gradient of an energy and nothing guarantees the end; what comes out is only a
+proposal, and the open–close iterations go on from it.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from . import assembly, contact_states
 from .contact_springs import Springs
 from .contacts import ContactSet
 
+#: The bond of a contact that has slipped and not lost all cohesion: it may slide.
+SLIPPED = 2
 #: ε is counted in units of the squared load on a contact's blocks over its stiffness. It starts at so many times the mean of N²/kₙ
 #: in the last open–close iteration (slopes of 400 to 1 000 blocks: 1 takes a third more iterations, 1 000 walls a tenth more),
 #: and not below the second number.
@@ -158,21 +161,26 @@ class CentralPath:
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
-        some = self._some = np.flatnonzero(acting(found.partner, gap))
+        act = acting(found.partner, gap)
+        slipped = bonded == SLIPPED
+        some, held = (np.flatnonzero(act & which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
         order = pattern.order
-        self._at = found.block[some], found.other[some], order, np.ascontiguousarray(vectors[some])
-        self._upper, self._lower = pattern.upper[some], pattern.lower[some]
+        self._some, self._held = some, held
+        self._at, self._held_at, self._all_at = (
+            (found.block[rows], found.other[rows], order, np.ascontiguousarray(vectors[rows]))
+            for rows in (some, held, np.concatenate([some, held]))
+        )
+        self._upper, self._lower, self._all_lift = (
+            np.concatenate([array[some], array[held]]) for array in (pattern.upper, pattern.lower, springs.lift)
+        )
+        # Bonds are springs either way.
+        self._bonds = springs.normal[held], springs.shear[held], gap[held], found.shear[held]
         self._lift, self._kn, self._ks = springs.lift[some], springs.normal[some], springs.shear[some]
-        held, slides = bonded[some] > 0, found.state[some] == SLIP
+        slides = found.state[some] == SLIP
         friction = np.where(slides, springs.friction[some], springs.peak[some])
-        firm = np.where(slides, springs.sliding[some], springs.hold[some]) + held * springs.cohesion[some]
+        firm = np.where(slides, springs.sliding[some], springs.hold[some] + slipped[some] * springs.cohesion[some])
         self._rough = (friction > 0.0) | (firm > 0.0)
-        # N is counted from where the contact is pulled off; its strength against sliding is positive to the last.
-        self._pull = held * springs.tension[some]
-        sloped = friction > 0.0
-        self._pull[sloped] = np.minimum(self._pull[sloped], 0.9 * firm[sloped] / friction[sloped])
-        self._mu = np.where(self._rough, friction, 1.0)
-        self._base = np.where(self._rough, firm - friction * self._pull, 0.0)
+        self._mu, self._base = np.where(self._rough, friction, 1.0), np.where(self._rough, firm, 0.0)
 
         load = np.append(np.abs(right).max(axis=1, initial=0.0), 0.0)
         load = np.maximum(load[order[self._at[0]]], load[order[self._at[1]]])
@@ -182,11 +190,13 @@ class CentralPath:
         self._data = np.empty(pattern.size)
         self._unknowns = np.zeros(right.size)
         # Motions: what makes the gap and the motion along the edge 0 where no force acts.
-        self._g, self._s = gap[some] - self._pull / self._kn, -found.shear[some] / self._ks
+        self._g, self._s = gap[some], -found.shear[some] / self._ks
         self._load = max(float(np.abs(right).max()), 1e-300)
-        self.epsilon = max(_START * float(np.mean(forces[some] ** 2 / self._kn / self._unit)), _LEAST_START)
+        self.epsilon = max(
+            _START * float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0, _LEAST_START
+        )
         self._centre(self.epsilon * self._unit)
-        self.missed, self.ended, self._blocked, self._again = 1.0, False, 0, 0
+        self.missed, self.ended, self._blocked, self._again = 1.0, not len(some), 0, 0
 
     @property
     def blocked(self) -> bool:
@@ -225,19 +235,27 @@ class CentralPath:
 
     def advance(self) -> int:
         """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
+        if self.ended:
+            return 0
         pattern, kn, ks, mu, rough, unit = self._pattern, self._kn, self._ks, self._mu, self._rough, self._unit
         normal, width, (back, ahead), (above, below) = self._normal, self._width, self._slip, self._left()
         epsilon = float(self._products(normal, width, back, ahead, above, below).sum()) / float((1 + 2 * rough).sum())
         residual = (self._right - np.einsum("bij,bj->bi", self._matrix, self._unknowns.reshape(-1, 6))).ravel()
-        add_forces(residual, *self._at, normal - self._pull, self._shear)
+        add_forces(residual, *self._at, normal, self._shear)
+        kn_held, ks_held, gap_held, before_held = self._bonds
+        moved_held = contact_states.moved(self._unknowns, *self._held_at)
+        moved_held[:, 0] -= self._all_lift[len(kn) :] * moved_held[:, 1]
+        pulled, sheared = -kn_held * (gap_held + moved_held[:, 0]), before_held - ks_held * moved_held[:, 1]
+        add_forces(residual, *self._held_at, pulled, sheared)
         gap_missed = self._g + normal / kn - width
         slip_missed = self._s + self._shear / ks - (ahead - back)
         soft = width + normal / kn
         stiff, stiff_along = normal / soft, rough / (1.0 / ks + ahead / below + back / above)
         slope = stiff_along * mu * (back / above - ahead / below)
         assemble(
-            self._data, self._matrix, pattern.stride, pattern.diagonal, self._upper, self._lower, *self._at, stiff,
-            stiff_along, slope, self._lift,
+            self._data, self._matrix, pattern.stride, pattern.diagonal, self._upper, self._lower, *self._all_at,
+            np.concatenate([stiff, kn_held]), np.concatenate([stiff_along, ks_held]),
+            np.concatenate([slope, np.zeros(len(kn_held))]), self._all_lift,
         )  # fmt: skip
         solve = solution_of(pattern, self._data)
 
@@ -319,6 +337,7 @@ class CentralPath:
         sliding = np.where(self._ks * self._slip[0] > above, 1.0, np.where(self._ks * self._slip[1] > below, -1.0, 0.0))
         closed = np.where(self._rough & (sliding == 0.0), STICK, SLIP)
         state, direction = np.full(self._n, OPEN), np.zeros(self._n)
+        state[self._held] = STICK
         state[self._some] = np.where(self._kn * self._width > self._normal, OPEN, closed)
         direction[self._some] = np.where(self._rough & (state[self._some] == SLIP), sliding, 0.0)
         return state, direction

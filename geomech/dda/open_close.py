@@ -319,7 +319,7 @@ def settle(
     slower: Iterator[tuple[_States, int]] | None = None
     caution, fewest, tries = _ALL, np.inf, 0
     few, small = len(found) <= _FEW, pattern.solver is None
-    iteration = 0
+    iteration, most = 0, max_iterations
     # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states fits.
     closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
     while True:
@@ -340,8 +340,8 @@ def settle(
             # Bonds are lost for good: none breaks before all else is right, and the most strained break first.
             wrong = bonds & _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 0.5)
             states, caution, fewest, tries = states.switched(wrong, answer.called), _ALL, np.inf, 0
-            # What was tried knew of bonds that are gone.
-            slower = None
+            # What was tried knew of bonds that are gone, and what is left has time of its own: there are fewer bonds each time.
+            slower, max_iterations = None, max(max_iterations, iteration + most)
             continue
         wrong &= ~bonds
         closing = wrong & (states.state == OPEN) & (answer.called.state == STICK)
