@@ -53,6 +53,8 @@ class FacePoints:
     held      (m,)    bonds may pull: the part is the whole face
     shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
     apart     (m,)    distance of the two springs, in parts of the part
+    went      (m, 2)  how far its ends have gone with the last iteration of the step
+    stride    (m,)    the part of the way to where they seem to be that they go: half the last one's, or less, after turning about
     """
 
     ends: np.ndarray
@@ -62,6 +64,8 @@ class FacePoints:
     held: np.ndarray
     shortest: np.ndarray
     apart: np.ndarray
+    went: np.ndarray
+    stride: np.ndarray
 
     @classmethod
     def of(
@@ -98,7 +102,9 @@ class FacePoints:
             apart[glued] = bends(ends[glued], length[glued])
             some = apart < _AT_CORNERS
             ends, length, held, shortest, apart = ends[some], length[some], held[some], shortest[some], apart[some]
-        return cls(ends, geometry, length, _pressed(normal[ends], held, shortest), held, shortest, apart)
+        part = _pressed(normal[ends], held, shortest)
+        still, full = np.zeros_like(part), np.ones(len(part))
+        return cls(ends, geometry, length, part, held, shortest, apart, still, full)
 
     @property
     def place(self) -> np.ndarray:
@@ -192,8 +198,15 @@ class FacePoints:
         to_low = np.where(low > 0, [np.maximum(low - length, 0.0), high], [low, low + half])
         to_high = np.where(high < 1, [low, np.minimum(high + length, 1.0)], [high - half, high])
         part[lame] = np.where(first, to_low, to_high).T[lame]
-        off = np.abs(part - self.part).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
-        return replace(self, part=np.where(off[:, None], part, self.part)) if off.any() else None
+        # Neighbours that turn each other's block go back and forth together for ever: the way is halved at every turn.
+        way = part - self.part
+        stride = np.where((way * self.went).sum(axis=1) < 0, 0.5 * self.stride, self.stride)
+        way *= stride[:, None]
+        off = np.abs(way).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
+        if not off.any():
+            return None
+        way[~off] = 0.0
+        return replace(self, part=self.part + way, went=np.where(off[:, None], way, self.went), stride=stride)
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
