@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numba import njit
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
@@ -27,6 +28,64 @@ from .contacts import ContactSet
 _WAY = 0.5
 #: Newton's method ends a round after so many solutions at most; the line search halves its interval so often.
 _SOLUTIONS, _HALVINGS = 30, 14
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _pushes(contact, gap, bonded, partner, rounding):
+    """Whether a contact pushes (or, bonded, pulls) at the gaps of all, ``gap`` (n,): of two corners' lines the one less deep in,
+    where both are crossed. ``partner`` (n, k), −1 for none."""
+    own = gap[contact]
+    if not (own < 0.0 or bonded[contact]):
+        return False
+    for k in range(partner.shape[1]):
+        p = partner[contact, k]
+        if p < 0:
+            continue
+        other = gap[p]
+        if not (other < rounding[contact] and (other < own or (other == own and contact < p) or other >= 0.0)):
+            return False
+    return True
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _all_pushing(gap, bonded, partner, rounding):
+    """(n,) of `_pushes`."""
+    out = np.empty(gap.shape[0], np.bool_)
+    for c in range(gap.shape[0]):
+        out[c] = _pushes(c, gap, bonded, partner, rounding)
+    return out
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _slope(t, start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear, gaps):
+    """How the energy changes along a step, at its part ``t``; ``gaps`` (n,) is scratch. See `LaggedFriction._way`."""
+    n = gap.shape[0]
+    for c in range(n):
+        gaps[c] = gap[c] + t * apart[c]
+    found = start + t * curved
+    for c in range(n):
+        if _pushes(c, gaps, bonded, partner, rounding):
+            found += normal[c] * gaps[c] * apart[c]
+        pull = trial[c] - t * shear[c] * along[c]
+        found -= min(max(pull, -strength[c]), strength[c]) * along[c]
+    return found
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _least_energy(start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear):
+    """The part of a step at which the energy is least, by halving; arguments as for `_slope`."""
+    gaps = np.empty(gap.shape[0])
+    same = (start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear, gaps)
+    if _slope(1.0, *same) <= 1e-9 * abs(_slope(0.0, *same)):
+        return 1.0
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if _slope(middle, *same) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return 0.5 * (low + high)
 
 
 class LaggedFriction:
@@ -80,16 +139,7 @@ class LaggedFriction:
             yield state, np.where(state == SLIP, np.sign(trial), 0.0), change
 
     def _closed(self, gap: np.ndarray) -> np.ndarray:
-        """Which contacts push (or, bonded, pull) at ``gap``: of two corners' lines the one less deep in, where both are crossed."""
-        closed = (gap < 0) | self._bonded
-        number = np.arange(len(gap))
-        for partner in self._found.partner.T:
-            has = partner >= 0
-            other = gap[partner]
-            closed &= ~has | (
-                (other < self._found.rounding) & ((other < gap) | ((other == gap) & (number < partner)) | (other >= 0))
-            )
-        return closed
+        return _all_pushing(gap, self._bonded, self._found.partner, self._found.rounding)
 
     def _forces(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self._gap + motion[:, 0], self._found.shear - self._springs.shear * motion[:, 1]
@@ -130,15 +180,9 @@ class LaggedFriction:
             (rows * self._right).sum()
         )
 
-        def slope(t: float) -> float:
-            gap, trial = self._forces(self._contact_motion + t * along)
-            push = np.where(self._closed(gap), -self._springs.normal * gap, 0.0)
-            return float(start + t * curved - push @ along[:, 0] - np.clip(trial, -strength, strength) @ along[:, 1])
-
-        if slope(1.0) <= 1e-9 * abs(slope(0.0)):
-            return 1.0
-        low, high = 0.0, 1.0
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if slope(middle) > 0 else (middle, high)
-        return 0.5 * (low + high)
+        gap, trial = self._forces(self._contact_motion)
+        springs, found = self._springs, self._found
+        return _least_energy(
+            start, curved, gap, trial, np.ascontiguousarray(along[:, 0]), np.ascontiguousarray(along[:, 1]), strength,
+            self._bonded, found.partner, found.rounding, springs.normal, springs.shear,
+        )  # fmt: skip
