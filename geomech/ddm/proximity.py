@@ -18,6 +18,11 @@ APART = 1.25
 #: The same for opposite sides of a body: what is left of equilibrium errors in a slender one is amplified by its
 #: slenderness squared.
 ACROSS = 0.6
+#: The same for elements of cracks that meet at an angle of less than `ACUTE`: they stand beside each other all along, however coarsely
+#: they are graded into the node. Graded ones, as long beside that angle as a ratio of 0.3 makes them, are left (0.15 left K of a fold
+#: by 165° 10 % off, by 168° anything).
+#: At order 2 and below they may be a share `LOW` of that, from a ratio `FINE` on whatever they are.
+BESIDE, ACUTE, GRADED, LOW, FINE = 3.5, np.radians(60), 1.05 * (1 / 0.3 - 1), 0.5, 0.299
 #: Elements of faces that meet are not halved below this part of the shorter face.
 AT_NODE = 0.01
 #: The same where one of them is a side: the thin rock between may then be as good as loose (a mouth at 5°: K 2 % → 0.03 %).
@@ -41,12 +46,13 @@ def _distance(px, py, ax, ay, bx, by):
     return np.hypot(px - ax - s * dx, py - ay - s * dy)
 
 
-def crowding(start, end, tip, source, touching, n_edges, apart, across, chained, shortest):
+def crowding(start, end, tip, source, meeting, n_edges, apart, across, chained, beside, shortest):
     """(n,) the largest length / (allowed length) of each element over all others.
 
-    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``), ``chained`` times it where the two lie on one source or on ``touching``
-    ones, whose grading already ties sizes to distances; there elements below the ``shortest`` (n_sources,) of both sources
-    are left alone. Elements that share an end are not compared, but for the tip at
+    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``), ``chained`` times it
+    where the two lie on one source or on two that meet, whose grading already ties sizes to distances; there elements below the
+    ``shortest`` (n_sources,) of both sources are left alone. ``meeting`` (n_sources, n_sources) is 0 for sources that do not meet, 1 for those that
+    do, −sin of the angle between cracks where that is acute: there `BESIDE` and ``beside`` times `GRADED` count. Elements that share an end are not compared, but for the tip at
     the other end (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
     """
     middle = 0.5 * (start[:, 0] + end[:, 0])
@@ -55,12 +61,27 @@ def crowding(start, end, tip, source, touching, n_edges, apart, across, chained,
     reach = (1.0 + 1.0 / min(apart, across)) * length.max() if len(start) else 0.0
     sweep = np.argsort(middle, kind="stable")
     return _crowding(
-        start, end, length, tip, source, touching, n_edges, apart, across, chained, shortest, sweep, 1.000001 * reach
+        start,
+        end,
+        length,
+        tip,
+        source,
+        meeting,
+        n_edges,
+        apart,
+        across,
+        chained,
+        beside,
+        shortest,
+        sweep,
+        1.000001 * reach,
     )
 
 
 @_jit
-def _crowding(start, end, length, tip, source, touching, n_edges, apart, across, chained, shortest, sweep, reach):
+def _crowding(
+    start, end, length, tip, source, meeting, n_edges, apart, across, chained, beside, shortest, sweep, reach
+):
     n, least_apart = len(start), min(apart, across)
     out = np.zeros(n)
     for m in range(n):
@@ -75,10 +96,10 @@ def _crowding(start, end, length, tip, source, touching, n_edges, apart, across,
             near = 0.5 * (length[i] + length[j]) + max(length[i], length[j]) / least_apart
             if (mx - qx) ** 2 + (my - qy) ** 2 > near * near:
                 continue
-            same = source[i] == source[j] or touching[source[i], source[j]]
+            meet = meeting[source[i], source[j]]
             allowed = apart
-            if same:
-                allowed = chained
+            if meet != 0:
+                allowed = chained if meet > 0 else min(chained, BESIDE)
             elif source[i] < n_edges and source[j] < n_edges:
                 allowed = across
             shared = 0
@@ -100,12 +121,11 @@ def _crowding(start, end, length, tip, source, touching, n_edges, apart, across,
             d = min(d, _distance(end[i, 0], end[i, 1], start[j, 0], start[j, 1], end[j, 0], end[j, 1]))
             d = min(d, _distance(start[j, 0], start[j, 1], start[i, 0], start[i, 1], end[i, 0], end[i, 1]))
             d = min(d, _distance(end[j, 0], end[j, 1], start[i, 0], start[i, 1], end[i, 0], end[i, 1]))
-            d = max(d, 1e-300) * allowed
-            least = min(shortest[source[i]], shortest[source[j]]) if same else 0.0
-            if length[i] > least:
-                out[i] = max(out[i], length[i] / d)
-            if length[j] > least:
-                out[j] = max(out[j], length[j] / d)
+            d = max(d, 1e-300)
+            least = min(shortest[source[i]], shortest[source[j]]) if meet != 0 else 0.0
+            graded = beside * GRADED / -meet if meet < 0 else np.inf
+            for k in (i, j):
+                out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
     return out
 
 
@@ -117,14 +137,15 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
     too thin for that: it would take too many elements, or shorter ones than coordinates can tell apart.
     """
     # A graded element is 1/ratio times its distance to the next but one.
-    chained = max(2.5, 1.05 / ratio)
+    chained, meeting = max(2.5, 1.05 / ratio), _meeting(pieces, touching, n_edges)
+    beside = np.inf if ratio >= FINE else LOW if unknowns <= 6 else 1.0
     shortest = AT_NODE * np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     shortest[:n_edges] *= AT_BOUNDARY / AT_NODE
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
     while True:
         tip = np.where(kind == shapes.ORDINARY, 0, kind)
         start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
-        crowded = crowding(start, end, tip, source, touching, n_edges, APART, ACROSS, chained, shortest)
+        crowded = crowding(start, end, tip, source, meeting, n_edges, APART, ACROSS, chained, beside, shortest)
         length = np.hypot(*(end - start).T)
         cut = (crowded > 1 + 1e-9) & (length > 2 * FLOOR * extent)
         if not cut.any():
@@ -135,6 +156,20 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
     if len(crowded) and crowded.max() > HOPELESS:
         raise ValueError(f"{_thin(start, end, length, crowded)}: less than coordinates can tell apart")
     return start, end, kind, source
+
+
+def _meeting(pieces: np.ndarray, touching: np.ndarray, n_edges: int) -> np.ndarray:
+    """What `crowding` has to know of sources that meet."""
+    out = touching.astype(float)
+    i, j = (k + n_edges for k in np.nonzero(np.triu(touching[n_edges:, n_edges:], 1)))
+    for p in (0, 1):
+        for q in (0, 1):
+            a, b = pieces[i, 1 - p] - pieces[i, p], pieces[j, 1 - q] - pieces[j, q]
+            size, dot = np.hypot(*a.T) * np.hypot(*b.T), np.sum(a * b, axis=1)
+            at = (dot > np.cos(ACUTE) * size) & (pieces[i, p] == pieces[j, q]).all(axis=1)
+            sine = np.abs(a[at, 0] * b[at, 1] - a[at, 1] * b[at, 0]) / size[at]
+            out[i[at], j[at]] = out[j[at], i[at]] = -np.maximum(sine, 1e-300)
+    return out
 
 
 def _thin(start, end, length, crowded) -> str:
