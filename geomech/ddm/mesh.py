@@ -93,8 +93,10 @@ def mesh(
             half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
         )
     start, end, kind, source = keep_apart(
-        start, end, kind, source, pieces, touching, len(edges), settings.grading_ratio, extent, 2 * (settings.order + 1)
-    )
+        start, end, kind, source, pieces, touching, len(edges), settings.grading_ratio, extent,
+        # Images have no unknowns.
+        (2 if half_plane is None else 1) * (settings.order + 1),
+    )  # fmt: skip
     if half_plane is not None:
         own = source < n_pieces
         start, end, kind, source = start[own], end[own], kind[own], source[own]
