@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from scene_texts import GOOD
 
+from geomech import ddm
+from geomech.model import Cracks, Material
 from geomech.scene import load_scene
 
 PIPELINES = Path(__file__).parents[2] / "pipelines"
@@ -50,6 +52,58 @@ def test_sizes_that_are_hardly_in_metres(scene_file, factor, told):
     ]
     found = warnings_of(scene_file, overrides=changes)
     assert ["in metres?" in w.way_out for w in found] == [True] * told
+
+
+@pytest.mark.parametrize(
+    ("ratio", "at", "too_large"), [(1.0, 0.75, 0.98), (1.0, 0.25, 0.98), (2.0, 0.25, 2.06), (3.0, 0.25, 4.6)]
+)
+def test_how_far_linear_pressure_is_off_under_shallow_blocks(ratio, at, too_large):
+    """K of a slot in a block under a strip load, by the linear pressure that balances it below, over K on a rigid smooth base:
+    the crack solver with the base held (in tension or none is not asked: the slots are open, the base is pressed or hardly
+    pulled). It is what `SHALLOW` goes by."""
+    wide, half = ratio, 0.125 * ratio
+    outline = np.array([[-wide / 2, 0], [wide / 2, 0], [wide / 2, 1], [half, 1], [-half, 1], [-wide / 2, 1]])
+    slot = Cracks.from_polylines([np.array([[0, at - 0.1], [0, at + 0.1]])], aperture=np.inf)
+    rock = Material("rock", 20e9, 0.25)
+    linear = ddm.Body([outline], slot, rock).solve(
+        ddm.BodyLoad(sides={3: (0.0, -1e6), 0: (0.0, 2 * half * 1e6 / wide)})
+    )
+    held = ddm.Body([outline], slot, rock, supports=[ddm.Support(0, hold="normal")])
+    held = held.solve(ddm.BodyLoad(sides={3: (0.0, -1e6)}))
+    assert linear.tips["k_i"].max() / held.tips["k_i"].max() == pytest.approx(too_large, rel=0.01)
+
+
+@pytest.mark.parametrize(("height", "told"), [(0.5, 1), (0.7, 0)])
+def test_shallow_cracked_blocks_on_a_fixed_base_are_told(scene_file, height, told):
+    text = f"""
+title = "a slab on its ground"
+[[geometry.zones]]
+name = "slab"
+rectangle = [0.0, 0.0, 1.0, {height}]
+[[geometry.zones]]
+name = "ground"
+rectangle = [-1.0, -1.0, 2.0, 0.0]
+[[geometry.cracks]]
+name = "flaw"
+points = [[0.5, 0.2], [0.5, 0.4]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2500
+k_ic_pa_sqrt_m = 1e6
+[zones.ground]
+fixed = true
+[joints.default]
+friction_angle_deg = 30
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+[run]
+end_time_s = 1.0
+"""
+    found = [w for w in load_scene(scene_file(text)).warnings if "lies on a fixed block" in w.message]
+    assert len(found) == told
+    for warning in found:
+        assert "'slab'" in warning.message and "cut it by joints" in warning.way_out
 
 
 def test_a_crack_that_reaches_the_outline_or_keeps_away_is_not_told(scene_file):
