@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..conventions import outward_normal_of
 from .actions import traction_history
 from .checks import material_of
 from .errors import Check
@@ -71,13 +72,15 @@ def _shallow(c: Check) -> None:
     if not (len(base) and cracked):
         return
     starts, ends = blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]
-    found = []
+    weight, found = np.array(c.tables.loads.gravity_m_s2), []
     for start, side in blocks.sides.items():
         block = int(blocks.vertex_block[start])
         if block not in cracked:
             continue
         a, b = blocks.vertices[side[0]], blocks.vertices[side[-1]]
         length = float(np.hypot(*(b - a)))
+        if weight.any() and weight @ outward_normal_of(b - a) < 0.5 * length * np.hypot(*weight):
+            continue  # a wall beside it, not the ground that bears it
         corners = blocks.vertices[blocks.vertex_start[block] : blocks.vertex_start[block + 1]] - a
         depth = np.abs((b - a)[0] * corners[:, 1] - (b - a)[1] * corners[:, 0]).max() / length
         slenderness = length / float(depth)
