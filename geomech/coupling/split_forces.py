@@ -77,15 +77,22 @@ class _Faces:
 
     def on(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """(places from 0 to 1, shares m, tractions) on the segment from ``a`` to ``b``; None where it is no crack yet."""
-        place, here = _along(self.nodes, a, b)
-        return (place[here], self.share[here], self.traction[here]) if here.any() else None
+        here = np.repeat(self._elements_on(a, b), len(self.nodes) // len(self.ends))
+        # Elements graded to a corner at its end may be shorter than what tells them from the segment.
+        if self.share[here].sum() < 0.5 * np.hypot(*(b - a)):
+            return None
+        return _along(self.nodes[here], a, b)[0], self.share[here], self.traction[here]
 
     def ends_at(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(2,) gap and (2,) slip at the ends of the segment from ``a`` to ``b``."""
-        _, here = _along(self.ends.mean(axis=1), a, b)
+        here = self._elements_on(a, b)
         points = self.ends[here].reshape(-1, 2)
         nearest = [int(np.argmin(np.hypot(*(points - end).T))) for end in (a, b)]
         return self.gap[here].ravel()[nearest], self.slip[here].ravel()[nearest]
+
+    def _elements_on(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """(n,) which elements have their middle on the segment from ``a`` to ``b``."""
+        return _along(self.ends.mean(axis=1), a, b)[1]
 
 
 def holds_together(state: State, blocks: np.ndarray) -> bool:

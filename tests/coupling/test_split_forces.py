@@ -8,6 +8,7 @@ import pytest
 
 from geomech import dda
 from geomech.conventions import normal_of
+from geomech.coupling import split_forces
 from geomech.coupling.balance import balanced
 from geomech.coupling.cracked_blocks import CrackedBlocks
 from geomech.coupling.growing import take_growth
@@ -260,3 +261,16 @@ def moving(now):
         spin = x * momentum[1] - y * momentum[0] + momentum[2]
         total += [moments[0], momentum[0], momentum[1], spin, v @ momentum / 2]
     return total
+
+
+def test_elements_graded_to_a_corner_are_no_part_of_the_segment_that_leaves_it():
+    """A ligament that breaks from a kink graded to 1e-7 of its length is whole rock before, and the crack's last segment a crack."""
+    ends = np.array([[[-1.0, 0.5], [-3e-7, 1e-7]], [[-3e-7, 1e-7], [0.0, 0.0]]])
+    nodes = ends[:, :1] + np.array([0.02, 0.5, 0.98])[:, None] * (ends[:, 1:] - ends[:, :1])
+    length = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 3, 3)
+    nothing = np.zeros((2, 2))
+    faces = split_forces._Faces(nodes.reshape(-1, 2), length, np.ones((6, 2)), ends, nothing, nothing)
+    assert faces.on(np.zeros(2), np.array([1.0, -0.3])) is None
+    place, share, _ = faces.on(*ends[0])
+    assert share.sum() == pytest.approx(np.hypot(1.0, 0.5))
+    assert place[:3] == pytest.approx([0.02, 0.5, 0.98])
