@@ -97,6 +97,13 @@ class ContactSet:
         known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
         return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
 
+    def like(self, rows: np.ndarray) -> ContactSet:
+        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press on."""
+        again = self.trying(rows)
+        if again is self or self.points is None:
+            return again
+        return replace(self.lumped.placed(self.points.pressed_by(rows["normal_force"])), tried=again.tried)
+
     def placed(self, points: FacePoints | None) -> ContactSet:
         """These contacts, found at the corners, with the springs of faces where ``points`` say."""
         if points is None:

@@ -106,6 +106,10 @@ class FacePoints:
         still, full = np.zeros_like(part), np.ones(len(part))
         return cls(ends, geometry, length, part, held, shortest, apart, still, full)
 
+    def pressed_by(self, normal: np.ndarray) -> FacePoints:
+        """The same faces on the parts that forces ``normal`` (n,) N at the corners press on."""
+        return replace(self, part=_pressed(normal[self.ends], self.held, self.shortest))
+
     @property
     def place(self) -> np.ndarray:
         """(m, 2) where along the face the springs of its contacts stand, in parts of it."""

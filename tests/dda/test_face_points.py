@@ -140,3 +140,13 @@ def test_a_block_that_is_dropped_askew_on_a_soft_joint_gains_no_energy():
         lost.append(-budget.residual / budget.turnover)
     print(f"part of the energy that is out of sight: {lost[0]:.1e}, with a quarter of the step {lost[1]:.1e}")
     assert -1e-4 < lost[1] < 0.01 and lost[1] < 0.3 * lost[0]
+
+
+def test_the_same_step_again_begins_with_the_parts_that_it_has_ended_with():
+    """Passes between blocks and cracks repeat a step: it is not sought again where faces touch."""
+    system, push = on_a_bed(), PointLoad(1, (FACE / 2 + 0.7, 1.0), History.constant([0.0, -THRUST]))
+    first = system.step(State.at_rest(system.blocks), Loads(point_loads=(push,)), 10.0)
+    again = system.step(State.at_rest(system.blocks), Loads(point_loads=(push,)), 10.0, like=first)
+    assert first.statistics["open_close_iterations"] > 3
+    assert again.statistics["open_close_iterations"] == 1
+    assert again.state.rotation == pytest.approx(first.state.rotation, rel=1e-3)
