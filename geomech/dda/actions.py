@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import BOLT, GROUND, Blocks, Loads, State
-from .assembly import Pattern
+from .assembly import Links, Pattern
 from .bolts import ROUNDS, BoltSet, check_bolts, labels
 from .contacts import ContactSet
 from .force_rows import POINT_FORCE
@@ -142,8 +142,8 @@ class StepActions:
                 return settled
         raise self.bolts.unsettled()
 
-    def _links(self, pattern: Pattern, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Flat places and numbers of the blocks ``across`` (n, 6, 6) between the two ends of every bolt, and their transposes."""
+    def _links(self, pattern: Pattern, across: np.ndarray) -> Links:
+        """The blocks ``across`` (n, 6, 6) between the two ends of every bolt, and their transposes."""
         pairs, n = self.bolts.pairs, len(self.bolts.number)
         row, column = self.order[pairs.block], np.where(pairs.other == GROUND, -1, self.order[pairs.other])
         both = np.flatnonzero((row >= 0) & (column >= 0))
@@ -151,8 +151,12 @@ class StepActions:
         a, b = np.arange(6)[:, None], np.arange(6)
         upper = pattern.upper[at, None, None] + a * pattern.stride[row[both], None, None] + b
         lower = pattern.lower[at, None, None] + a * pattern.stride[column[both], None, None] + b
-        numbers = np.concatenate([across[both], across[both].transpose(0, 2, 1)])
-        return np.concatenate([upper, lower]).ravel(), numbers.ravel()
+        return Links(
+            row=np.concatenate([row[both], column[both]]),
+            column=np.concatenate([column[both], row[both]]),
+            places=np.concatenate([upper, lower]),
+            blocks=np.concatenate([across[both], across[both].transpose(0, 2, 1)]),
+        )
 
     # -- after ---------------------------------------------------------------------------------------------------------
 

@@ -19,11 +19,22 @@ DENSE_BLOCKS = 60
 
 
 @dataclass(frozen=True, eq=False)
+class Links:
+    """What links blocks besides contacts: ``blocks`` (k, 6, 6) of the matrix at ``row`` and ``column`` (k,) of its 6×6 blocks,
+    which stand at ``places`` (k, 6, 6) of the flat matrix."""
+
+    row: np.ndarray
+    column: np.ndarray
+    places: np.ndarray
+    blocks: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Pattern:
     """Where each 6×6 block stands in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
 
     ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. ``solver`` is None for a dense matrix. ``links``
-    are flat places and the numbers that what links blocks besides contacts adds there, None without.
+    are those that other things than contacts make, None without.
     """
 
     n: int
@@ -34,12 +45,20 @@ class Pattern:
     lower: np.ndarray
     size: int
     solver: BlockSolver | None = None
-    links: tuple[np.ndarray, np.ndarray] | None = None
+    links: Links | None = None
 
     def add_links(self, data: np.ndarray) -> None:
         """Add them to an assembled matrix."""
         if self.links is not None:
-            np.add.at(data, *self.links)
+            np.add.at(data, self.links.places, self.links.blocks)
+
+    def without_contacts(self, matrix: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+        """(n, 6) the product of the blocks' own ``matrix`` (n, 6, 6) and of the links with ``unknowns`` (6 n,)."""
+        rows = unknowns.reshape(-1, 6)
+        out = np.einsum("bij,bj->bi", matrix, rows)
+        if self.links is not None:
+            np.add.at(out, self.links.row, np.einsum("kij,kj->ki", self.links.blocks, rows[self.links.column]))
+        return out
 
 
 def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pattern:

@@ -240,7 +240,7 @@ class CentralPath:
         pattern, kn, ks, mu, rough, unit = self._pattern, self._kn, self._ks, self._mu, self._rough, self._unit
         normal, width, (back, ahead), (above, below) = self._normal, self._width, self._slip, self._left()
         epsilon = float(self._products(normal, width, back, ahead, above, below).sum()) / float((1 + 2 * rough).sum())
-        residual = (self._right - np.einsum("bij,bj->bi", self._matrix, self._unknowns.reshape(-1, 6))).ravel()
+        residual = (self._right - pattern.without_contacts(self._matrix, self._unknowns)).ravel()
         add_forces(residual, *self._at, normal, self._shear)
         kn_held, ks_held, gap_held, before_held = self._bonds
         moved_held = contact_states.moved(self._unknowns, *self._held_at)

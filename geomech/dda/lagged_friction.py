@@ -175,10 +175,9 @@ class LaggedFriction:
     def _way(self, step: np.ndarray, along: np.ndarray, strength: np.ndarray) -> float:
         """The part of ``step`` at which the energy is least: its slope along the way only grows."""
         rows = step.reshape(-1, 6)
-        curved = np.einsum("bi,bij,bj->", rows, self._matrix, rows)
-        start = np.einsum("bi,bij,bj->", rows, self._matrix, self._motion.reshape(-1, 6)) - float(
-            (rows * self._right).sum()
-        )
+        turned = self._pattern.without_contacts(self._matrix, step)
+        curved = float((rows * turned).sum())
+        start = float((turned * self._motion.reshape(-1, 6)).sum() - (rows * self._right).sum())
 
         gap, trial = self._forces(self._contact_motion)
         springs, found = self._springs, self._found

@@ -157,7 +157,7 @@ class RoundedLaws:
         )
 
     def _residual(self, unknowns: np.ndarray, normal: np.ndarray, shear: np.ndarray) -> np.ndarray:
-        residual = self._right - np.einsum("bij,bj->bi", self._matrix, unknowns.reshape(-1, 6)).ravel()
+        residual = self._right - self._pattern.without_contacts(self._matrix, unknowns).ravel()
         add_forces(residual, *self._at, normal, shear)
         return residual
 

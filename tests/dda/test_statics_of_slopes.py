@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geomech import dda
 from geomech.bench import block_scenes
-from geomech.model import OPEN, JointLaw, State
+from geomech.model import OPEN, Bolt, JointLaw, State
 
 
 @pytest.mark.parametrize(
@@ -38,3 +39,25 @@ def test_weight_put_on_at_once_is_carried_by_way_of_the_central_path(n, law, mos
     largest = 1e-8 * loose["normal_force"].max()
     assert len(loose) and (loose["normal_force"] > -largest).all()
     assert (np.abs(loose["shear_force"]) <= math.tan(block_scenes.FRICTION) * loose["normal_force"] + largest).all()
+
+
+def test_stiff_bolts_between_blocks_take_no_more_iterations_than_none():
+    # Bars as stiff as the blocks: equations whose balance leaves out what one end does to the other do not settle without cuts.
+    blocks = block_scenes.slope(200)
+    centre = np.array([part.mean(axis=0) for part in np.split(blocks.vertices, blocks.vertex_start[1:-1])])
+    free = np.flatnonzero(~np.asarray(blocks.fixed))
+    down = 3.0 * np.array([math.cos(math.radians(20)), -math.sin(math.radians(20))])
+    ends = [(i, int(np.linalg.norm(centre - centre[i] - down, axis=1).argmin())) for i in free[::9]]
+    bars = tuple(
+        Bolt(int(i), tuple(centre[i]), j, tuple(centre[j]), stiffness=1e11, compression=True, name=f"bar {i}")
+        for i, j in ends
+        if j != i
+    )
+    system = dda.BlockSystem(
+        blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01, dynamic=False)
+    )
+    result = system.step(State.at_rest(blocks), replace(block_scenes.WEIGHT, bolts=bars))
+    iterations = result.statistics["open_close_iterations"]
+    print(f"{len(bars)} bars: {iterations} iterations")
+    assert result.statistics["step_cuts"] == 0 and result.statistics["unbalanced"] < 1e-8
+    assert iterations <= 30
