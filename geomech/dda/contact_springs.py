@@ -102,18 +102,27 @@ class Springs:
 
 
 def penalties(
-    block: np.ndarray, other: np.ndarray, length: np.ndarray, modulus: np.ndarray, area: np.ndarray, fixed: np.ndarray
+    block: np.ndarray,
+    other: np.ndarray,
+    length: np.ndarray,
+    modulus: np.ndarray,
+    area: np.ndarray,
+    fixed: np.ndarray,
+    rigid: np.ndarray,
 ) -> np.ndarray:
     """(n,) Pa: penalty stiffness of contacts with tributary ``length`` (n,) m between ``block`` and ``other`` (n,); E'
-    ``modulus`` Pa, ``area`` m² and ``fixed`` (n_blocks,).
+    ``modulus`` Pa, ``area`` m², ``fixed`` and ``rigid`` (n_blocks,).
 
-    `PENALTY_RATIO` times the E' of both (a fixed block does not give way: the other's) times the ratio of the face to the
+    `PENALTY_RATIO` times the E' of both (a block that is fixed or rigid does not give way: the other's, so that a platen has
+    the same springs whether it stands or is moved) times the ratio of the face to the
     block's depth behind it where that is above one, ≈ 4 ℓ²/A: the springs of a slab 1000 : 1 would otherwise give way by
     twelve times its own shortening, and so give way by the hundredth that those of a square do. The time step does not
     enter: walls settle as well at 10⁻³ as at 10⁶ times the time of a wave through a block, a stiffness bounded by m/dt²
     only penetrates more, and a force that is a stiffness times a gap would jump whenever a step is cut.
     """
-    hold, hold_other = fixed[block], fixed[other]
+    hold, hold_other = fixed[block] | rigid[block], fixed[other] | rigid[other]
+    neither = hold & hold_other
+    hold, hold_other = np.where(neither, fixed[block], hold), np.where(neither, fixed[other], hold_other)
     own = np.where(hold, modulus[other], modulus[block])
     theirs = np.where(hold_other, modulus[block], modulus[other])
     both = np.minimum(np.sqrt(own * theirs), _MOST_CONTRAST * np.minimum(own, theirs))

@@ -185,6 +185,7 @@ class ContactFinder:
         self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
+        self._rigid = rigid
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
@@ -298,7 +299,7 @@ class ContactFinder:
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
         if kn is None:
-            normal = penalties(block, other, length, self._modulus, self._area, self._fixed)
+            normal = penalties(block, other, length, self._modulus, self._area, self._fixed, self._rigid)
         else:
             normal = np.full(len(block), float(kn))
         return contact_springs(

@@ -86,6 +86,22 @@ def test_springs_between_unlike_blocks(contrast):
         assert result.statistics["unbalanced_ratio"] < 1e-14 * max(contrast, 100.0)
 
 
+def test_a_platen_has_the_same_springs_fixed_or_rigid_and_moved():
+    found = []
+    for fixed, rigid in ((True, False), (False, True)):
+        blocks = Blocks.from_polygons(
+            [rectangle(-5, -1, 6, 0), rectangle(0, 0, 1, 1)], fixed=[fixed, False], material=[0, 1]
+        )
+        steel, rock = (
+            Material("steel", 200e9, 0.3, density=7800.0, rigid=rigid),
+            Material("rock", 10e9, 0.2, density=2600.0),
+        )
+        system = dda.BlockSystem(blocks, [steel, rock])
+        found.append(system.contacts_near(State.at_rest(blocks)).springs.normal)
+    assert len(found[0]) == 2 and found[0] == pytest.approx(40 * rock.plane_modulus, rel=1e-12)
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+
+
 @pytest.mark.parametrize(("dynamic", "dt"), [(1.0, 1e-2), (1.0, 1e-3), (0.0, 10.0)])
 def test_walls_of_two_rocks_settle(dynamic, dt):
     # By the stiffer block's E' alone most of these are cut again and again, and the static one fails.
