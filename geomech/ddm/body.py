@@ -158,13 +158,7 @@ class Body:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""
         if self.outlined:
             raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
-        cracks = self.cracks
-
-        def name(node: int) -> str:
-            k = int(cracks.crack[np.argmax((cracks.segments == node).any(axis=1))])
-            return repr(cracks.names[k]) if k < len(cracks.names) else f"crack {k}"
-
-        self.half_plane.check_inside(self.loops, cracks.nodes, name)
+        self.half_plane.check_inside(self.loops, self.cracks)
         return np.concatenate(
             [edges, self.half_plane.edge(np.concatenate([*self.loops, cracks.nodes, np.empty((0, 2))]))]
         )

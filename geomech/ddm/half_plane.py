@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from ..model import Cracks
 
 #: A stress that a load brings to the surface is no load it bears when it is larger than this part of the load.
 _BORNE = 1e-9
@@ -98,9 +102,9 @@ class HalfPlane:
         if gradient.any():
             raise ValueError("body_force_gradient: in a half-plane a body force is uniform")
 
-    def check_inside(self, loops: Sequence[np.ndarray], nodes: np.ndarray, name: Callable[[int], str]) -> None:
-        """Raise ValueError when a hole among ``loops`` or one of the crack ``nodes`` (n, 2), of the crack called ``name(k)``, is not
-        in the rock."""
+    def check_inside(self, loops: Sequence[np.ndarray], cracks: Cracks) -> None:
+        """Raise ValueError naming the hole among ``loops``, or the crack, that is not in the rock."""
+        nodes = cracks.nodes
         points = np.concatenate([*loops, nodes, np.empty((0, 2))])
         if not len(points):
             return
@@ -110,8 +114,8 @@ class HalfPlane:
                 raise ValueError(
                     f"hole {k}: reaches the free surface of the half-plane; draw what is open to it as an outline"
                 )
-        for k in np.flatnonzero(self.frame(nodes)[:, 1] > near)[:1] if len(nodes) else ():
-            x, y = nodes[k]
-            raise ValueError(
-                f"{name(int(k))}: ({x:g}, {y:g}) lies outside the rock, above the surface of the half-plane"
-            )
+        for node in np.flatnonzero(self.frame(nodes)[:, 1] > near)[:1] if len(nodes) else ():
+            k = int(cracks.crack[np.argmax((cracks.segments == node).any(axis=1))])
+            name = repr(cracks.names[k]) if k < len(cracks.names) else f"crack {k}"
+            x, y = nodes[node]
+            raise ValueError(f"{name}: ({x:g}, {y:g}) lies outside the rock, above the surface of the half-plane")

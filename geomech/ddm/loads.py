@@ -48,13 +48,14 @@ class BodyLoad:
 
     segments             (m, 2, 2)  straight pieces of the boundary, anywhere on it, directed along it
     tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear between
-    body_force           (2,)       N/m³ at ``about``
+    body_force           (2,)       N/m³ at ``about``; in a half-plane, where it makes stress grow with depth, everywhere
     body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
     about                (2,)       m; the centroid when left out
     k0                   in a half-plane, the stress along its surface that goes with the body force, per stress out of
                          it; left out, ν/(1−ν), that of rock that could not widen
     remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
-                                    that carry it act on the outline in addition to ``tractions``. Holes are free of it
+                                    that carry it act on the outline in addition to ``tractions``. Holes are free of it.
+                                    In a half-plane it must be parallel to the surface
     crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a `Pressure`,
                          or a function of points (n, 2) to (n,)
     hole_pressure        the same in all holes, or of each: a number, Pa, or a `Pressure`

@@ -195,7 +195,7 @@ class Solution:
     def stress(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
 
-        On a boundary it is the rock's, on a crack that of the upper face (left of its segment), or the lower with ``side``
+        Above the surface of a half-plane there is none: zero. On a boundary it is the rock's, on a crack that of the upper face (left of its segment), or the lower with ``side``
         −1. At crack tips it is that a fiftieth of the element's length beside, and so it is nearer than that to other
         ends of elements (corners, crack nodes): the discrete field has no value there.
         """
@@ -211,7 +211,7 @@ class Solution:
     def displacement(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
         """(n, 2) displacement at ``points`` (n, 2), m, on cracks that of the face on ``side``. What no support holds of
         the mean displacement and mean rotation of the outline is zero; in the infinite plane cracks add to the uniform
-        strain about the origin."""
+        strain about the origin, in a half-plane to that of whole ground about the surface's point."""
         return self.fields(points, side)[1]
 
     def fields(self, points: np.ndarray, side: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
