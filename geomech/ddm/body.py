@@ -99,7 +99,7 @@ class Body:
         if half_plane is not None:
             edges = self._in_half_plane(edges)
         check_cracks(cracks, edges, self.loops, _fresh(cracks, previous if same else None))
-        points = np.concatenate([*self.loops, cracks.nodes, np.empty((0, 2))])
+        points = self._vertices
         self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
         self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
         marked: list[tuple[np.ndarray, int]] = []
@@ -159,24 +159,26 @@ class Body:
         if self.outlined:
             raise ValueError("half_plane: the body has an outline; a half-plane has none but its surface")
         self.half_plane.check_inside(self.loops, self.cracks)
-        return np.concatenate(
-            [edges, self.half_plane.edge(np.concatenate([*self.loops, cracks.nodes, np.empty((0, 2))]))]
-        )
+        return np.concatenate([edges, self.half_plane.edge(self._vertices)])
+
+    @property
+    def _vertices(self) -> np.ndarray:
+        """(n, 2) of the loops and of the cracks."""
+        return np.concatenate([*self.loops, self.cracks.nodes, np.empty((0, 2))])
 
     @property
     def limits(self) -> list[np.ndarray]:
         """Loops about what is not rock, that above a free surface included, and the outline."""
         if self.half_plane is None:
             return self.loops
-        return [*self.loops, self.half_plane.sky(np.concatenate([*self.loops, self.cracks.nodes, np.empty((0, 2))]))]
+        return [*self.loops, self.half_plane.sky(self._vertices)]
 
     @property
     def sides(self) -> np.ndarray:
         """(m, 2, 2) edges of the loops and, of a free surface, the piece that is in sight."""
         if self.half_plane is None:
             return self.mesh.edges
-        points = np.concatenate([*self.loops, self.cracks.nodes, np.empty((0, 2))])
-        return np.concatenate([self.mesh.edges, self.half_plane.edge(points)])
+        return np.concatenate([self.mesh.edges, self.half_plane.edge(self._vertices)])
 
     def found_again(self, loops: list[np.ndarray], cracks: Cracks, material: Material) -> Body | None:
         """This body where ``loops``, ``cracks`` and ``material`` are its own, else None. What cracks and blocks are called
