@@ -10,15 +10,24 @@ from .. import dda, ddm
 
 @dataclass(frozen=True)
 class Reason:
-    """Errors of ``kind`` whose message has ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence."""
+    """Errors of ``kind`` whose message has ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence; ``drawn``: only before
+    anything has moved or grown."""
 
     name: str
     kind: type[Exception]
     pattern: str
     meaning: str
+    drawn: bool = False
 
 
 REASONS = (
+    Reason(
+        "sharp corner drawn",
+        ValueError,
+        r"meet at \(\S+, \S+\) at less than 10°|folds back on itself|leaves the boundary at \(\S+, \S+\) at less than 3°",
+        "cracks as cut meet each other or a surface too sharply to be resolved: they are named, with the place",
+        drawn=True,
+    ),
     Reason(
         "no rest in situ",
         dda.NoInSituEquilibrium,
@@ -64,9 +73,10 @@ REASONS = (
 )
 
 
-def reason_of(error: Exception) -> str | None:
-    """The name of the reason that ``error`` gives; None: it is none of `REASONS`."""
+def reason_of(error: Exception, begun: bool = True) -> str | None:
+    """The name of the reason that ``error`` gives, before or (``begun``) after the first cycle; None: it is none of `REASONS`."""
     for reason in REASONS:
-        if type(error) is reason.kind and re.search(reason.pattern, str(error)):
+        fits = type(error) is reason.kind and not (begun and reason.drawn)
+        if fits and re.search(reason.pattern, str(error)):
             return reason.name
     return None

@@ -67,7 +67,7 @@ class Invariants:
         self._tough = np.array([material.k_ic for material in problem.materials])
         self._bond = max(law.tensile_strength for law in problem.face_laws)
         self._stop_at = problem.run.stop_at
-        self._area = 0.0
+        self._time = self._area = 0.0
         self._strain = 0.0
         self._standing: tuple[int, float, str] | None = None
         # How many warnings there had been at the last cycle, and at the one before.
@@ -75,6 +75,9 @@ class Invariants:
 
     def check(self, cycle: Cycle) -> None:
         broken = [*_nowhere(cycle), *_strayed(cycle)]
+        if not cycle.state.time >= self._time:
+            broken.append(f"time goes back from {self._time:g} to {cycle.state.time:g} s")
+        self._time = cycle.state.time
         self.faults += [f"cycle {cycle.number}: {what}" for what in broken]
         if broken:
             return

@@ -104,6 +104,10 @@ class EventSteps:
             self.reached = abs(excess) <= SETTLED or (excess > 0 and search.width <= JUMP * abs(at))
             if self.reached or (excess < 0 and not (whole and (search.enclosed or (at < limit and k < OPEN)))):
                 break
+            if search.next <= start:
+                # Driven from the start on, by tips that growth has not brought to rest: the load does not go back for them.
+                self.reached = True
+                break
             aim = min(search.next, limit)
             whole = whole or not self._far(aim - start)
             if not whole:

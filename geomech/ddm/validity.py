@@ -205,7 +205,12 @@ def _check_folds(cracks: Cracks, new: np.ndarray, name) -> None:
     folded = np.sum(u * v, axis=1) > np.cos(SHARPEST_FOLD) * np.hypot(*u.T) * np.hypot(*v.T)
     for k in np.flatnonzero(folded)[:1]:
         x, y = node[k]
-        raise ValueError(f"{name(one[k] // 2)}: folds back on itself at ({x:g}, {y:g}), by more than 170°")
+        first, second = name(one[k] // 2), name(two[k] // 2)
+        if first != second:
+            raise ValueError(
+                f"{first} and {second} meet at ({x:g}, {y:g}) at less than 10°: end one of them before the other, or draw one crack"
+            )
+        raise ValueError(f"{first}: folds back on itself at ({x:g}, {y:g}), by more than 170°")
 
 
 def _to_pairs(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
