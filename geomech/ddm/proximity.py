@@ -137,8 +137,11 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
     too thin for that: it would take too many elements, or shorter ones than coordinates can tell apart.
     """
     # A graded element is 1/ratio times its distance to the next but one.
-    chained, meeting = max(2.5, 1.05 / ratio), _meeting(pieces, touching, n_edges)
-    beside = np.inf if ratio >= FINE else LOW if unknowns <= 6 else 1.0
+    chained = max(2.5, 1.05 / ratio)
+    if ratio >= FINE:  # acute angles then ask for nothing besides
+        beside, meeting = np.inf, touching.astype(float)
+    else:
+        beside, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges)
     shortest = AT_NODE * np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     shortest[:n_edges] *= AT_BOUNDARY / AT_NODE
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
