@@ -10,10 +10,15 @@ way it turns, and after. So four quantities found apart from each other have to 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import Blocks, Material, State
+
+if TYPE_CHECKING:
+    from ..ddm import Solution
+    from .hanging import Hanging
 
 
 @dataclass(eq=False)
@@ -24,7 +29,8 @@ class CrackEnergy:
     stored     around cracks, now
     friction   rubbed off between crack faces
     fracture   released at tips that grew
-    parting    released as tips met something and blocks parted: the last ligaments, and what the cracks stored that are walls now
+    parting    released as tips met something and blocks parted: the last ligaments, and what the cracks stored that are walls now; and
+               as tips grew in blocks that hang (`hanging`), which spend less on it than ∫ G da under held forces
     residual   work − stored − friction − fracture − parting: of increments and steps, and since blocks feel their cracks' mean
                strain only
     """
@@ -37,12 +43,17 @@ class CrackEnergy:
     residual: float = 0.0
     _released: float = 0.0
     _parted: bool = False
+    _hanging: frozenset[int] = frozenset()
     _growing: dict[tuple[int, int], tuple[float, float]] = field(default_factory=dict)
 
-    def passed(self, tips: np.ndarray, blocks: Blocks, materials: tuple[Material, ...]) -> None:
-        """A pass of the present step has ended with ``tips``, of which some are about to grow, or none."""
+    def passed(self, tips: np.ndarray, blocks: Blocks, materials: tuple[Material, ...], hanging: Hanging) -> None:
+        """A pass of the present step has ended with ``tips``, of which some are about to grow, or none; some are in blocks ``hanging``."""
         if not len(tips) or not (self._growing or (tips["grown"] > 0).any()):
             return
+        hangs = np.array([block in hanging for block in tips["block"].tolist()])
+        if (hangs & (tips["grown"] > 0)).any():
+            self._parted = True
+        tips = tips[~hangs]
         modulus = np.array([m.plane_modulus for m in materials])[blocks.material[tips["block"]]]
         release = (tips["k_i"] ** 2 + tips["k_ii"] ** 2) / modulus
         keys = list(zip(tips["crack"].tolist(), tips["end"].tolist()))
@@ -62,13 +73,20 @@ class CrackEnergy:
         """Blocks part in the present step."""
         self._parted = True
 
-    def after(self, before: State, state: State, blocks: Blocks, solutions: dict) -> None:
-        """The step from ``before`` to ``state`` has been taken, with the ``solutions`` (block → `ddm.Solution`) at its end."""
+    def after(
+        self, before: State, state: State, blocks: Blocks, felt: dict[int, tuple[float, Solution]], hanging: Hanging
+    ) -> None:
+        """The step from ``before`` to ``state`` has been taken; ``felt`` at its end is block → (share, `ddm.Solution`), what blocks are strained by;
+        ``hanging`` are those that feel no more than their mean stress."""
         strain = state.crack_strain - before.crack_strain
         mean = 0.5 * (before.stress + state.stress)
         work = float(blocks.areas(before.vertices) @ np.sum(mean * strain, axis=1))
-        stored = sum(solution.crack_energy for solution in solutions.values())
-        friction = sum(solution.frictional_work for solution in solutions.values())
+        stored = sum(share * solution.crack_energy for share, solution in felt.values())
+        friction = sum(share * solution.frictional_work for share, solution in felt.values())
+        now_hang = frozenset(block for block in felt if block in hanging)
+        # What a block stored that begins to hang, or is whole no more, was of another kind.
+        self._parted |= now_hang != self._hanging
+        self._hanging = now_hang
         rest = work - (stored - self.stored) - (friction - self.friction) - self._released
         self.work += work
         self.fracture += self._released

@@ -84,6 +84,17 @@ class CrackedBlocks:
                 bodies, loads, warm, self.history, self.solved_from, self.problem.run.skip, self.blocks.names
             )
 
+    def felt(self) -> dict:
+        """block → (share, solution) that the strain of its cracks is from, in the last pass."""
+        return {block: self._felt(block, solution) for block, solution in self.solutions.items()}
+
+    def _felt(self, block: int, solution):
+        if block not in self.hanging or block not in self.hanging.solutions:
+            return 1.0, solution
+        answer = self.hanging.solutions[block]
+        # (Bodies may have grown since.)
+        return self.hanging.share(block, answer.body, self.system.compliance[block]), answer
+
     # -- changes of the blocks -----------------------------------------------------------------------------------------
 
     def _take_blocks(self, parent: np.ndarray | None = None) -> None:

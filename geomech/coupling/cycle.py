@@ -189,9 +189,9 @@ class Coupling:
             budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
             if now.bodies:
-                now.crack_energy.passed(tips, now.blocks, now.problem.materials)
+                now.crack_energy.passed(tips, now.blocks, now.problem.materials, now.hanging)
                 if ends or parts:
-                    now.crack_energy.after(now.state, result.state, now.blocks, solutions)
+                    now.crack_energy.after(now.state, result.state, now.blocks, now.felt(), now.hanging)
                 statistics |= now.crack_energy.statistics()
             if self.tips is not None and len(tips):
                 statistics["fastest_tip"] = self.tips.speed.fastest(result.dt)
