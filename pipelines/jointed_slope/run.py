@@ -9,7 +9,7 @@ from pathlib import Path
 from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_jointed_slope import Slide, draw, report
+from compare_jointed_slope import Slide, check, draw, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
@@ -19,4 +19,5 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
         draw(slide, place / "jointed_slope.png")
         if not quiet:
             print("\n" + text)
+        check(slide)
     return 0
