@@ -1,0 +1,72 @@
+"""The command line: ``geomech check | build | run | resume | safety | render | report | bench | doctor``.
+
+Exit codes: 0 done, 1 the run failed (what was written stays readable), 2 bad input, 3 interrupted (Ctrl-C or SIGTERM).
+Each verb is a module: ``declare`` says its arguments, and nothing heavy is imported before the verb is asked for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+from .. import __version__
+from . import bench, build, check, doctor, render, report, resume, run, safety
+from .scenes import default_folder
+from .telling import say, say_errors
+from .verb import BAD_INPUT, DONE, FAILED, INTERRUPTED, BadInput
+
+__all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "default_folder", "main"]
+
+# The matrices of a specimen are small: a second BLAS thread gains them nothing, and costs tens of times their own time
+# when the machine is busy. Set before numpy is loaded; whoever wants more says so in the environment.
+for _library in ("OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+#: In the order of the help.
+VERBS = (check, build, run, resume, safety, render, report, bench, doctor)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code. ``arguments`` defaults to the process's own."""
+    options = _parser().parse_args(arguments)
+    verb: Callable[[argparse.Namespace], int] = options.verb
+    try:
+        return verb(options)
+    except KeyboardInterrupt:
+        say("interrupted")
+        return INTERRUPTED
+    except Exception as error:
+        if _is_bad_input(error):
+            say_errors(error)
+            return BAD_INPUT
+        if options.debug:
+            raise
+        if isinstance(error, OSError) and error.filename:
+            say(f"geomech: {error.filename}: {(error.strerror or type(error).__name__).lower()}")
+            return FAILED
+        say(f"geomech: {type(error).__name__}: {error}\n(run it again with --debug before the verb for the traceback)")
+        return FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="geomech",
+        description="How a jointed, cracked rock mass comes apart: blocks that move (DDA), cracks that grow (DDM).",
+        epilog="exit codes: 0 done, 1 failed run, 2 bad input, 3 interrupted",
+    )
+    parser.add_argument("--version", action="version", version=f"geomech {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of a failure")
+    verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
+    for verb in VERBS:
+        verb.declare(verbs)
+    return parser
+
+
+def _is_bad_input(error: Exception) -> bool:
+    if isinstance(error, BadInput):
+        return True
+    # The scene package is only asked when it has been imported: no other part raises its error.
+    scene = sys.modules.get("geomech.scene")
+    return scene is not None and isinstance(error, getattr(scene, "SceneError", ()))

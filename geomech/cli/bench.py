@@ -1,0 +1,70 @@
+"""``geomech bench``: what things cost and how right they are, now and against figures of before."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..bench import TOPICS, topic
+from .verb import DONE, FAILED, BadInput, Verbs, add_verb
+
+
+def declare(verbs: Verbs) -> None:
+    bench = add_verb(
+        verbs, "bench", _bench, "measure what things cost and how right they are (run it in the project's folder)",
+        "geomech bench startup\ngeomech bench --quick --out before.json\ngeomech bench --quick --against before.json",
+    )  # fmt: skip
+    bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(TOPICS)} (default: all)")
+    bench.add_argument("--quick", action="store_true", help="fewer repetitions, nothing compiled anew")
+    bench.add_argument(
+        "--out", type=Path, metavar="FILE", help="where the figures go, JSON (default outputs/bench/figures.json)"
+    )
+    bench.add_argument(
+        "--against", type=Path, metavar="FILE", help="figures of an earlier run: say what got slower or less accurate"
+    )
+    bench.add_argument(
+        "--seeds", metavar="FIRST-LAST",
+        help="of slopes: run these, one on each core, and leave rows and a picture in outputs/bench_slopes; seeds that have been "
+        "run before, by the same program, are not run again",
+    )  # fmt: skip
+
+
+def _bench(options: argparse.Namespace) -> int:
+    unknown = [name for name in options.topics if name not in TOPICS]
+    if unknown:
+        raise BadInput(f"no benchmark {', '.join(unknown)}; there are {', '.join(TOPICS)}")
+    from ..bench import figures
+
+    try:
+        before = figures.read(options.against) if options.against else None
+    except (OSError, ValueError) as error:
+        raise BadInput(f"--against: {error}") from error
+    seeds = _seeds(options)
+    unit, found = figures.yardstick(), {}
+    print(figures.said(figures.machine()), end="\n\n")
+    for name in options.topics or TOPICS:
+        if name == "slopes" and seeds:
+            from ..bench.fuzzed_slopes import measure_many
+
+            found[name] = measure_many(seeds)
+        else:
+            found[name] = topic(name)(options.quick)
+        print(found[name].text, end="\n\n", flush=True)
+    print(figures.write(options.out or Path("outputs/bench/figures.json"), found, quick=options.quick, unit=unit))
+    if before is None:
+        return DONE
+    changes = figures.changes(before, found, unit)
+    print(figures.compared(changes, before, options.against))
+    return FAILED if figures.less_accurate(changes) else DONE
+
+
+def _seeds(options: argparse.Namespace) -> range:
+    """The seeds of slopes that are asked for; none: the benchmark's own."""
+    if options.seeds is None:
+        return range(0)
+    if "slopes" not in options.topics:
+        raise BadInput("--seeds belongs to slopes: geomech bench slopes --seeds 0-299")
+    first, _, last = options.seeds.partition("-")
+    if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
+        raise BadInput(f"--seeds takes two numbers that ascend, as 0-299, not {options.seeds!r}")
+    return range(int(first), int(last or first) + 1)

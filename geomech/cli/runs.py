@@ -1,0 +1,30 @@
+"""Run folders that a command line names, or that lie below what it names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .verb import BadInput
+
+if TYPE_CHECKING:
+    from ..output import Run
+
+
+def run_folders(place: Path) -> list[Path]:
+    """``place`` itself where it is a run folder (or nothing that could hold one), else all below it."""
+    if (place / "history.csv").is_file() or not place.is_dir():
+        return [place]
+    return sorted(found.parent for found in place.rglob("history.csv")) or [place]
+
+
+def open_run(folder: Path) -> Run:
+    """The run in ``folder``; where there is none, BadInput that names those below it."""
+    from ..output import Run
+
+    try:
+        return Run(folder)
+    except FileNotFoundError as error:
+        below = [str(found) for found in run_folders(folder) if found != folder]
+        listed = ", ".join(below[:12]) + (f" and {len(below) - 12} more" if len(below) > 12 else "")
+        raise BadInput(f"{error}" + (f"; runs below it: {listed}" if below else "")) from None
