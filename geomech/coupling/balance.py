@@ -78,7 +78,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None) -> tuple[Bal
     static = now.problem.dda.dynamic_factor == 0.0
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     asked, response = dt, now.response
-    result, iterations = None, 0
+    result, iterations, tried_whole = None, 0, False
     for attempt in range(COMPLIANCE_PASSES):
         with now.timed("dda"):
             result = now.system.step(now.state, now.problem.loads, dt, response, load_time, result)
@@ -95,7 +95,10 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None) -> tuple[Bal
         response, differences = _take_response(now, result.state, settling, tolerance)
         mismatch = float(differences.max())
         if mismatch < tolerance:
-            break
+            if not static or dt == asked or tried_whole:
+                break
+            # What cut a static step short may have been a strain that the first passes assumed.
+            dt, tried_whole = asked, True
         chasing = np.array(list(now.solutions), int)[differences > NO_ANSWER]
         if attempt + 1 == PATIENCE and len(chasing):
             for block in chasing.tolist():
