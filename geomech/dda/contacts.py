@@ -282,6 +282,8 @@ class ContactFinder:
                 )
                 for owner in (block, other)
             )  # fmt: skip
+            # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold it.
+            give[self._rigid[block[ends[:, 0]]] | self._rigid[other[ends[:, 0]]]] = 0.0
             own = 2.0 / (springs.normal[ends[:, 0]] * length**2)
             return np.sqrt(own / np.maximum(own, give))
 
