@@ -6,7 +6,7 @@ import difflib
 import fnmatch
 
 from ..model import WEIGHT
-from ..shapes.gmsh_model import CRACK
+from ..shapes.gmsh_drawing import CRACK
 from ..shapes.parts import JOINT
 from .drawing import Drawing
 from .errors import Check

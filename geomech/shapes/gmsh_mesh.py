@@ -7,20 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
+from .gmsh_drawing import CRACK, GmshDrawing, GmshModelError
 from .parts import JOINT, Joint, Mark, Trace, Zone, is_mark
 
 #: A node on a straight run is no corner: nodes leave the run by less than this part of its shorter neighbour edge.
 _STRAIGHT = 1e-9
 
 
-def drawing_of_mesh(gmsh, path: Path):
+def drawing_of_mesh(gmsh, path: Path) -> GmshDrawing:
     """The `GmshDrawing` of the mesh in Gmsh's current model; the mesh itself is not kept.
 
     Every entity of a physical surface is a zone, or several where it falls apart. Raises GmshModelError for meshes
     without physical surfaces or with outlines that touch themselves.
     """
-    from .gmsh_model import CRACK, GmshDrawing, GmshModelError
-
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     at = {int(tag): k for k, tag in enumerate(tags)}
     nodes = np.asarray(coordinates).reshape(-1, 3)
@@ -133,8 +132,6 @@ def _rim(elements: np.ndarray, nodes: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _loops(edges: list[tuple[int, int]], path: Path, entity: int, tags: np.ndarray) -> list[list[int]]:
-    from .gmsh_model import GmshModelError
-
     following: dict[int, int] = {}
     for a, b in edges:
         if a in following:
