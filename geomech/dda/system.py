@@ -5,31 +5,23 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from ..model import OPEN, STICK, Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
-from .actions import StepActions, felt_gravity
-from .augmented import settle_augmented
-from .contact_springs import Springs, end_of_step, over_a_step
+from .attempt import Attempt
 from .contacts import ContactFinder, ContactSet
-from .energy import StepEnergy, sliding, step_energies
 from .excavation import Excavations, until_next_event
-from .held import balanced, hold, with_rigid_motion
-from .imbalance import imbalance
-from .loads import AppliedForces, Inertia, LoadMap, generalised
+from .loads import LoadMap
 from .moments import block_moments
-from .open_close import Settled, Unsettled, settle
+from .open_close import Unsettled
 from .overlap import refuse_overlap
-from .rigid import mean_stress, with_rigid
+from .rigid import with_rigid
 from .step import CrackResponse, NotConverged, StepResult
 from .step_length import StepLength
-from .stopping import Stopped, dissipating, stop
-from .time_integration import TimeScheme, advance, assemble_blocks, turned
+from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, told_rows
-from .viscous_boundary import QuietEdges
 
 log = logging.getLogger(__name__)
 
@@ -39,8 +31,6 @@ _WINDOW = 2.2
 _BLOCK_SHARE = 0.1
 #: Gaps below this many times the largest coordinate, its round-off, decide nothing.
 _SLACK = 5e-16
-#: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
-_PLACED = 20
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
 
@@ -51,6 +41,12 @@ class BlockSystem:
     ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
     means that such edges do not touch; without it the first law holds everywhere. Contact springs are
     ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks (`penalties`).
+
+    What every `Attempt` at a step reads is made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and ``compliance``
+    (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of contacts and the ``load_map``;
+    and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving`` (indices), which of them ``turns``, and ``free``, the
+    number of a block among those that move, −1 for the others. ``allowed_penetration`` (m) is zero where penalty springs
+    hold alone.
 
     Raises ValueError when materials or joints are missing or a block has no area.
     """
@@ -70,40 +66,40 @@ class BlockSystem:
         self.joints = tuple(joints) or (JointLaw("frictionless"),)
         self.settings = settings or DdaSettings()
         self.scheme = TimeScheme.of(self.settings)
-        self._load_map = LoadMap(blocks)
+        self.load_map = LoadMap(blocks)
         self._excavations = Excavations(blocks)
 
         of = np.asarray(blocks.material, dtype=int)
         self.density = np.array([m.density for m in self.materials])[of]
-        self._stiffness = np.ascontiguousarray(np.array([m.stiffness() for m in self.materials])[of])
+        self.stiffness = np.ascontiguousarray(np.array([m.stiffness() for m in self.materials])[of])
         self.compliance = np.ascontiguousarray(np.array([m.compliance() for m in self.materials])[of])
         modulus = np.array([m.plane_modulus for m in self.materials])[of]
         rigid = np.array([m.rigid for m in self.materials])[of]
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
-        self._finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid)
+        self.finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid)
         self._take_out(None, None)
-        rigid = rigid & ~self._fixed
-        self._rigid = np.flatnonzero(rigid)
+        rigid = rigid & ~self.fixed
+        self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
-        self._held = with_rigid(blocks.held, rigid)
+        self.held = with_rigid(blocks.held, rigid)
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
-        self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
+        self.vertex_start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
-        self._no_compliance = np.zeros((blocks.n_blocks, 3, 3))
-        self._no_offset = np.zeros((blocks.n_blocks, 3))
+        self.no_compliance = np.zeros((blocks.n_blocks, 3, 3))
+        self.no_offset = np.zeros((blocks.n_blocks, 3))
 
         vertices = blocks.vertices
         areas = blocks.areas()
         if (areas <= 0).any():
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
-        self._mass = self.density * areas
+        self.mass = self.density * areas
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
         self._slack = _SLACK * float(np.abs(vertices).max())
         self._limit = min(
             self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
         )
-        self._tolerance = self._allowed_penetration(float(np.sqrt(areas.min())))
+        self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
 
     def _allowed_penetration(self, size: float) -> float:
         """m, of the multipliers' mode; 0 where penalty springs hold alone."""
@@ -138,15 +134,15 @@ class BlockSystem:
     def _take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
         """Go on without the blocks ``removed`` (n_blocks,): they keep their place in all arrays, fixed and touching nothing;
         ``drained`` ones took the water with them."""
-        self._removed = removed
+        self.taken_out = removed
         fixed = self.blocks.fixed if removed is None else self.blocks.fixed | removed
-        self._fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
-        self._free = np.where(self._fixed, -1, np.cumsum(~self._fixed) - 1).astype(np.int64)
-        self._moving = np.flatnonzero(~self._fixed)
-        self._turns = ~self._fixed if self.blocks.held is None else ~(self._fixed | self.blocks.held[:, 2])
+        self.fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
+        self.free = np.where(self.fixed, -1, np.cumsum(~self.fixed) - 1).astype(np.int64)
+        self.moving = np.flatnonzero(~self.fixed)
+        self.turns = ~self.fixed if self.blocks.held is None else ~(self.fixed | self.blocks.held[:, 2])
         self._sparse: tuple[np.ndarray, assembly.Pattern] | None = None
-        self._finder.take_out(removed)
-        self._load_map.take_out(removed, drained)
+        self.finder.take_out(removed)
+        self.load_map.take_out(removed, drained)
 
     def step(
         self,
@@ -170,31 +166,30 @@ class BlockSystem:
         if not dt > 0:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
         removed = self.removed(loads, state.time)
-        if removed is not self._removed:
+        if removed is not self.taken_out:
             self._take_out(removed, self._excavations.drained(loads, state.time))
         if load_time is None:
             dt = until_next_event(loads, state.time, dt)
         vertices = np.ascontiguousarray(state.vertices)
         carried = self.settings.dynamic_factor * state.velocity
-        carried[self._fixed] = 0.0
-        moments = block_moments(vertices, self._next, self._start)
+        carried[self.fixed] = 0.0
+        moments = block_moments(vertices, self._next, self.vertex_start)
         if state.time == 0.0 and len(state.contacts) == 0:
             refuse_overlap(self.blocks, vertices, moments)
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
         limit = self._limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
-        found = self._finder.find(state, vertices, _WINDOW * limit)
+        found = self.finder.find(state, vertices, _WINDOW * limit)
         if like is not None:
             found = found.like(like.contacts)
         reason, before, broken = "", np.inf, np.zeros(0, np.int64)
         cuts = 0
         while True:
             try:
-                result, largest = self._attempt(
-                    state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
-                )
+                attempt = Attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time)
+                result, largest = attempt.result(), attempt.largest
             except Unsettled as failure:
-                reason = f"{failure}{self._finder.where(found, failure.contact)}"
+                reason = f"{failure}{self.finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
             else:
                 bonded = result.contacts["bonded"]
@@ -204,7 +199,7 @@ class BlockSystem:
                     # Corners that were left out, and springs that were moved, for the sake of a bond are back before it breaks.
                     broken = np.append(broken, found.vertex[lost] * len(vertices) + found.edge[lost])
                     holds = found.relies_on_glue and not unheld
-                    found = self._finder.find(state, vertices, _WINDOW * limit, holds, broken=broken)
+                    found = self.finder.find(state, vertices, _WINDOW * limit, holds, broken=broken)
                     continue
                 if largest <= 1.0001 * limit:
                     self._refuse_crushed(result.state)
@@ -214,7 +209,7 @@ class BlockSystem:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     limit = 1.1 * largest
-                    found = self._finder.find(state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken)
+                    found = self.finder.find(state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken)
                     continue
                 before = largest
                 shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
@@ -228,20 +223,20 @@ class BlockSystem:
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
-        return self._finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self._limit, lumped=True)
+        return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self._limit, lumped=True)
 
     def told(self, found: ContactSet, forces: ToldContacts) -> np.ndarray:
         """CONTACT rows of ``found``, those that ``forces`` tell of as these say: for a `State` whose next step begins so."""
-        if self._tolerance:
-            on_multiplier = self._finder.on_penalty(found)[0]
+        if self.allowed_penetration:
+            on_multiplier = self.finder.on_penalty(found)[0]
         else:
             on_multiplier = np.zeros(len(found), bool)
-        return told_rows(found, forces, self._finder.closure, on_multiplier)
+        return told_rows(found, forces, self.finder.closure, on_multiplier)
 
     def _refuse_unheld(self, loads: Loads, time: float) -> None:
         """In statics weight needs something to rest on: what falls for ever has no equilibrium."""
         holds = (
-            self._fixed.any() or self.blocks.held is not None or loads.edge_tractions or loads.point_loads
+            self.fixed.any() or self.blocks.held is not None or loads.edge_tractions or loads.point_loads
             or loads.block_motions or loads.point_motions or loads.bolts or loads.viscous_boundaries or loads.water
         )  # fmt: skip
         if self.scheme.static and not holds and loads.gravity.at(time).any():
@@ -251,7 +246,7 @@ class BlockSystem:
             )
 
     def _refuse_crushed(self, state: State) -> None:
-        area = block_moments(state.vertices, self._next, self._start)[:, 0]
+        area = block_moments(state.vertices, self._next, self.vertex_start)[:, 0]
         if not (area > 0).all():
             crushed = int(np.argmin(area > 0))
             name = self.blocks.names[crushed] if self.blocks.names else f"block {crushed}"
@@ -272,251 +267,24 @@ class BlockSystem:
         # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
         return min(dt, float(2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit))))
 
-    def _pattern(
+    def pattern_of(
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
     ) -> assembly.Pattern:
+        """Where the matrix of blocks that touch, ``block`` with ``other`` (n,), or are ``linked`` by bolts has entries, and its solver:
+        kept from step to step while the same blocks do."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
-        if int(self._free.max()) + 1 <= assembly.DENSE_BLOCKS:
-            return assembly.dense_pattern(self._free, block, other)
+        if int(self.free.max()) + 1 <= assembly.DENSE_BLOCKS:
+            return assembly.dense_pattern(self.free, block, other)
         pairs, pattern = np.stack([block, other]), None
         if self._sparse is not None:
             known, pattern = self._sparse
-            if pattern.order is self._free and np.array_equal(known, pairs):
+            if pattern.order is self.free and np.array_equal(known, pairs):
                 return pattern
         kept = None if pattern is None else pattern.solver
-        pattern = assembly.sparse_pattern(self._free, block, other, moments[:, 1:3], kept)
+        pattern = assembly.sparse_pattern(self.free, block, other, moments[:, 1:3], kept)
         self._sparse = pairs, pattern
         return pattern
-
-    def _over_the_step(self, found: ContactSet, dt: float):
-        """What acts over a step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs, curved laws."""
-        curved = self._finder.curved(found)
-        # Multipliers are forces at the end of the step.
-        weight = 1.0 if self._tolerance else self.scheme.weight
-        if weight != 1.0 and curved is not None:
-            # The lines of a law that is curved are those of the end of the step.
-            weight = np.full(len(found), weight)
-            weight[curved.rows] = 1.0
-        mass = np.where(self._fixed, np.inf, self._mass)
-        springs, gap = over_a_step(
-            found.springs, np.ascontiguousarray(found.gap), (found.state != OPEN) & (found.bonded > 0),
-            np.minimum(mass[found.block], mass[found.other]), weight, self.scheme.block_damping, dt,
-        )  # fmt: skip
-        return springs, gap, weight, curved
-
-    def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
-        def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray) -> Settled:
-            most = self.settings.max_open_close_iterations
-            return settle(pattern, matrix, right, contacts, vectors, stiff, start, self._slack, most, curved)
-
-        if not self._tolerance or not len(found):
-            if found.stretch.any():
-                found = replace(found, shear=found.shear - springs.shear * found.stretch)
-            return solve(found, springs, gap)
-        return settle_augmented(solve, found, springs, gap, self._finder.on_penalty(found), self._tolerance)
-
-    def _stopped(
-        self, found, settled, slid, velocity, moments, density, dt, pattern, matrix, vectors, turn, imposed
-    ) -> tuple[np.ndarray, float]:
-        """``velocity`` without the sliding that friction has stopped in the step, and the energy that this takes (J/m)."""
-        mass = np.where(self._fixed, np.inf, self._mass)
-        stopped = Stopped.of(found, settled, slid, velocity, moments[:, 1:3], mass, dt, self._slack)
-        if stopped is None:
-            return velocity, 0.0
-        try:
-            change = stop(stopped, pattern, matrix, vectors, found, settled, dt)
-        except np.linalg.LinAlgError as error:
-            raise Unsettled(str(error)) from error
-        if imposed is not None:
-            change = imposed.free_part(change, pattern.order)
-        rates = np.zeros_like(velocity)
-        rates[self._moving] = change[pattern.order[self._moving]] * (2.0 / dt)
-        rates[:, 2:] /= np.sqrt(moments[:, :1])
-        rates, lost = dissipating(turned(rates, turn), velocity, moments, density, self._fixed)
-        return velocity + rates, lost
-
-    def _real_springs(self, found: ContactSet, settled: Settled) -> tuple[np.ndarray, np.ndarray]:
-        """Contact springs that store energy, normal and shear: what multipliers hold does not."""
-        normal, shear = found.springs.normal, settled.springs.shear
-        if not self._tolerance:
-            return normal, shear
-        held = self._finder.on_penalty(found)
-        return np.where(held[0], 0.0, normal), np.where(held[1], 0.0, shear)
-
-    def _attempt(
-        self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time
-    ) -> tuple[StepResult, float]:
-        scheme = self.scheme
-        time = state.time + dt
-        acting = state.time + scheme.weight * dt if load_time is None else load_time
-        gravity = felt_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
-        points, edges = self._load_map.rows(loads, acting, vertices, state.rotation)
-        centroid = np.ascontiguousarray(moments[:, 1:3])
-        load = generalised(points, edges, centroid)
-        given = crack is not None
-        # Mass stays, whatever the strain does to the area.
-        density = self._mass / moments[:, 0]
-        static = scheme.static
-        begun, heavier = scheme.begun(carried, state.acceleration, dt)
-        compliance = np.ascontiguousarray(crack.compliance, dtype=float) if given else self._no_compliance
-        offset = np.ascontiguousarray(crack.offset, dtype=float) if given else self._no_offset
-        stress, crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
-        n_free, iterations = len(self._moving), 0
-        end = time if load_time is None else load_time
-        actions = StepActions.of(
-            self.blocks, self._fixed, loads, state, self._load_map, moments, self._free, self._removed, end
-        )
-        linked = None if actions is None else actions.linked
-        pattern = self._pattern(found.block, found.other, moments, linked) if n_free else None
-        order = self._free if pattern is None else pattern.order
-        matrix, right, tangent, stress0 = assemble_blocks(
-            order, moments, density, self._stiffness, self.compliance, begun, stress, crack_strain, given,
-            compliance, offset, gravity, load, dt, heavier, scheme.weight, scheme.block_damping, scheme.mass_damping,
-            scheme.stiffness_damping, n_free,
-        )  # fmt: skip
-        quiet = None
-        if loads.viscous_boundaries and not static and n_free:
-            middle = state.time + 0.5 * dt if load_time is None else load_time
-            quiet = QuietEdges.of(
-                loads.viscous_boundaries, self.blocks, vertices, middle, self.density, self._stiffness, self._fixed
-            )
-            quiet.assemble(matrix, right, order, moments, dt)
-        held = self._held
-        alone = static and self.blocks.n_blocks == 1 and n_free and actions is None
-        if alone and balanced(load[0], points, edges, self._mass[0] * gravity, moments[0]):
-            held = with_rigid_motion(held)
-        if actions is not None:
-            held = actions.held(held)
-        own = matrix, right
-        for _ in range(_PLACED):
-            if found.points is not None:
-                matrix, right = own[0].copy(), own[1].copy()
-            springs, gap, weight, curved = self._over_the_step(found, dt)
-            vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, moments)
-            if held is not None and n_free:
-                hold(held, matrix, right, vectors, found.block, found.other, order)
-            if not n_free:
-                zero = np.zeros(len(found))
-                settled = Settled(
-                    np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
-                )
-                unknowns = settled.unknowns
-            elif actions is None:
-                settled = self._settled(pattern, matrix, right, found, gap, vectors, springs, curved)
-                unknowns = settled.unknowns
-            else:
-                solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
-                settled, unknowns = actions.settle(pattern, matrix, right, vectors, found, gap, solve)
-            iterations += settled.iterations
-            better = found.misplaced(settled)
-            if better is None:
-                break
-            found = better.trying(found.rows(settled))
-        else:
-            raise Unsettled("faces do not settle on the part of them that touches")
-
-        increment = np.zeros((self.blocks.n_blocks, 6))
-        increment[self._moving] = unknowns[order[self._moving]]
-        increment[:, 2:] /= np.sqrt(moments[:, :1])
-        imposed = None if actions is None else actions.imposed
-        if imposed is not None:
-            increment += imposed.increment
-        new_vertices, velocity, new_stress, new_crack, largest = advance(
-            increment, carried, dt, static, vertices, self._start, moments, tangent, stress0, compliance, offset, given,
-            crack_strain, self._turns,
-        )  # fmt: skip
-        if quiet is not None:
-            absorbed = quiet.rows(increment, moments, dt)
-            edges = np.concatenate([edges, absorbed])
-            load = load + generalised(points[:0], absorbed, centroid)
-        acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
-        velocity, kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
-        if heavier != 1.0:
-            acceleration = 2.0 * heavier * (increment - begun * dt) / (dt * dt)
-        slid = sliding(vectors, settled.unknowns, order, found.block, found.other)
-        if actions is not None and n_free:
-            slid += actions.along
-        rubbed = 0.0
-        if imposed is not None:
-            imposed.correct_velocity(velocity)
-        if not static and n_free:
-            velocity, rubbed = self._stopped(
-                found, settled, slid, velocity, moments, density, dt, pattern, matrix, vectors, increment[:, 2], imposed
-            )
-        rows = found.rows(settled)
-        reaction, acting_right, largest_force, acted = None, right, 0.0, {}
-        if actions is not None:
-            points, reaction, acted = actions.acted(settled, unknowns, rows, points, new_vertices)
-            acting_right, largest_force = actions.with_bolt_forces(right), actions.largest_bolt_force
-            load = generalised(points, edges, centroid) + actions.work_forces(reaction, rows, centroid)
-        end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, weight)
-        energy = StepEnergy._make(
-            step_energies(
-                increment, state.velocity, carried, velocity, acceleration, dt, gravity, load, scheme.weight,
-                scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, density, moments, self._fixed, stress,
-                tangent, stress0, self.compliance, self._stiffness, found.state, settled.state, found.bonded, settled.bonded,
-                found.gap, settled.gap, settled.lifted, settled.slip, slid, settled.normal_force, found.shear,
-                settled.shear_force, end_shear, *self._real_springs(found, settled),
-                weight if isinstance(weight, np.ndarray) else np.full(len(found), weight), found.law, self._finder.closure,
-            ).tolist()
-        )  # fmt: skip
-        energy = energy._replace(friction=energy.friction + rubbed, scheme=energy.scheme - rubbed)
-        residual, ratio = imbalance(
-            matrix, acting_right, vectors, found.block, found.other, order, settled.unknowns, settled.normal_force,
-            settled.shear_force, acceleration, density, moments, gravity, load, largest_force,
-        )  # fmt: skip
-
-        if len(self._rigid):
-            new_stress[self._rigid] = mean_stress(
-                self._rigid, rows, load, moments, density, acceleration, carried[:, 2], increment[:, 2]
-            )
-        if scheme.mass_damping:
-            acceleration = acceleration + scheme.mass_damping / dt * increment
-        memory = rows
-        if scheme.weight != 1.0:
-            memory = rows.copy()
-            memory["shear_force"] = end_shear
-        if self._removed is not None:
-            new_stress[self._removed] = 0.0
-        inertia = Inertia(density, gravity, acceleration, carried[:, 2], self._fixed)
-        forces = AppliedForces(points, edges, centroid, moments[:, 0].copy(), inertia, reaction)
-        new_state = State(
-            time=time,
-            vertices=new_vertices,
-            velocity=velocity,
-            stress=new_stress,
-            rotation=state.rotation + increment[:, 2],
-            crack_strain=new_crack,
-            contacts=self._finder.carried(new_vertices, memory),
-            acceleration=kept,
-            bolts=state.bolts if actions is None else actions.memory,
-            imposed=state.imposed if imposed is None else imposed.totals,
-            removed=self._removed,
-        )
-        closed = settled.state != OPEN
-        statistics = {
-            "open_close_iterations": iterations,
-            "dt": dt,
-            "step_cuts": cuts,
-            "kinetic_energy": energy.kinetic,
-            "elastic_energy": energy.elastic,
-            "contact_energy": energy.contact,
-            "worst_penetration": _deepest(closed, found.gap, settled.gap),
-            "max_displacement_ratio": largest / self.half_height,
-            "unbalanced": residual,
-            "unbalanced_ratio": ratio,
-            **acted,
-        }
-        return StepResult(new_state, dt, rows, forces, acceleration, energy, statistics), largest
-
-
-def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
-    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them.
-
-    An open one whose vertex is behind its edge's line has a partner line that is not crossed: nothing penetrates there.
-    """
-    return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0
 
 
 def run(

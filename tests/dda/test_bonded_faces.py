@@ -161,7 +161,7 @@ def test_blocks_beside_one_another_on_one_line_are_faces_of_their_own():
     polygons += [np.array([[x, 0.0], [x + 1, 0], [x + 1, 1], [x, 1]]) for x in (0.0, 1.0, 2.5)]
     blocks = Blocks.from_polygons(polygons, fixed=[True] + [False] * 3)
     system = dda.BlockSystem(blocks, [Material("rock", 10e9, 0.0, density=2600.0)], [GLUE])
-    found = system._finder.find(State.at_rest(blocks), blocks.vertices, 0.01, lumped=True)
+    found = system.finder.find(State.at_rest(blocks), blocks.vertices, 0.01, lumped=True)
     faces = found.faces
     assert len(faces.length) == 4 and faces.length == pytest.approx(1.0)
     for k in range(4):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.dda import system
+from geomech.dda import attempt
 from geomech.dda.lagged_friction import LaggedFriction
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
@@ -21,8 +21,8 @@ def test_rounds_come_to_an_end_where_a_block_hangs_on_its_bonds(monkeypatch, gra
         asked.append(arguments)
         return true_settle(*arguments)
 
-    true_settle = system.settle
-    monkeypatch.setattr(system, "settle", settle)
+    true_settle = attempt.settle
+    monkeypatch.setattr(attempt, "settle", settle)
     roof = np.array([[-1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [-1.0, 2.0]])
     block = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     blocks = Blocks.from_polygons([roof, block], fixed=[True, False])

@@ -56,6 +56,6 @@ def test_results_are_the_same_with_pairs_kept_and_sought_every_time(monkeypatch)
     kept, one = states()
     monkeypatch.setattr(module, "_REACH", 1.0)
     anew, other = states()
-    assert kept._finder._near.searches < 0.7 * anew._finder._near.searches
+    assert kept.finder._near.searches < 0.7 * anew.finder._near.searches
     assert np.array_equal(one.vertices, other.vertices)
     assert np.array_equal(one.contacts, other.contacts)

@@ -1,0 +1,336 @@
+"""One step of a given length: the equations of blocks, the states of contacts in them, the motion, and what it took.
+
+`BlockSystem.step` attempts a step as long as it likes, and a shorter one where contacts do not settle or blocks move too far.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..model import OPEN, STICK, Loads, State
+from . import assembly
+from .actions import StepActions, felt_gravity
+from .augmented import settle_augmented
+from .contact_springs import Springs, end_of_step, over_a_step
+from .contacts import ContactSet
+from .energy import StepEnergy, sliding, step_energies
+from .held import balanced, hold, with_rigid_motion
+from .imbalance import imbalance
+from .loads import AppliedForces, Inertia, generalised
+from .open_close import Settled, Unsettled, settle
+from .rigid import mean_stress
+from .step import CrackResponse, StepResult
+from .stopping import Stopped, dissipating, stop
+from .time_integration import advance, assemble_blocks, turned
+from .viscous_boundary import QuietEdges
+
+if TYPE_CHECKING:
+    from .system import BlockSystem
+
+#: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
+_PLACED = 20
+
+
+class Attempt:
+    """A step of ``system`` by ``dt`` from ``state`` with the contacts ``found``; ``cuts`` steps were attempted in vain before.
+
+    ``carried`` (n_blocks, 6) is the velocity that the step begins with, ``moments`` those of the blocks of ``vertices``. Raises
+    `Unsettled` where contacts find no states.
+    """
+
+    def __init__(
+        self,
+        system: BlockSystem,
+        state: State,
+        vertices: np.ndarray,
+        carried: np.ndarray,
+        moments: np.ndarray,
+        loads: Loads,
+        dt: float,
+        crack: CrackResponse | None,
+        found: ContactSet,
+        cuts: int,
+        load_time: float | None,
+    ) -> None:
+        self.system, self.state, self.vertices, self.carried, self.moments = system, state, vertices, carried, moments
+        self.dt, self.found, self.cuts = dt, found, cuts
+        self.time = state.time + dt
+        self.centroid = np.ascontiguousarray(moments[:, 1:3])
+        # Mass stays, whatever the strain does to the area.
+        self.density = system.mass / moments[:, 0]
+        self.given = crack is not None
+        self.crack_compliance = (
+            np.ascontiguousarray(crack.compliance, dtype=float) if self.given else system.no_compliance
+        )
+        self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
+        self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
+        self._act(loads, load_time)
+        self._assemble()
+        self._absorb(loads, load_time)
+        self._settle()
+        self._move()
+
+    def _act(self, loads: Loads, load_time: float | None) -> None:
+        """Forces, imposed motion and bolts of this step."""
+        system, state, scheme, dt = self.system, self.state, self.system.scheme, self.dt
+        acting = state.time + scheme.weight * dt if load_time is None else load_time
+        self.gravity = felt_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
+        self.points, self.edges = system.load_map.rows(loads, acting, self.vertices, state.rotation)
+        self.load = generalised(self.points, self.edges, self.centroid)
+        end = self.time if load_time is None else load_time
+        self.actions = StepActions.of(
+            system.blocks, system.fixed, loads, state, system.load_map, self.moments, system.free, system.taken_out, end
+        )
+
+    def _assemble(self) -> None:
+        """The equations of blocks without their contacts."""
+        system, scheme, found, dt = self.system, self.system.scheme, self.found, self.dt
+        self.begun, self.heavier = scheme.begun(self.carried, self.state.acceleration, dt)
+        self.n_free = len(system.moving)
+        linked = None if self.actions is None else self.actions.linked
+        self.pattern = system.pattern_of(found.block, found.other, self.moments, linked) if self.n_free else None
+        self.order = system.free if self.pattern is None else self.pattern.order
+        self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
+            self.order, self.moments, self.density, system.stiffness, system.compliance, self.begun, self.stress,
+            self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt, self.heavier,
+            scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.n_free,
+        )  # fmt: skip
+
+    def _absorb(self, loads: Loads, load_time: float | None) -> None:
+        """Add what viscous boundaries do."""
+        system, state = self.system, self.state
+        self.quiet = None
+        if loads.viscous_boundaries and not system.scheme.static and self.n_free:
+            middle = state.time + 0.5 * self.dt if load_time is None else load_time
+            self.quiet = QuietEdges.of(
+                loads.viscous_boundaries, system.blocks, self.vertices, middle, system.density, system.stiffness,
+                system.fixed,
+            )  # fmt: skip
+            self.quiet.assemble(self.matrix, self.right, self.order, self.moments, self.dt)
+
+    def _held(self) -> np.ndarray | None:
+        """(n_blocks, 3) bool: what is held of the blocks' motion in this step; None where nothing is."""
+        system, actions, held = self.system, self.actions, self.system.held
+        alone = system.scheme.static and system.blocks.n_blocks == 1 and self.n_free and actions is None
+        weight = system.mass[0] * self.gravity if alone else None
+        if alone and balanced(self.load[0], self.points, self.edges, weight, self.moments[0]):
+            held = with_rigid_motion(held)
+        return held if actions is None else actions.held(held)
+
+    def _settle(self) -> None:
+        """The states of contacts and the unknowns; faces with a stiffness are tried on other parts until they fit."""
+        actions, found, order = self.actions, self.found, self.order
+        held = self._held()
+        own = self.matrix, self.right
+        self.iterations = 0
+        for _ in range(_PLACED):
+            if found.points is not None:
+                self.matrix, self.right = own[0].copy(), own[1].copy()
+            springs, gap, weight, curved = self._over_the_step(found)
+            vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, self.moments)
+            if held is not None and self.n_free:
+                hold(held, self.matrix, self.right, vectors, found.block, found.other, order)
+            if not self.n_free:
+                zero = np.zeros(len(found))
+                settled = Settled(
+                    np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
+                )
+                unknowns = settled.unknowns
+            elif actions is None:
+                settled = self._settled(self.pattern, self.matrix, self.right, found, gap, vectors, springs, curved)
+                unknowns = settled.unknowns
+            else:
+                solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
+                settled, unknowns = actions.settle(self.pattern, self.matrix, self.right, vectors, found, gap, solve)
+            self.iterations += settled.iterations
+            better = found.misplaced(settled)
+            if better is None:
+                break
+            found = better.trying(found.rows(settled))
+        else:
+            raise Unsettled("faces do not settle on the part of them that touches")
+        self.found, self.settled, self.unknowns = found, settled, unknowns
+        self.vectors, self.weight = vectors, weight
+
+    def _over_the_step(self, found: ContactSet):
+        """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs, curved laws."""
+        system = self.system
+        curved = system.finder.curved(found)
+        # Multipliers are forces at the end of the step.
+        weight = 1.0 if system.allowed_penetration else system.scheme.weight
+        if weight != 1.0 and curved is not None:
+            # The lines of a law that is curved are those of the end of the step.
+            weight = np.full(len(found), weight)
+            weight[curved.rows] = 1.0
+        mass = np.where(system.fixed, np.inf, system.mass)
+        springs, gap = over_a_step(
+            found.springs, np.ascontiguousarray(found.gap), (found.state != OPEN) & (found.bonded > 0),
+            np.minimum(mass[found.block], mass[found.other]), weight, system.scheme.block_damping, self.dt,
+        )  # fmt: skip
+        return springs, gap, weight, curved
+
+    def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
+        system = self.system
+
+        def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray) -> Settled:
+            most = system.settings.max_open_close_iterations
+            return settle(pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved)
+
+        if not system.allowed_penetration or not len(found):
+            if found.stretch.any():
+                found = replace(found, shear=found.shear - springs.shear * found.stretch)
+            return solve(found, springs, gap)
+        return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
+
+    def _move(self) -> None:
+        """Blocks are moved; their velocities, stresses and accelerations at the end."""
+        system, scheme, found, dt = self.system, self.system.scheme, self.found, self.dt
+        state, carried, actions, moments = self.state, self.carried, self.actions, self.moments
+        increment = np.zeros((system.blocks.n_blocks, 6))
+        increment[system.moving] = self.unknowns[self.order[system.moving]]
+        increment[:, 2:] /= np.sqrt(moments[:, :1])
+        imposed = None if actions is None else actions.imposed
+        if imposed is not None:
+            increment += imposed.increment
+        self.new_vertices, velocity, self.new_stress, self.new_crack, self.largest = advance(
+            increment, carried, dt, scheme.static, self.vertices, system.vertex_start, moments, self.tangent, self.stress0,
+            self.crack_compliance, self.crack_offset, self.given, self.crack_strain, system.turns,
+        )  # fmt: skip
+        if self.quiet is not None:
+            absorbed = self.quiet.rows(increment, moments, dt)
+            self.edges = np.concatenate([self.edges, absorbed])
+            self.load = self.load + generalised(self.points[:0], absorbed, self.centroid)
+        acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
+        velocity, self.kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
+        if self.heavier != 1.0:
+            acceleration = 2.0 * self.heavier * (increment - self.begun * dt) / (dt * dt)
+        self.slid = sliding(self.vectors, self.settled.unknowns, self.order, found.block, found.other)
+        if actions is not None and self.n_free:
+            self.slid += actions.along
+        self.rubbed = 0.0
+        if imposed is not None:
+            imposed.correct_velocity(velocity)
+        self.increment, self.velocity, self.acceleration = increment, velocity, acceleration
+        if not scheme.static and self.n_free:
+            self._stop(imposed)
+
+    def _stop(self, imposed) -> None:
+        """Take the sliding that friction has stopped in the step off the velocity; the energy (J/m) that this takes."""
+        system, found, velocity = self.system, self.found, self.velocity
+        mass = np.where(system.fixed, np.inf, system.mass)
+        stopped = Stopped.of(
+            found, self.settled, self.slid, velocity, self.moments[:, 1:3], mass, self.dt, system.slack
+        )
+        if stopped is None:
+            return
+        try:
+            change = stop(stopped, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt)
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        if imposed is not None:
+            change = imposed.free_part(change, self.order)
+        rates = np.zeros_like(velocity)
+        rates[system.moving] = change[self.order[system.moving]] * (2.0 / self.dt)
+        rates[:, 2:] /= np.sqrt(self.moments[:, :1])
+        rates, self.rubbed = dissipating(
+            turned(rates, self.increment[:, 2]), velocity, self.moments, self.density, system.fixed
+        )
+        self.velocity = velocity + rates
+
+    def result(self) -> StepResult:
+        """The step as it is told of."""
+        system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
+        state, actions, dt, gravity = self.state, self.actions, self.dt, self.gravity
+        rows = found.rows(settled)
+        reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
+        points, load, turn = self.points, self.load, self.increment[:, 2]
+        if actions is not None:
+            points, reaction, acted = actions.acted(settled, self.unknowns, rows, points, self.new_vertices)
+            acting_right, largest_force = actions.with_bolt_forces(self.right), actions.largest_bolt_force
+            load = generalised(points, self.edges, self.centroid) + actions.work_forces(reaction, rows, self.centroid)
+        end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, self.weight)
+        energy = self._energy(load, end_shear)
+        residual, ratio = imbalance(
+            self.matrix, acting_right, self.vectors, found.block, found.other, self.order, settled.unknowns,
+            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, gravity, load,
+            largest_force,
+        )  # fmt: skip
+        new_stress, acceleration = self.new_stress, self.acceleration
+        if len(system.rigid):
+            new_stress[system.rigid] = mean_stress(
+                system.rigid, rows, load, self.moments, self.density, acceleration, self.carried[:, 2], turn
+            )
+        if scheme.mass_damping:
+            acceleration = acceleration + scheme.mass_damping / dt * self.increment
+        memory = rows
+        if scheme.weight != 1.0:
+            memory = rows.copy()
+            memory["shear_force"] = end_shear
+        if system.taken_out is not None:
+            new_stress[system.taken_out] = 0.0
+        inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
+        forces = AppliedForces(points, self.edges, self.centroid, self.moments[:, 0].copy(), inertia, reaction)
+        imposed = None if actions is None else actions.imposed
+        new_state = State(
+            time=self.time,
+            vertices=self.new_vertices,
+            velocity=self.velocity,
+            stress=new_stress,
+            rotation=state.rotation + turn,
+            crack_strain=self.new_crack,
+            contacts=system.finder.carried(self.new_vertices, memory),
+            acceleration=self.kept,
+            bolts=state.bolts if actions is None else actions.memory,
+            imposed=state.imposed if imposed is None else imposed.totals,
+            removed=system.taken_out,
+        )
+        statistics = {
+            "open_close_iterations": self.iterations,
+            "dt": dt,
+            "step_cuts": self.cuts,
+            "kinetic_energy": energy.kinetic,
+            "elastic_energy": energy.elastic,
+            "contact_energy": energy.contact,
+            "worst_penetration": _deepest(settled.state != OPEN, found.gap, settled.gap),
+            "max_displacement_ratio": self.largest / system.half_height,
+            "unbalanced": residual,
+            "unbalanced_ratio": ratio,
+            **acted,
+        }
+        return StepResult(new_state, dt, rows, forces, acceleration, energy, statistics)
+
+    def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
+        """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""
+        system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
+        weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
+        energy = StepEnergy._make(
+            step_energies(
+                self.increment, self.state.velocity, self.carried, self.velocity, self.acceleration, self.dt, self.gravity,
+                load, scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.density,
+                self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance, system.stiffness,
+                found.state, settled.state, found.bonded, settled.bonded, found.gap, settled.gap, settled.lifted,
+                settled.slip, self.slid, settled.normal_force, found.shear, settled.shear_force, end_shear,
+                *self._real_springs(), weight, found.law, system.finder.closure,
+            ).tolist()
+        )  # fmt: skip
+        return energy._replace(friction=energy.friction + self.rubbed, scheme=energy.scheme - self.rubbed)
+
+    def _real_springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Contact springs that store energy, normal and shear: what multipliers hold does not."""
+        normal, shear = self.found.springs.normal, self.settled.springs.shear
+        if not self.system.allowed_penetration:
+            return normal, shear
+        held = self.system.finder.on_penalty(self.found)
+        return np.where(held[0], 0.0, normal), np.where(held[1], 0.0, shear)
+
+
+def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them.
+
+    An open one whose vertex is behind its edge's line has a partner line that is not crossed: nothing penetrates there.
+    """
+    return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0
