@@ -19,9 +19,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..model import TIP, Cracks, DdmSettings, JointLaw, Material
+from ..model import Cracks, DdmSettings, JointLaw, Material
 from ..model.polygon import area_moments
-from . import shapes
 from .applied import Applied, apply, check_equilibrium
 from .automatic import for_target
 from .bordered import SMALLEST, Bordered
@@ -35,14 +34,16 @@ from .functionals import TipFunctionals
 from .half_plane import HalfPlane
 from .influence import ElementSet, influence, reuse
 from .iterative import FACTORABLE, NotSolved, compressed, is_compressed
+from .jumps import closing, strain_weights
 from .kept_rows import KeptRows
 from .loads import BodyLoad
 from .mesh import Mesh, mesh, outline_edges
 from .placing import OFF
 from .solution import Solution
 from .supports import Holds, Support, called, marks, place, values_at
+from .tip_elements import tip_elements
 from .unit_loads import UnitLoad, UnitLoads, on_elements
-from .validity import check_cracks, check_outline, outlined
+from .validity import check_cracks, check_outline, new_segments, outlined
 from .work import Work
 
 _log = logging.getLogger(__name__)
@@ -98,7 +99,7 @@ class Body:
         edges = previous.mesh.edges if same else outline_edges(self.loops)[0]
         if half_plane is not None:
             edges = self._in_half_plane(edges)
-        check_cracks(cracks, edges, self.loops, _fresh(cracks, previous if same else None))
+        check_cracks(cracks, edges, self.loops, new_segments(cracks, previous.cracks) if same else None)
         points = self._vertices
         self._extent = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
         self._tol = 8e-16 * float(np.abs(points).max()) if len(points) else 0.0
@@ -186,8 +187,7 @@ class Body:
         own = self.cracks
         same = (
             material == self.material
-            and len(self._given_loops) == len(loops)
-            and all(np.array_equal(a, b) for a, b in zip(self._given_loops, loops))
+            and _same_loops(self._given_loops, loops)
             and all(
                 np.array_equal(getattr(own, name), getattr(cracks, name))
                 for name in ("nodes", "segments", "aperture", "surface", "law")
@@ -397,51 +397,18 @@ class Body:
 
     @cached_property
     def tip_elements(self) -> tuple[np.ndarray, ...]:
-        """What the tips' rows say of geometry (TIP, factors zero), and of each its element, the element's last node,
-        weights (n_tips, p+1) that make nodal values the coefficient of √r, and whether its faces touch unloaded."""
-        network, c = self.cracks, self.faces
-        n = len(network.tips)
-        rows, element, last = np.zeros(n, TIP), np.zeros(n, int), np.zeros(n, int)
-        lead, touching = np.zeros((n, c.per)), np.zeros(n, bool)
-        at_tip: dict[int, tuple[int, bool]] = {}
-        for e in np.flatnonzero(c.kind != shapes.ORDINARY):
-            i, j = network.segments[c.source[e]]
-            if c.kind[e] in (shapes.TIP_START, shapes.TIP_BOTH):
-                at_tip[int(i)] = int(e), False
-            if c.kind[e] in (shapes.TIP_END, shapes.TIP_BOTH):
-                at_tip[int(j)] = int(e), True
-        for k, (row, node) in enumerate(zip(rows, network.tips)):
-            e, at_end = at_tip[int(node)]
-            segment = c.source[e]
-            row["node"], row["crack"], row["block"] = node, network.crack[segment], network.block[segment]
-            row["end"], row["point"] = at_end, network.nodes[node]
-            row["direction"] = c.tangent[e] if at_end else -c.tangent[e]
-            element[k], last[k] = e, -1 if at_end else 0
-            lead[k] = shapes.leading(c.family, c.order, int(c.kind[e]), at_end) / np.sqrt(c.length[e])
-            touching[k] = network.aperture[segment] == 0
-        return rows, element, last, lead, touching
+        """See `tip_elements.tip_elements`."""
+        return tip_elements(self.cracks, self.faces)
 
     @cached_property
     def closing(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(n_unknowns,) aperture (2μ, zero for slip), which unknowns can close (bool) and what they are then."""
-        c = self.faces
-        aperture = np.zeros((c.n, 2, c.per))
-        aperture[:, 1] = 2 * self.material.shear_modulus * self.cracks.aperture[c.source, None]
-        can_close = np.zeros(aperture.shape, bool)
-        can_close[:, 1] = np.isfinite(aperture[:, 1])
-        aperture[~can_close] = 0.0
-        return aperture.ravel(), can_close.ravel(), -aperture.ravel()
+        """See `jumps.closing`."""
+        return closing(self.faces, self.cracks, 2 * self.material.shear_modulus)
 
     @cached_property
     def strain_weights(self) -> np.ndarray:
         """(3, n_unknowns) mean strain of the cracks from nodal slip and opening (times 2μ)."""
-        c = self.faces
-        t, n = c.tangent, c.normal
-        out = np.empty((3, c.n, 2, c.per))
-        for component, axis in enumerate((t, n)):
-            jump = np.stack([n[:, 0] * axis[:, 0], n[:, 1] * axis[:, 1], n[:, 0] * axis[:, 1] + n[:, 1] * axis[:, 0]])
-            out[:, :, component] = jump[:, :, None] * c.quadrature
-        return out.reshape(3, -1) / (self.area * 2 * self.material.shear_modulus)
+        return strain_weights(self.faces) / (self.area * 2 * self.material.shear_modulus)
 
     def compliance(self, sol: Solution | None = None) -> np.ndarray:
         """(3, 3) added compliance, 1/Pa: mean crack strain (xx, yy, xy; engineering shear) per uniform boundary stress,
@@ -472,13 +439,3 @@ class Body:
 
 def _same_loops(old: list[np.ndarray], new: list[np.ndarray]) -> bool:
     return len(old) == len(new) and all(np.array_equal(a, b) for a, b in zip(old, new))
-
-
-def _fresh(cracks: Cracks, previous: Body | None) -> np.ndarray | None:
-    """(n_segments,) bool: which segments were not in ``previous``."""
-    if previous is None:
-        return None
-    known = {row.tobytes() for row in np.ascontiguousarray(previous.cracks.nodes[previous.cracks.segments])}
-    return np.array(
-        [row.tobytes() not in known for row in np.ascontiguousarray(cracks.nodes[cracks.segments])], dtype=bool
-    )

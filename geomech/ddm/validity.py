@@ -296,3 +296,11 @@ def _to_segments(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
     rel = points[:, None] - a
     s = np.clip(np.sum(rel * d, axis=2) / np.sum(d * d, axis=1), 0.0, 1.0)
     return np.hypot(*np.moveaxis(rel - s[..., None] * d, 2, 0)).min(axis=1)
+
+
+def new_segments(cracks: Cracks, earlier: Cracks) -> np.ndarray:
+    """(n_segments,) bool: which segments of ``cracks`` are none of the ``earlier`` ones, bit for bit."""
+    known = {row.tobytes() for row in np.ascontiguousarray(earlier.nodes[earlier.segments])}
+    return np.array(
+        [row.tobytes() not in known for row in np.ascontiguousarray(cracks.nodes[cracks.segments])], dtype=bool
+    )
