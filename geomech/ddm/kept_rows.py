@@ -30,9 +30,9 @@ class KeptRows:
 
     def grown(self, was: np.ndarray, compute: Callable[[np.ndarray], np.ndarray]) -> KeptRows:
         """The matrix of elements whose numbers were ``was`` (n_elements,), −1 where new; ``compute(elements)`` makes rows."""
-        new = np.flatnonzero(was < 0)
-        at = np.where(was >= 0, self.at[was], 0)
-        at[new] = self._total // self._width + np.arange(len(new))
+        new, kept = np.flatnonzero(was < 0), np.flatnonzero(was >= 0)
+        at = np.empty(len(was), int)
+        at[kept], at[new] = self.at[was[kept]], self._total // self._width + np.arange(len(new))
         blocks = [*self.blocks, compute(new)] if len(new) else list(self.blocks)
         while len(blocks) > 2 and len(blocks[-2]) < ALIKE * len(blocks[-1]):
             blocks[-2:] = [np.concatenate(blocks[-2:])]
