@@ -110,11 +110,11 @@ class Panel:
             down, right, corner = reduce(Piece.joined, self.pieces)
             nothing = np.zeros(0, int)
             rows, columns, lower, upper = self.known or (nothing, nothing, np.empty((0, 0)), np.empty((0, 0)))
-            fresh = np.delete(np.arange(self.n), rows)
+            fresh = _others(self.n, rows)
             self.lower = np.empty(down.shape)
             self.lower[rows] = _lower(before, down[rows], lower)
             self.lower[fresh] = _lower(before, down[fresh])
-            fresh = np.delete(np.arange(self.n), columns)
+            fresh = _others(self.n, columns)
             self.upper = np.empty(right.shape, order="F")
             self.upper[:, columns] = _upper(before, right[:, columns], upper)
             self.upper[:, fresh] = _upper(before, right[:, fresh])
@@ -244,7 +244,9 @@ class Bordered:
         # New segments that end at a tip come last: they are tried, bent, and graded as they turn.
         source, settled = elements.source, np.zeros(elements.n, bool)
         settled[before[before >= 0]] = True
-        at_tip = np.isin(source, source[elements.kind != shapes.ORDINARY]) & ~np.isin(source, source[settled])
+        ends, stands = np.zeros((2, int(source.max(initial=0)) + 1), bool)
+        ends[source[elements.kind != shapes.ORDINARY]], stands[source[settled]] = True, True
+        at_tip = (ends & ~stands)[source]
         new = np.flatnonzero(was < 0)
         came, column = np.concatenate([new, now[loose[stay]]]), np.concatenate([np.full(len(new), -1), stay])
         order = np.argsort(at_tip[came], kind="stable")
@@ -268,7 +270,8 @@ class Bordered:
             corner[np.ix_(r_old, c_old)] = piece.corner[np.ix_(from_r, from_c)]
         if len(new_c):
             values = compute(every, came[new_c])
-            right[np.ix_(places, c_new)] = values[numbers]
+            # Both are column-major: transposed, copying goes along memory.
+            right.T[np.ix_(c_new, places)] = values.T[:, numbers]
             corner[:, c_new] = values[here]
         if len(fresh):
             values = compute(came[fresh], every)
@@ -393,6 +396,13 @@ class BorderedFactor:
                 if panel.first:
                     x[: panel.first] -= panel.upper @ x[panel.here]
         return x.T[..., self._places].T
+
+
+def _others(n: int, of: np.ndarray) -> np.ndarray:
+    """The numbers below ``n`` that are not among ``of``."""
+    rest = np.ones(n, bool)
+    rest[of] = False
+    return np.flatnonzero(rest)
 
 
 def _known(last: Panel, rows, from_rows, columns, from_columns, first: int, end: int) -> Known:

@@ -10,6 +10,7 @@ import numpy as np
 from ..model import Material
 from .boundary import BoundarySystem
 from .influence import ElementSet, line_forces, project_jumps
+from .kept_rows import KeptRows
 from .mesh import Mesh
 from .particular import GrowingWithDepth, Particular, edge_densities
 from .placing import OFF, onto_boundary, sides_for
@@ -45,6 +46,31 @@ class UnitLoad:
         self.used = False
 
 
+class Eliminated:
+    """A ``load`` (n,) on the boundary, ``y`` = A_ΓΓ⁻¹ load and A_CΓ y ``on_faces`` (n_elements, width), both of which outlast
+    growth; ``new`` are the elements where the latter is not worked out yet."""
+
+    def __init__(self, load: np.ndarray, y: np.ndarray, on_faces: np.ndarray, new: np.ndarray | None = None):
+        self.load, self.y, self.on_faces = load, y, on_faces
+        self.new = np.empty(0, int) if new is None else new
+
+    def grown(self, was: np.ndarray) -> Eliminated:
+        """The same between elements whose numbers were ``was`` (n_elements,), −1 where new."""
+        missing = np.zeros(len(self.on_faces) + 1, bool)
+        missing[-1] = missing[self.new] = True  # its end stands for −1
+        at = np.where(missing[was], 0, was)
+        on_faces = self.on_faces[at] if len(self.on_faces) else np.empty((len(was), self.on_faces.shape[1]))
+        return Eliminated(self.load, self.y, on_faces, np.flatnonzero(missing[was]))
+
+    def complete(self, cg: np.ndarray | KeptRows, faces: ElementSet) -> None:
+        """Work out what is missing, with A_CΓ, ``cg``."""
+        if not len(self.new):
+            return
+        rows = cg.of(self.new) if isinstance(cg, KeptRows) else cg[faces.unknowns(self.new)]
+        self.on_faces[self.new] = (rows @ self.y).reshape(len(self.new), 2 * faces.per)
+        self.new = self.new[:0]
+
+
 class UnitLoads:
     """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `kernels` for ``tol``.
 
@@ -70,10 +96,13 @@ class UnitLoads:
         self._segments: dict[bytes, UnitLoad] = {}
         self._on_edges: dict[str | int, UnitLoad] = {}
         self._recent: list[bytes] = []
+        self._last: Eliminated | None = None
 
     def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
         """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old numbers."""
         n_g = self.boundary.n_unknowns
+        if old._last is not None:
+            self._last = old._last.grown(c_old)
         new, kept = np.flatnonzero(c_old < 0), np.flatnonzero(c_old >= 0)
         to, fro, at = (
             n_g + x for x in (self.faces.unknowns(kept), old.faces.unknowns(c_old[kept]), self.faces.unknowns(new))
@@ -143,8 +172,11 @@ class UnitLoads:
             else:
                 total += unit.answered @ size
         if rest.any():
-            y = boundary.solve(rest[:n_g])
-            reduced = rest[n_g:] - cg @ y
+            if self._last is None or not np.array_equal(self._last.load, rest[:n_g]):
+                y = boundary.solve(rest[:n_g])
+                self._last = Eliminated(rest[:n_g].copy(), y, (cg @ y).reshape(self.faces.n, 2 * self.faces.per))
+            self._last.complete(cg, self.faces)
+            y, reduced = self._last.y, rest[n_g:] - self._last.on_faces.ravel()
             total += np.concatenate([rest, y, reduced, opened(reduced)])
         return total[:n_g], total[n_g:n], total[n : n + n_g], total[n + n_g : 2 * n], total[2 * n :]
 
