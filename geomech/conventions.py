@@ -67,8 +67,11 @@ def traction(stress: np.ndarray, normal: np.ndarray) -> np.ndarray:
 
 def rotate_stress(stress: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
     """Turn the material that carries ``stress`` (..., 3) by ``angle`` (rad), R σ Rᵀ: the co-rotated stress."""
-    stress = np.asarray(stress, dtype=float)
-    c, s = np.cos(angle), np.sin(angle)
+    return turned_stress(np.asarray(stress, dtype=float), np.cos(angle), np.sin(angle))
+
+
+def turned_stress(stress: np.ndarray, c: np.ndarray | float, s: np.ndarray | float) -> np.ndarray:
+    """``stress`` (..., 3) turned by the angle of cosine ``c`` and sine ``s``, as `rotate_stress` does."""
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     return np.stack(
         [

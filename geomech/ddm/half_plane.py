@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..conventions import turned_stress
+
 if TYPE_CHECKING:
     from ..model import Cracks
 
@@ -76,15 +78,7 @@ class HalfPlane:
     def stress_of(self, in_frame: np.ndarray) -> np.ndarray:
         """(..., 3) stress in x and y from that along the surface and out of it."""
         (c, s), _ = self.turn
-        xx, yy, xy = in_frame[..., 0], in_frame[..., 1], in_frame[..., 2]
-        return np.stack(
-            [
-                c * c * xx + s * s * yy - 2 * c * s * xy,
-                s * s * xx + c * c * yy + 2 * c * s * xy,
-                c * s * (xx - yy) + (c * c - s * s) * xy,
-            ],
-            axis=-1,
-        )
+        return turned_stress(in_frame, c, s)
 
     def check_uniform(self, stress: np.ndarray) -> None:
         """Raise ValueError unless a uniform ``stress`` (3,) leaves the surface without traction."""
