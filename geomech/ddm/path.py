@@ -8,8 +8,13 @@ y ∝ x^(3/2) (Amestoy & Leblond 1992), whose chord has two thirds of the turn.
 Compression σ along a crack makes this stiff. A step that leaves its line by ω meets a shear of its own of about
 σ ω √(πΔa), so that the turn the criterion asks for next falls by more than ω: by (1 + κ) ω, κ ~ |σ| √(πΔa) / K_I. This
 is what holds wing cracks to the line of the load (Cotterell & Rice 1980). From κ = 2 on, a single correction throws
-back as far as the trial went out, and a crack would go straight on with any K_II. So where the look ahead turns
-back against the trial, the condition on the chord is solved, not corrected once: an implicit rule, stable for all κ.
+back as far as the trial went out, and a crack would go straight on with any K_II. So the condition on the chord is
+solved, not corrected once, where the look ahead says that it is stiff.
+
+A chord that has half of the turn is the trapezoidal rule: stable for all κ, but what one step leaves over comes back in
+the next with the other sign, κ/(2 + κ) of it, and stiff paths zigzag for long. With the share s of the turn it is
+(1 − s) κ/(1 + s κ): s = 1 − 1/κ from κ = 2 on leaves 1/κ, and in the limit no shear at the end of a step (backward Euler).
+κ falls with √Δa, so that fine steps have half the turn, and second order.
 """
 
 from __future__ import annotations
@@ -26,15 +31,18 @@ KINK = np.radians(20.0)
 SMOOTH_SHARE, KINK_SHARE = 1 / 2, 2 / 3
 #: A chord is good when its direction is off its condition by less than this: K_II of about 1 % of K_I.
 TOLERANCE = np.radians(1.0)
-#: A correction onward by less than this is taken as it is; of a larger one a second look tells whether it overshoots, which it does
-#: where the slope of the condition (see `SLOPES`) is below the second figure. Steps of 1 mm along 140 MPa otherwise bend by 17°
+#: From this κ on, paths are stiff: below, a single correction falls off from step to step.
+STIFF = 2.0
+#: A correction onward by less than this that nothing says is stiff is taken as it is; of a larger one a second look tells
+#: whether it overshoots, which it does from the second figure for κ on. Steps of 1 mm along 140 MPa otherwise bend by 17°
 #: for 6°, then back, and miss the load that drives them by 14 %.
-SMOOTH, GENTLE = np.radians(4.2), -1.5
+SMOOTH, GENTLE = np.radians(4.2), 1.0
 #: Looks ahead at most. Secants need two or three; what is left then is of the order of the tolerance.
 LOOKS = 5
-#: Bounds of the slope of the condition: −1 − κ times the share, for no stress along the crack −1. Beyond them two trials
-#: lie too close together to tell it.
-SLOPES = (-20.0, -0.5)
+#: Bounds of the slope −1 − κ of the turn ahead over that of the chord. Beyond them two trials lie too close together to tell it.
+SLOPES = (-39.0, 0.0)
+#: The largest κ that a first look is believed.
+GUESSED = 8.0
 #: The chord lies between the first trial and the first correction, since the condition falls by at least as much as the
 #: chord turns; by this part of their difference it may lie outside (tension along the crack, round-off).
 OUTSIDE = 0.2
@@ -44,7 +52,7 @@ class Chords:
     """The directions of one growth step's chords, looked for tip by tip: the steps of all tips are tried together.
 
     With θ the angle of the chord, θ₀ that of the criterion at its start, a(θ) the one that the criterion asks for at
-    its end and s the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀.
+    its end and s the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀, and a falls by 1 + κ times what θ turns.
     """
 
     def __init__(self, tips: np.ndarray) -> None:
@@ -52,8 +60,9 @@ class Chords:
         self.share = np.where(np.abs(self.start) > KINK, KINK_SHARE, SMOOTH_SHARE)
         self.looks = 0
         self.onward = np.zeros(len(tips), bool)
+        self.whole = self.start
         self.last_angle = np.full(len(tips), np.nan)
-        self.last_rest = np.full(len(tips), np.nan)
+        self.last_turns = np.full(len(tips), np.nan)
         self.lowest = np.full(len(tips), -np.inf)
         self.highest = np.full(len(tips), np.inf)
 
@@ -66,13 +75,12 @@ class Chords:
         self.looks += 1
         turns = _turns_ahead(tips, grown, ahead, cracks, cycle)
         angle = tips["angle"].copy()
-        rest = self.share * turns - (1 - self.share) * (angle - self.start)
-        off = np.abs(rest) > TOLERANCE  # not where there is nothing ahead, nan
-        with np.errstate(divide="ignore", invalid="ignore"):
-            slope = (rest - self.last_rest) / (angle - self.last_angle)
-        slope = np.where(np.isfinite(slope), np.clip(slope, *SLOPES), -1.0)
-        known = np.isfinite(rest)
         first = self.looks == 1
+        kappa = self._first_guess(turns) if first else self._secant(turns, angle)
+        share = np.maximum(self.share, 1 - 1 / np.maximum(kappa, 1.0))
+        rest = share * turns - (1 - share) * (angle - self.start)
+        off = np.abs(rest) > TOLERANCE  # not where there is nothing ahead, nan
+        known = np.isfinite(rest)
         if first:
             # Faces that close make the condition jump; secants must not run away across the jump.
             ends = np.stack([angle - OUTSIDE * rest, angle + (1 + OUTSIDE) * rest])
@@ -80,18 +88,34 @@ class Chords:
                 np.nanmin(ends, axis=0, initial=np.inf),
                 np.nanmax(ends, axis=0, initial=-np.inf),
             )
-        tips["angle"][known] = np.clip(angle - rest / slope, self.lowest, self.highest)[known]
-        # A first look that turns on a little, the way the trial did, needs no second one: the path is smooth.
-        onward = rest * self.start >= 0
-        unsettled = off & ~(onward & (np.abs(rest) < SMOOTH)) if first else off
+        tips["angle"][known] = np.clip(angle + rest / (1 + share * kappa), self.lowest, self.highest)[known]
         if first:
-            self.onward = onward
+            # A first look that turns on a little, the way the trial did, needs no second one: the path is smooth.
+            self.onward = rest * self.start >= 0
+            self.whole = angle + self.share * turns
+            unsettled = off & ~(self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF))
         elif self.looks == 2:
-            # Nor is a large turn stiff for its size alone: then the first correction was right.
-            gentle = self.onward & (slope > GENTLE)
-            tips["angle"][gentle], unsettled = angle[gentle], unsettled & ~gentle
-        self.last_angle, self.last_rest = angle, rest
+            # Nor is a large turn stiff for its size alone: then the first correction was right, the whole of it.
+            gentle = self.onward & (kappa < GENTLE)
+            tips["angle"][gentle], unsettled = self.whole[gentle], off & ~gentle
+        else:
+            unsettled = off
+        self.last_angle, self.last_turns = angle, turns
         return self.looks == LOOKS or not unsettled.any()
+
+    def _first_guess(self, turns: np.ndarray) -> np.ndarray:
+        """κ by the turn ahead of a trial along the tangent: on a smooth path, from half a turn before the tip, it is 2 + κ
+        times that; of a zigzag about a straight line −κ times. 0 where that is not stiff; kinks do not tell."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = turns / self.start
+        kappa = np.minimum(np.where(ratio > 0, ratio - 2, -ratio), GUESSED)
+        return np.where((kappa >= STIFF) & (np.abs(self.start) <= KINK), kappa, 0.0)
+
+    def _secant(self, turns: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """κ by the last two looks."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slope = (turns - self.last_turns) / (angle - self.last_angle)
+        return np.where(np.isfinite(slope), -1 - np.clip(slope, *SLOPES), 0.0)
 
 
 def corrected(

@@ -87,6 +87,6 @@ def test_wings_of_a_closed_crack_with_friction_grow_into_the_load():
         )
     assert steps[0].tips["angle"] == pytest.approx(math.acos(1 / 3), abs=0.02)
     assert (np.diff(loads) > 0).all()
-    # Chords zigzag by a few tenths of a degree about the path.
-    assert (np.diff(directions) < 0.5).all() and directions[-1] == pytest.approx(90, abs=3)
+    # The path is smooth and so are its chords, though κ of `ddm.path` rises to 7.
+    assert (np.diff(directions) < 0).all() and directions[-1] == pytest.approx(90, abs=3)
     assert ratios[2] == pytest.approx(1.0, abs=0.06) and ratios[-1] == pytest.approx(0.6, abs=0.03)
