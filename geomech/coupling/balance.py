@@ -90,7 +90,9 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None) -> tuple[Bal
         now.acted = result.statistics
         if not now.bodies:
             return Balance(result, {}, np.empty(0, TIP)), np.zeros(0)
-        now.hanging.find(now.bodies, now.system.compliance, result.contacts)
+        # At rest nothing is taken to hang for its softness alone (`hanging`).
+        if not static:
+            now.hanging.find(now.bodies, now.system.compliance, result.contacts)
         _solve_bodies(now, result)
         response, differences = _take_response(now, result.state, settling, tolerance)
         mismatch = float(differences.max())

@@ -7,6 +7,10 @@ strain chase each other with a gain of up to hundreds, and there are states that
 the cracks of these blocks bring the strain ε_c = κ ∂W/∂σ, with W(σ) the complementary energy, per area, that they add to the body under
 a uniform stress, faces closing or not. W is convex: blocks and cracks agree in a few passes, and no energy is gained. What drives the
 tips is solved under the actual forces as ever.
+
+In statics no motion can take energy from anywhere, and passes that agree are an equilibrium of the forces that act: there a block
+hangs only where its passes do not agree. (A specimen sheared between the halves of a box has no shear on its sides, which its mean
+stress would put there: as it came to hang it bore 4 % less at once, and its cracks then ran through.)
 """
 
 from __future__ import annotations
