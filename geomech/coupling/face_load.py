@@ -20,9 +20,9 @@ def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touc
         moment += push * place
         shear += ax * x + ay * y
         size += abs(x) + abs(y)
-    # The force that goes with a unit of pressure: shear in proportion to it, evenly spread where faces are held together
-    # besides and there is none to go by. Pressure on a bond that may pull is linear, and shear even, wherever its resultant
-    # is: it goes on without a jump as that leaves the face.
+    # The force that goes with a unit of pressure: shear in proportion to it, evenly spread where faces are held
+    # together besides and there is none to go by. Pressure on a bond that may pull is linear, and shear even, wherever
+    # its resultant is: it goes on without a jump as that leaves the face.
     reach = [place for place, _ in acting]
     holds = all(touch.holds for _, touch in acting)
     even = holds or abs(total) <= 1e-9 * size or not min(reach) <= moment / total <= max(reach)
@@ -49,8 +49,9 @@ def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touc
 
 
 def _ends(acting: list, gapes: list, length: float, way: int) -> list[tuple[tuple[float, Touch], float]]:
-    """Where a face's pressure may end on one side (``way`` −1 or 1), as pairs of place and touch, and the share of each:
-    the last contact that acts, and the next one that gapes, the less the wider it does beside how much the other one gives."""
+    """Where a face's pressure may end on one side (``way`` −1 or 1), as pairs of place and touch, and the share of
+    each: the last contact that acts, and the next one that gapes, the less the wider it does beside how much the other
+    one gives."""
     closed = max(acting, key=lambda of: (way * of[0], abs(of[1].force[0]) + abs(of[1].force[1])))
     beyond = [of for of in gapes if way * (of[0] - closed[0]) > SAME * length]
     if not beyond:

@@ -15,8 +15,9 @@ FACE_ANGLE = np.radians(10.0)
 #: A face that ends within this part of its edge's length of the edge's end ends there.
 SNAP = 1e-9
 
-#: Pressures end at a multiple of this part of an edge's length. Force and moment are kept on whatever length; and the body,
-#: which knows what segments that it has met before do to it, would meet new ones every step, for faces slide by strains.
+#: Pressures end at a multiple of this part of an edge's length. Force and moment are kept on whatever length; and the
+#: body, which knows what segments that it has met before do to it, would meet new ones every step, for faces slide by
+#: strains.
 GRID = 2.0**-12
 
 #: Contacts nearer to each other than this part of a face's length are at one place.
@@ -69,8 +70,8 @@ def on_grid(place: float, length: float) -> float:
 
 
 def add_on_side(pieces: Pieces, blocks: Blocks, side: list[int], line: tuple, span: tuple, t_a, t_b) -> None:
-    """A traction from ``t_a`` to ``t_b`` over a ``span`` of a straight side: one piece an edge, for a load segment lies on
-    one edge."""
+    """A traction from ``t_a`` to ``t_b`` over a ``span`` of a straight side: one piece an edge, for a load segment lies
+    on one edge."""
     (start, end, (ax, ay), length), (a, b) = line, span
     corners = [start, *(blocks.vertices[k].tolist() for k in side[1:-1]), end]
     marks = [0.0, *(place_along(corner, start, (ax, ay)) for corner in corners[1:-1]), length]
@@ -139,8 +140,8 @@ def add_edge_force(pieces: Pieces, blocks: Blocks, edge: int, point: Sequence[fl
 
 
 def add_edge_piece(pieces: Pieces, blocks: Blocks, vertices: np.ndarray, row: np.void, turn_back: np.ndarray) -> None:
-    """A piece of an edge (EDGE_FORCE row, on the current ``vertices``) with its traction, which is linear there too: the
-    block's motion is affine. Its ends stay bit for bit at the edge's where they are there."""
+    """A piece of an edge (EDGE_FORCE row, on the current ``vertices``) with its traction, which is linear there too:
+    the block's motion is affine. Its ends stay bit for bit at the edge's where they are there."""
     first, last = int(row["edge"]), int(blocks.next_vertex[row["edge"]])
     now = vertices[last] - vertices[first]
     a, b = blocks.vertices[first], blocks.vertices[last]

@@ -15,8 +15,8 @@ from .load_pieces import FACE_ANGLE, SAME, line_of, place_along
 class Touch(NamedTuple):
     """A contact as one of its blocks feels it. There are few, so they are plain numbers.
 
-    ``own``: the block owns the vertex, not the edge; ``normal`` of the edge, current axes; ``point`` and the ``force`` on
-    the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``: it may pull.
+    ``own``: the block owns the vertex, not the edge; ``normal`` of the edge, current axes; ``point`` and the ``force``
+    on the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``: it may pull.
     """
 
     own: bool
@@ -55,7 +55,8 @@ def touches_of(
 
 
 def on_outline(blocks: Blocks, touch: Touch) -> np.ndarray:
-    """Where a contact's spring stands on the block, reference frame: its vertex, or the foot of the other's on its edge."""
+    """Where a contact's spring stands on the block, reference frame: its vertex, or the foot of the other's on its
+    edge."""
     start = blocks.vertices[touch.edge]
     if touch.own:
         return blocks.vertices[touch.vertex]
@@ -80,9 +81,9 @@ def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: li
 def faces_and_lone(
     blocks: Blocks, vertices: np.ndarray, touches: list[Touch]
 ) -> tuple[dict[tuple[int, int], list[Touch]], list[Touch]]:
-    """What touches a block as joint faces with at least two distinct points, (first edge of the own straight side, first
-    edge of the other's) → contacts, and the contacts left alone. A vertex in a straight side, as the end of a named piece,
-    does not part what touches it into faces of their own."""
+    """What touches a block as joint faces with at least two distinct points, (first edge of the own straight side,
+    first edge of the other's) → contacts, and the contacts left alone. A vertex in a straight side, as the end of a
+    named piece, does not part what touches it into faces of their own."""
     found: dict[tuple[int, int], list[Touch]] = {}
     lone = []
     for touch in touches:

@@ -8,9 +8,9 @@ pressure, so that it breaks Coulomb's law nowhere unless it breaks it as a whole
 over a short piece of that edge; a lone force on a block's own corner is resolved along the corner's two edges and enters there
 as shear, which keeps both force and moment exactly. Tractions change without a jump as contacts come and go.
 
-Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force on
-the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al. (2023,
-eqs. 2-4) write.
+Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force
+on the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al.
+(2023, eqs. 2-4) write.
 
 All of it lives in the block's reference frame: points are mapped back by the block's affine motion, forces turned
 back by its rotation. What the forces then leave out of balance is the block's inertia (d'Alembert): it is put on as
@@ -74,9 +74,9 @@ def boundary_load(
 
     ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
     that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
-    ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which is
-    spread over the block as its inertia is; ``route``: "contacts", "springs" or "kelvin-springs"; ``tensile_strength`` of the
-    joint laws, Pa (None: none has any).
+    ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which
+    is spread over the block as its inertia is; ``route``: "contacts", "springs" or "kelvin-springs";
+    ``tensile_strength`` of the joint laws, Pa (None: none has any).
     """
     c, s = math.cos(rotation), math.sin(rotation)
     pieces = Pieces()

@@ -1,6 +1,7 @@
 """One step of a given length: the equations of blocks, the states of contacts in them, the motion, and what it took.
 
-`BlockSystem.step` attempts a step as long as it likes, and a shorter one where contacts do not settle or blocks move too far.
+`BlockSystem.step` attempts a step as long as it likes, and a shorter one where contacts do not settle or blocks move
+too far.
 """
 
 from __future__ import annotations
@@ -36,10 +37,11 @@ _PLACED = 20
 
 
 class Attempt:
-    """A step of ``system`` by ``dt`` from ``state`` with the contacts ``found``; ``cuts`` steps were attempted in vain before.
+    """A step of ``system`` by ``dt`` from ``state`` with the contacts ``found``; ``cuts`` steps were attempted in vain
+    before.
 
-    ``carried`` (n_blocks, 6) is the velocity that the step begins with, ``moments`` those of the blocks of ``vertices``. Raises
-    `Unsettled` where contacts find no states.
+    ``carried`` (n_blocks, 6) is the velocity that the step begins with, ``moments`` those of the blocks of
+    ``vertices``. Raises `Unsettled` where contacts find no states.
     """
 
     def __init__(
@@ -157,7 +159,8 @@ class Attempt:
         self.vectors, self.weight = vectors, weight
 
     def _over_the_step(self, found: ContactSet):
-        """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs, curved laws."""
+        """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs,
+        curved laws."""
         system = self.system
         curved = system.finder.curved(found)
         # Multipliers are forces at the end of the step.

@@ -40,13 +40,14 @@ class BlockSystem:
 
     ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
     means that such edges do not touch; without it the first law holds everywhere. Contact springs are
-    ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks (`penalties`).
+    ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks
+    (`penalties`).
 
-    What every `Attempt` at a step reads is made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and ``compliance``
-    (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of contacts and the ``load_map``;
-    and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving`` (indices), which of them ``turns``, and ``free``, the
-    number of a block among those that move, −1 for the others. ``allowed_penetration`` (m) is zero where penalty springs
-    hold alone.
+    What every `Attempt` at a step reads is made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
+    ``compliance`` (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
+    contacts and the ``load_map``; and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
+    (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
+    ``allowed_penetration`` (m) is zero where penalty springs hold alone.
 
     Raises ValueError when materials or joints are missing or a block has no area.
     """
@@ -132,8 +133,8 @@ class BlockSystem:
         return self._excavations.removed(loads, time)
 
     def _take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
-        """Go on without the blocks ``removed`` (n_blocks,): they keep their place in all arrays, fixed and touching nothing;
-        ``drained`` ones took the water with them."""
+        """Go on without the blocks ``removed`` (n_blocks,): they keep their place in all arrays, fixed and touching
+        nothing; ``drained`` ones took the water with them."""
         self.taken_out = removed
         fixed = self.blocks.fixed if removed is None else self.blocks.fixed | removed
         self.fixed = np.ascontiguousarray(fixed, dtype=np.bool_)
@@ -153,14 +154,14 @@ class BlockSystem:
         load_time: float | None = None,
         like: StepResult | None = None,
     ) -> StepResult:
-        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme weighs
-        them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the result of
-        the same step with another ``crack``, from whose contact states iterations begin.
+        """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme
+        weighs them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the
+        result of the same step with another ``crack``, from whose contact states iterations begin.
 
-        A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun again
-        from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
-        ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved, or
-        when nothing holds them up in statics.
+        A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
+        again from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
+        ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved, or when nothing
+        holds them up in statics.
         """
         dt = self.settings.time_step if dt is None else float(dt)
         if not dt > 0:
@@ -196,7 +197,8 @@ class BlockSystem:
                 lost = (bonded != found.bonded) & found.inset
                 unheld = found.relies_on_glue and (bonded < found.bonded).any()
                 if unheld or lost.any():
-                    # Corners that were left out, and springs that were moved, for the sake of a bond are back before it breaks.
+                    # Corners that were left out, and springs that were moved, for the sake of a bond are back before it
+                    # breaks.
                     broken = np.append(broken, found.vertex[lost] * len(vertices) + found.edge[lost])
                     holds = found.relies_on_glue and not unheld
                     found = self.finder.find(state, vertices, _WINDOW * limit, holds, broken=broken)
@@ -226,7 +228,7 @@ class BlockSystem:
         return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self._limit, lumped=True)
 
     def told(self, found: ContactSet, forces: ToldContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, those that ``forces`` tell of as these say: for a `State` whose next step begins so."""
+        """CONTACT rows of ``found``, as ``forces`` say where they tell of one: for a `State` whose next step begins so."""
         if self.allowed_penetration:
             on_multiplier = self.finder.on_penalty(found)[0]
         else:
@@ -270,8 +272,8 @@ class BlockSystem:
     def pattern_of(
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
     ) -> assembly.Pattern:
-        """Where the matrix of blocks that touch, ``block`` with ``other`` (n,), or are ``linked`` by bolts has entries, and its solver:
-        kept from step to step while the same blocks do."""
+        """Where the matrix of blocks that touch, ``block`` with ``other`` (n,), or are ``linked`` by bolts has entries,
+        and its solver: kept from step to step while the same blocks do."""
         if linked is not None:
             block, other = np.concatenate([block, linked[0]]), np.concatenate([other, linked[1]])
         if int(self.free.max()) + 1 <= assembly.DENSE_BLOCKS:
@@ -299,8 +301,8 @@ def run(
     state: State | None = None,
     watch: Callable[[StepResult], None] | None = None,
 ) -> Iterator[State]:
-    """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how long.
-    ``watch`` sees every `StepResult`.
+    """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
+    long. ``watch`` sees every `StepResult`.
 
     ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
     """

@@ -53,12 +53,13 @@ class Body:
     """An elastic body with cracks.
 
     ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``holes``:
-    more of them, which may run either way, in the infinite plane too. ``half_plane``: the rock is that below a free surface instead
-    of all of the plane; cracks may end at it. ``cracks``: those of this body. ``previous``: an
-    earlier body of which whatever is unchanged, element by element, is reused, factors included (`bordered`): growth costs
-    the rows and columns of the new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of a crack segment counts in
-    them. ``counts`` tells what making it took, ``work`` what was done since by all bodies that share it. Raises ValueError naming the item on geometry that is no body,
-    numpy.linalg.LinAlgError when cracks cut a part off.
+    more of them, which may run either way, in the infinite plane too. ``half_plane``: the rock is that below a free
+    surface instead of all of the plane; cracks may end at it. ``cracks``: those of this body. ``previous``: an earlier
+    body of which whatever is unchanged, element by element, is reused, factors included (`bordered`): growth costs the
+    rows and columns of the new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of
+    a crack segment counts in them. ``counts`` tells what making it took, ``work`` what was done since by all bodies
+    that share it. Raises ValueError naming the item on geometry that is no body, numpy.linalg.LinAlgError when cracks
+    cut a part off.
     """
 
     def __init__(
@@ -182,8 +183,8 @@ class Body:
         return np.concatenate([self.mesh.edges, self.half_plane.edge(self._vertices)])
 
     def found_again(self, loops: list[np.ndarray], cracks: Cracks, material: Material) -> Body | None:
-        """This body where ``loops``, ``cracks`` and ``material`` are its own, else None. What cracks and blocks are called
-        and when they grew may differ: the body is then a copy that shares all else with this one."""
+        """This body where ``loops``, ``cracks`` and ``material`` are its own, else None. What cracks and blocks are
+        called and when they grew may differ: the body is then a copy that shares all else with this one."""
         own = self.cracks
         same = (
             material == self.material
@@ -247,8 +248,8 @@ class Body:
             on_both = system.factor if system.iterated else None
             self._w, self.crack_system = compressed(c, crack, system.solve, on_boundary, self._cg, nu, tol, on_both)
             return
-        # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper to
-        # make again, should the boundary change, than to carry along.
+        # W = A_ΓΓ⁻¹ A_ΓC and S by the columns and rows of new elements; A_ΓC and A_CC are not kept, as they are cheaper
+        # to make again, should the boundary change, than to carry along.
         kept = same_boundary and not old.compressed
 
         def follow(k):
@@ -307,8 +308,8 @@ class Body:
 
         ``history``: the solution, of this or an earlier body, from which the load went on to this one, or its
         ``memory``. Faces with friction begin with its slip and its broken cement, so that the answer is a step of a
-        process; without it they begin as if never loaded. ``warm``: a solution whose face states are no more than the first guess of the
-        contact, by default ``history``; smooth faces have no memory and need nothing else.
+        process; without it they begin as if never loaded. ``warm``: a solution whose face states are no more than the
+        first guess of the contact, by default ``history``; smooth faces have no memory and need nothing else.
 
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
         `faces.NotConverged` when the contact of crack faces does not settle.
@@ -372,8 +373,8 @@ class Body:
         return applied, self._loads.of(applied), rest, imposed
 
     def k_functionals(self, solution: Solution | None = None) -> TipFunctionals:
-        """K_I and K_II of all tips as functions of the load, for the face states of ``solution`` (all open if None); kept
-        until others are asked for."""
+        """K_I and K_II of all tips as functions of the load, for the face states of ``solution`` (all open if None);
+        kept until others are asked for."""
         began = None if solution is None else solution.began
         key = (b"" if solution is None else solution.face_states.key), began
         if self._functionals is None or self._functionals[0][0] != key[0] or self._functionals[0][1] is not began:

@@ -9,7 +9,8 @@ from .influence import ElementSet
 
 
 def closing(faces: ElementSet, cracks: Cracks, twice_modulus: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(n_unknowns,) aperture (times ``twice_modulus``, 2μ; zero for slip), which unknowns can close (bool) and what they are then."""
+    """(n_unknowns,) aperture (times ``twice_modulus``, 2μ; zero for slip), which unknowns can close (bool) and what
+    they are then."""
     aperture = np.zeros((faces.n, 2, faces.per))
     aperture[:, 1] = twice_modulus * cracks.aperture[faces.source, None]
     can_close = np.zeros(aperture.shape, bool)
@@ -19,7 +20,8 @@ def closing(faces: ElementSet, cracks: Cracks, twice_modulus: float) -> tuple[np
 
 
 def strain_weights(faces: ElementSet) -> np.ndarray:
-    """(3, n_unknowns) strain of the cracks, integrated over their body (xx, yy, xy; engineering shear), from nodal slip and opening."""
+    """(3, n_unknowns) strain of the cracks, integrated over their body (xx, yy, xy; engineering shear), from nodal slip
+    and opening."""
     t, n = faces.tangent, faces.normal
     out = np.empty((3, faces.n, 2, faces.per))
     for component, axis in enumerate((t, n)):

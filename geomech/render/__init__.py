@@ -31,7 +31,9 @@ def draw(
     from .plots import plots
 
     if not len(run.history):
-        raise ValueError(f"{run.folder}: the run has no cycle yet")
+        raise ValueError(
+            f"{run.folder}: the run has no cycle yet: let it go on (`geomech resume {run.folder}`), then draw it"
+        )
     asked = run.scene.get("render", {})
     last = final_cycle(run)
     fixed = look(

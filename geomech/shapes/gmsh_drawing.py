@@ -34,8 +34,8 @@ class Parameter:
 class GmshDrawing:
     """What a model holds: ``zones`` (with named edges), ``traces`` of cracks, its ``parameters`` by short name as used,
     ``warnings`` as (message, way out): whatever is drawn and left out; ``joints``; and where they stand in the model:
-    ``places`` says, for ("zones" | "cracks" | "joints" | "marks", index), which entities they are; ``marks`` are bolts, water
-    tables and measuring points."""
+    ``places`` says, for ("zones" | "cracks" | "joints" | "marks", index), which entities they are; ``marks`` are bolts,
+    water tables and measuring points."""
 
     zones: tuple[Zone, ...]
     traces: tuple[Trace, ...]

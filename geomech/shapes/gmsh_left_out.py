@@ -1,4 +1,4 @@
-"""What a Gmsh model draws and a run would know nothing of: curves without a name inside the rock, heights off its plane."""
+"""What a Gmsh model draws and a run would know nothing of: nameless curves inside the rock, heights off its plane."""
 
 from __future__ import annotations
 

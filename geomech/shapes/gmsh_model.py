@@ -28,15 +28,16 @@ def read_gmsh_model(
     chord_tolerance: float | None = None,
     unit: str | None = None,
 ) -> GmshDrawing:
-    """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep, .step.
+    """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep,
+    .step.
 
-    A parameter is known by the last part of its name in the side panel ("Parameters/Cracks/phi_deg" is ``phi_deg``)
-    or by the whole; where the model offers named choices the name may be given. Physical surfaces are zones, one
-    block a surface; physical curves called "crack:NAME" are cracks; those called "joint:NAME" that bound no surface are
-    joints; "bolt:NAME", "water" and "water:NAME" are lines that cut nothing, and physical points called "monitor:NAME" or
-    "probe:NAME" measuring points; all other physical curves name the block edges on them. A .brep or .step without physical
-    surfaces gives a zone a surface, and what its shapes are called there names surfaces and curves. Curved edges become
-    chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side). ``unit`` (a key of
+    A parameter is known by the last part of its name in the side panel ("Parameters/Cracks/phi_deg" is ``phi_deg``) or
+    by the whole; where the model offers named choices the name may be given. Physical surfaces are zones, one block a
+    surface; physical curves called "crack:NAME" are cracks; those called "joint:NAME" that bound no surface are joints;
+    "bolt:NAME", "water" and "water:NAME" are lines that cut nothing, and physical points called "monitor:NAME" or
+    "probe:NAME" measuring points; all other physical curves name the block edges on them. A .brep or .step without
+    physical surfaces gives a zone a surface, and what its shapes are called there names surfaces and curves. Curved
+    edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side). ``unit`` (a key of
     `geomech.shapes.field_lines.METRES`) is what the model is drawn in, default m; for a .step, what the file says.
 
     Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
@@ -135,9 +136,9 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
 
 
 def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:
-    """(name, physical tag, entities) of all physical points (0), curves (1) and surfaces (2). A file of shapes has no physical
-    groups: there every surface counts, and shapes are called what the file calls them. Points without a name only held a
-    size of elements, or a place."""
+    """(name, physical tag, entities) of all physical points (0), curves (1) and surfaces (2). A file of shapes has no
+    physical groups: there every surface counts, and shapes are called what the file calls them. Points without a name
+    only held a size of elements, or a place."""
     groups: dict[int, list[tuple[str, int, list[int]]]] = {0: [], 1: [], 2: []}
     for dim in (0, 1, 2):
         for _, group in gmsh.model.getPhysicalGroups(dim):

@@ -38,8 +38,8 @@ def open_model(gmsh, path: Path) -> None:
 
 
 def _forget_rest(gmsh) -> None:
-    """Gmsh's parser keeps what follows a fault in its line, and reads that before the next file: give it empty ones, which
-    take a word each, until nothing is left."""
+    """Gmsh's parser keeps what follows a fault in its line, and reads that before the next file: give it empty ones,
+    which take a word each, until nothing is left."""
     with tempfile.TemporaryDirectory() as folder:
         empty = Path(folder) / "empty.geo"
         empty.write_text("\n")

@@ -14,7 +14,8 @@ from .gmsh_opening import open_model
 def open_with_parameters(gmsh, path: Path, wanted: Mapping[str, float | str]) -> dict[str, Parameter]:
     """Open the model with ``wanted`` set; all its parameters as used, by short name.
 
-    What is known is set and the model read again, until the rest is known too: a parameter may appear with another's value.
+    What is known is set and the model read again, until the rest is known too: a parameter may appear with another's
+    value.
     """
     known = _opened(gmsh, path)
     waiting = dict(wanted)
@@ -40,7 +41,8 @@ def open_with_parameters(gmsh, path: Path, wanted: Mapping[str, float | str]) ->
 
 
 def _opened(gmsh, path: Path) -> dict[str, Parameter]:
-    """(Re)read the model; what it lets its user choose, by short name (by the whole one where another has the short one)."""
+    """(Re)read the model; what it lets its user choose, by short name (by the whole one where another has the short
+    one)."""
     open_model(gmsh, path)
     found = {}
     for name in gmsh.onelab.getNames():

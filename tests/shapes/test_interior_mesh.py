@@ -164,7 +164,8 @@ def test_default_sizes_are_a_few_thousand_triangles_and_quick():
     began = time.process_time()
     mesh = mesh_interior(blocks.loops(0), cracks)
     assert 1500 < len(mesh.triangles) < 6000
-    # Measured 0.04 s of processor time, which others on the machine lengthen less than the clock's; the bound leaves them room.
+    # Measured 0.04 s of processor time, which others on the machine lengthen less than the clock's; the bound leaves
+    # them room.
     assert time.process_time() - began < 0.6
 
 
