@@ -1,7 +1,8 @@
 """What a step of many blocks costs and how right it is: walls and jointed slopes of 100 to 100 000 blocks.
 
 Steps of 10 ms from rest under sudden weight, as many as half a minute has room for (one at least); the cost of an open–close
-iteration is that of the step over its iterations. Beside it the share of the contact search, the memory of the process, the
+iteration, one set of contact states or one step of the central path, is that of the step over its iterations. The last of these
+steps says what a step costs once the blocks have come to rest, if there was time for that. Beside it the share of the contact search, the memory of the process, the
 exponent of the cost, iterative solutions of the last equations, and errors against closed forms.
 """
 
@@ -42,7 +43,8 @@ GOALS, EXPONENT, SEARCH = {1000: 6e-3, 10_000: 0.1}, 1.1, 0.25
 
 @dataclass(frozen=True)
 class Cost:
-    """Medians over ``steps``: seconds of a step, of an iteration, of its solution, and of a step's contact search; memory of
+    """Medians over ``steps``: seconds of a step, of an iteration, of its solution, and of a step's contact search; seconds and
+    iterations of the ``last`` step; memory of
     the process at its peak, MB; ``factored`` of every factorisation; ``imbalance``: error of weight − inertia = reaction."""
 
     scene: str
@@ -54,6 +56,8 @@ class Cost:
     iteration: float
     solution: float
     search: float
+    last: float
+    last_iterations: int
     memory: float
     factored: float
     imbalance: float
@@ -65,7 +69,6 @@ class Watch:
 
     search: float = 0.0
     solution: float = 0.0
-    solutions: int = 0
     last: tuple | None = None
 
 
@@ -85,9 +88,9 @@ def _watched() -> Iterator[Watch]:
         finally:
             watch.search += time.perf_counter() - began
 
-    def timed(work, solutions, *given):
+    def timed(work, *given):
         nonlocal inside
-        if inside:  # a rough solution that asks for an exact one counts once
+        if inside:  # a rough solution may ask for an exact one
             return work(*given)
         inside, began = True, time.perf_counter()
         try:
@@ -95,15 +98,14 @@ def _watched() -> Iterator[Watch]:
         finally:
             inside = False
             watch.solution += time.perf_counter() - began
-            watch.solutions += solutions
 
     def timed_solve(self, data, right, *within):
         watch.last = self, data, right
-        return timed(solve, 1, self, data, right, *within)
+        return timed(solve, self, data, right, *within)
 
     def timed_roughly(self, data, within):
-        solution = timed(roughly, 0, self, data, within)
-        return lambda right: timed(solution, 1, right)
+        solution = timed(roughly, self, data, within)
+        return lambda right: timed(solution, right)
 
     ContactFinder.find, BlockSolver.solve, BlockSolver.rough_solution = timed_find, timed_solve, timed_roughly
     try:
@@ -148,21 +150,21 @@ def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, obje
     with _watched() as watch:
         began = time.perf_counter()
         while not rows or (time.perf_counter() - began < longest and len(rows) < 40):
-            before = watch.search, watch.solution, watch.solutions
+            before = watch.search, watch.solution
             start = time.perf_counter()
             result = system.step(state, WEIGHT)
             seconds = time.perf_counter() - start
             state = result.state
-            spent, solution, solutions = (
-                after - b for after, b in zip((watch.search, watch.solution, watch.solutions), before, strict=True)
-            )
+            spent, solution = watch.search - before[0], watch.solution - before[1]
+            # Correctors solve again with the same factors: iterations are fewer than solutions.
+            iterations = result.statistics["open_close_iterations"]
             rows.append(
                 {
                     "seconds": seconds,
-                    "iterations": solutions,
-                    "iteration": (seconds - spent) / solutions,
+                    "iterations": iterations,
+                    "iteration": (seconds - spent) / iterations,
                     "search": spent,
-                    "solution": solution / solutions,
+                    "solution": solution / iterations,
                 }
             )
     return rows, watch, result, system
@@ -188,6 +190,8 @@ def _measured(name: str, blocks: Blocks, longest: float, also_iterated: bool) ->
         median("iteration"),
         median("solution"),
         median("search"),
+        rows[-1]["seconds"],
+        rows[-1]["iterations"],
         peak_memory(),
         counts["shares"] / max(1, counts["factorisations"]),
         _imbalance(blocks, system, result),
@@ -268,16 +272,16 @@ def errors() -> dict[str, float]:
 
 
 def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict], errors: dict[str, float]) -> str:
-    head = "  scene          blocks  contacts  steps  iterations   s/step  ms/iteration  of it solving  search/step"
+    head = "  scene          blocks  contacts  steps  iterations   s/step  ms/iteration  of it solving  search/step  last step (iterations)"
     busy = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     lines = [
         f"steps of {1e3 * TIME_STEP:g} ms from rest under sudden weight; medians, the first step left out; iterations are",
-        f"solutions of the step's equations; {len(os.sched_getaffinity(0))} cores, load average of the machine {busy}",
+        f"factorisations of the step's equations; {len(os.sched_getaffinity(0))} cores, load average of the machine {busy}",
         f"{head}   memory  imbalance",
     ]
     lines += [
         f"  {c.scene:<13}{c.blocks:8d}{c.contacts:10d}{c.steps:7d}{c.iterations:12.1f}{c.step:9.3g}{1e3 * c.iteration:14.2f}"
-        f"{c.solution / c.iteration:15.0%}{c.search / c.step:13.1%}{c.memory:7.0f} MB{c.imbalance:11.1e}"
+        f"{c.solution / c.iteration:15.0%}{c.search / c.step:13.1%}{c.last:12.3g} s ({c.last_iterations:3d})    {c.memory:7.0f} MB{c.imbalance:11.1e}"
         for c in costs
     ]
     lines += [f"  exponent of an iteration's cost, {name}: {e:.2f} (goal {EXPONENT})" for name, e in exponents.items()]

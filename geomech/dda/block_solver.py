@@ -122,18 +122,29 @@ class BlockSolver:
                 x = None
             if x is not None:
                 return x
-            # Beyond single precision: double from now on.
-            self._factors, self._has_factors = Factors(*self._pattern), False
+            # Beyond single precision, as many sets of states are that are far from the right ones.
+            self._hold(np.float64)
         return self._solved(data, right, within)
+
+    def _hold(self, dtype: type) -> None:
+        """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.6 GB."""
+        tree, self._has_factors = self._factors.tree, False
+        del self._factors
+        self._factors = Factors(*self._pattern, dtype, tree)
 
     def rough_solution(self, data: np.ndarray, within: float) -> Callable[[np.ndarray], np.ndarray]:
         """What gives x (6n,) for one right side after the other with a residual ``within`` that part of it, from factors in single
         precision (half the time of double ones, where that is all the digits asked for), which leave those of `solve`
-        alone. Raises numpy.linalg.LinAlgError."""
+        alone, unless they are of so many blocks that single ones take their place. Raises numpy.linalg.LinAlgError."""
 
         def exactly(right: np.ndarray) -> np.ndarray:
-            return self.solve(data, right, within)
+            single = self._factors.single
+            x = self.solve(data, right, within)
+            self._rough_serves &= not single or self._factors.single
+            return x
 
+        if self.n >= SINGLE and self._rough_serves and not self._factors.single:
+            self._hold(np.float32)
         if self._factors.single or not self._rough_serves:
             return exactly
         if self._rough is None:
@@ -162,11 +173,14 @@ class BlockSolver:
     def _solved(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
         """`solve` with the factors as they are; None where single precision does not do."""
         if self._has_factors:
+            fresh = False
             changed = _changed(data, self._diagonal, self._factored, CHANGED)
             if np.count_nonzero(changed) > (0 if self._factors.tree.kept else FEW):
                 self.factor(data, changed)
+                # Single precision knows no more of this matrix than that, in full or in part.
+                fresh = self._factors.single
             x = self._iterate(data, right, within)
-            if x is not None:
+            if x is not None or fresh:
                 return x
         self.factor(data)
         if self._factors.single:

@@ -166,10 +166,12 @@ class CentralPath:
         some, held = (np.flatnonzero(act & which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
         order = pattern.order
         self._some, self._held = some, held
-        self._at, self._held_at, self._all_at = (
-            (found.block[rows], found.other[rows], order, np.ascontiguousarray(vectors[rows]))
-            for rows in (some, held, np.concatenate([some, held]))
-        )
+
+        def at(rows: np.ndarray) -> tuple[np.ndarray, ...]:
+            return found.block[rows], found.other[rows], order, np.ascontiguousarray(vectors[rows])
+
+        self._at, self._held_at = at(some), at(held)
+        self._all_at = at(np.concatenate([some, held])) if len(held) else self._at
         self._upper, self._lower, self._all_lift = (
             np.concatenate([array[some], array[held]]) for array in (pattern.upper, pattern.lower, springs.lift)
         )
@@ -202,6 +204,11 @@ class CentralPath:
     def blocked(self) -> bool:
         """Whether the last iterations hardly got ahead."""
         return self._blocked >= _BLOCKED
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the path ended where only round-off is left to decide."""
+        return self.ended and not self.epsilon > _END
 
     @property
     def unknowns(self) -> np.ndarray:

@@ -42,10 +42,11 @@ _LITTLE, _MORE = 12, 5
 #: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path takes
 #: fifteen; it is asked after so many iterations.
 _FEW, _CAUTIOUS = 40, 12
-#: The central path proposes states when no more than this part of the contacts are undecided, nor more than so many (a wall of
-#: 10 000 bricks takes half the iterations that it takes without this second bound), and no more than this part of the forces on
-#: blocks is out of balance.
-_DECIDED, _LEFT, _BALANCED = 0.006, 12, 1e-3
+#: The central path proposes states when no more than this part of the contacts are undecided, nor more than so many or so small
+#: a part (a wall of 10 000 bricks takes half the iterations that it takes without this second bound), and no more than this
+#: part of the forces on blocks is out of balance. At its end, where ε is round-off, the first of these suffices: a wall of
+#: 100 000 bricks leaves twenty that hardly touch.
+_DECIDED, _LEFT, _LEFT_PART, _BALANCED = 0.006, 12, 2e-4, 1e-3
 #: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces change
 #: by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
 _PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
@@ -230,13 +231,18 @@ def _proposed(
             undecided = path.advance()
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
-        if path.ended or (path.blocked and not patient):
-            return None, spent
-        if undecided <= max(2, min(_LEFT, _DECIDED * len(bonded))) and path.missed < _BALANCED:
+        few = _DECIDED * len(bonded)
+        if not path.arrived:
+            if path.ended or (path.blocked and not patient):
+                return None, spent
+            few = min(few, max(_LEFT, _LEFT_PART * len(bonded)))
+        if undecided <= max(2, few) and path.missed < _BALANCED:
             states = _States(*path.states(), bonded)
             if states.key not in offered:
                 offered.add(states.key)
                 return states, spent
+        if path.ended:
+            return None, spent
     return None, max(budget, 0)
 
 

@@ -91,9 +91,17 @@ def test_single_precision_is_refined_to_the_same_residual(monkeypatch):
     x = solver.solve(data.ravel(), right)
     assert np.abs(x - expected).max() <= 1e-8 * np.abs(expected).max()
     assert solver._factors.single
-    # Beyond its range it is double after all.
+    # Beyond its range it is double after all, …
     x = solver.solve(1e50 * data.ravel(), right)
     assert not solver._factors.single
+    assert np.abs(1e50 * x - expected).max() <= 1e-8 * np.abs(expected).max()
+    # … until few digits will do: then single precision takes its place, not one beside it, unless it does not serve there either.
+    x = solver.rough_solution(data.ravel(), 1e-4)(right)
+    assert solver._factors.single and solver._rough is None
+    assert np.abs(solver.multiply(data.ravel(), x) - right).max() <= 1e-4 * np.abs(right).max()
+    for _ in range(2):
+        x = solver.rough_solution(1e50 * data.ravel(), 1e-4)(right)
+        assert not solver._factors.single
     assert np.abs(1e50 * x - expected).max() <= 1e-8 * np.abs(expected).max()
 
 

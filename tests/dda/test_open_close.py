@@ -86,3 +86,34 @@ def test_bonds_break_only_where_they_must():
         # A second is statics: the first period of such a beam is 0.08 s.
         rows = system.step(State.at_rest(blocks), WEIGHT, 1.0).contacts
         assert rows["bonded"].all() == holds
+
+
+class _PathOf:
+    """A central path that leaves so many contacts undecided, one after the other."""
+
+    blocked, missed = False, 0.0
+
+    def __init__(self, undecided, arrived):
+        self._left, self._arrived = list(undecided), arrived
+        self.ended = self.arrived = False
+
+    def advance(self):
+        undecided = self._left.pop(0)
+        self.ended, self.arrived = not self._left, self._arrived and not self._left
+        return undecided
+
+    def states(self):
+        return np.full(10_000, 1), np.zeros(10_000)
+
+
+@pytest.mark.parametrize(("undecided", "arrived", "taken"), [
+    ([400, 12, 1], True, 2),  # few enough before the end
+    ([400, 50, 20], True, 3),  # at its end the path has said all it can
+    ([400, 50, 20], False, None),  # short of it, it has not
+    ([400, 50, 80], True, None),
+])  # fmt: skip
+def test_a_path_that_arrives_proposes_its_states_though_some_contacts_hardly_touch(undecided, arrived, taken):
+    bonded = np.zeros(10_000, np.int64)
+    states, spent = open_close._proposed(_PathOf(undecided, arrived), bonded, set(), 60, False)
+    assert (states is not None) == (taken is not None)
+    assert spent == (taken or 3)
