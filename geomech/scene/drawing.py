@@ -257,7 +257,7 @@ def _assembled(
         blocks, _ = assemble(parts.zones, (), parts.edges, geometry.tolerance_m)
         for k, only in parts.only_in.items():
             parts.joints[k] = within(parts.joints[k], [zone for zone in parts.zones if zone.name in only])
-        _tell_outside(parts, place, warnings)
+        _tell_outside(geometry, parts, place, warnings)
         cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints)
     except ShapeError as error:
         counted_from = f"; coordinates count from ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
@@ -293,21 +293,26 @@ def _source(flaw: Flaw, parts: _Parts, joints: Sequence[str], own: Sequence[str]
     return parts.sources.get((flaw.part, key), (("geometry", flaw.part, index), ""))
 
 
-def _tell_outside(parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
-    """Warn of joints from files of which nothing lies in the rock: units or origins that differ."""
+def _tell_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
+    """Warn of joints, drawn in the scene or from files, of which nothing lies in the rock: units or origins that differ."""
     import shapely
 
-    found = [(joint, *parts.sources["joints", joint.name]) for joint in parts.joints]
-    found = [(joint, path, at) for joint, path, at in found if path != ("geometry", "model")]
+    found = [
+        (JOINT + joint.name, [np.array(joint.points, dtype=float).reshape(-1, 2)], ("geometry", "joints", k), "")
+        for k, joint in enumerate(geometry.joints)
+    ]
+    found += [(joint.name, joint.lines, *parts.sources["joints", joint.name]) for joint in parts.joints]
+    found = [(*joint, path, at) for *joint, path, at in found if path != ("geometry", "model")]
     if not found:
         return
     rock = [shapely.Polygon(zone.loops[0], zone.loops[1:]) for zone in parts.zones]
     shapely.prepare(rock)
-    for joint, path, at in found:
-        lines = np.array([shapely.LineString(line) for line in joint.lines], dtype=object)
+    for name, drawn, path, at in found:
+        lines = np.array([shapely.LineString(line) for line in drawn], dtype=object)
         if not any(shapely.intersects(polygon, lines).any() for polygon in rock):
-            message = f"{at}: {joint.name!r} cuts nothing: none of its traces lies in the rock"
-            warnings.append(Fault(place(path), message, "is its unit or place wrong?"))
+            what = "none of its traces lies" if at else "no part of it lies"
+            message = f"{name!r} cuts nothing: {what} in the rock"
+            warnings.append(Fault(place(path), f"{at}: {message}" if at else message, "is its unit or place wrong?"))
 
 
 def _loops(zone) -> tuple[np.ndarray, ...]:

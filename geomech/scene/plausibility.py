@@ -8,7 +8,7 @@ from ..conventions import outward_normal_of
 from .actions import traction_history
 from .checks import material_of
 from .errors import Check
-from .held_blocks import fixed_blocks
+from .held_blocks import fixed_blocks, held_unknowns
 from .tables import SceneTables
 from .tables.loads import TractionTable
 
@@ -18,6 +18,8 @@ NEAR_MISS = 0.01
 SIZES = 1e-3, 100.0
 #: Rocks are stiffer and tougher by orders of magnitude: Pa, and Pa √m. Below, the number is in GPa or MPa.
 LEAST_MODULUS, LEAST_TOUGHNESS = 1e6, 1e3
+#: The lightest pumice weighs more, kg/m³. Below (but for 0, which is meant), the number is in g/cm³ or t/m³.
+LEAST_DENSITY = 100.0
 #: A cracked block that lies on a fixed one with a side so many times as long as the block is deep behind it. Contacts press linearly
 #: there; on a rigid base true pressure keeps under its load. K is 2 % off for 1, 1.4 times too large for 1½, twice for 2, 5 times
 #: for 3 (`tests/scene/test_plausibility.py`).
@@ -34,8 +36,10 @@ def check_plausible(c: Check) -> None:
     _size(c)
     _near_misses(c)
     _strain(c)
+    _gravity(c)
     _weightless(c)
     _shallow(c)
+    _increment(c)
 
 
 def _materials(c: Check) -> None:
@@ -52,6 +56,51 @@ def _materials(c: Check) -> None:
                 f"the fracture toughness of {name!r} is {m.k_ic_pa_sqrt_m:g} Pa √m, far below that of any rock",
                 "the unit is Pa √m: 1.2 MPa √m is 1.2e6",
             )
+    # One light material among others of true weight is meant so: walls that only guide.
+    name, heaviest = max(c.tables.materials.items(), key=lambda item: item[1].density_kg_m3)
+    if 0 < heaviest.density_kg_m3 < LEAST_DENSITY:
+        c.warn(
+            ("materials", name, "density_kg_m3"),
+            f"the density of {name!r} is {heaviest.density_kg_m3:g} kg/m³, less than that of any rock",
+            "the unit is kg/m³: 2.6 t/m³ is 2600",
+        )
+
+
+def _gravity(c: Check) -> None:
+    """Weight that points to the sky, or that nothing bears."""
+    loads, place = c.tables.loads, ("loads", "gravity_m_s2")
+    if not any(loads.gravity_m_s2):
+        return
+    if loads.gravity_m_s2[1] > 0:
+        c.warn(place, "gravity points upwards", "y runs up: the weight of rock is gravity_m_s2 = [0, -9.81]")
+    pushed = (
+        loads.tractions or loads.forces or loads.motions or loads.point_motions or loads.bolts
+        or loads.viscous_boundaries or loads.water is not None
+    )  # fmt: skip
+    if not pushed and not fixed_blocks(c.tables, c.drawing).any() and held_unknowns(c.tables, c.drawing) is None:
+        c.warn(
+            place,
+            "no block is fixed or guided, and nothing else bears their weight: all of them fall together",
+            "say `fixed = true` in the [zones.NAME] of what they stand on",
+        )
+
+
+def _increment(c: Check) -> None:
+    """An advance that crosses a block at a stroke has no path."""
+    increment, blocks = c.tables.growth.increment_m, c.drawing.blocks
+    if increment is None:
+        return
+    for b in np.unique(c.drawing.cracks.block).tolist():
+        own = blocks.vertices[blocks.vertex_start[b] : blocks.vertex_start[b + 1]]
+        largest = float(np.ptp(own, axis=0).max())
+        if increment > largest:
+            c.warn(
+                ("growth", "increment_m"),
+                f"an advance of {increment:g} m is more than all of {blocks.names[b]!r}, which is {largest:.3g} m: a tip "
+                "crosses it at a stroke",
+                "is it in metres? Unset, it is a tenth of the shortest crack",
+            )
+            return
 
 
 def _weightless(c: Check) -> None:

@@ -28,6 +28,7 @@ def warnings_of(scene_file, *changes, overrides=()):
     [
         (("= 20e9", "= 20.0"), "materials.rock.youngs_modulus_pa", "is 20 Pa", "50 GPa is 50e9"),
         (("= 1e6", "= 1.0"), "materials.rock.k_ic_pa_sqrt_m", "is 1 Pa √m", "1.2e6"),
+        (("= 2500", "= 2.5"), "materials.rock.density_kg_m3", "is 2.5 kg/m³", "is 2600"),
         # 10 MPa at the end of the run, on 0.1 GPa: 10 %.
         (("= 20e9", "= 0.1e9"), "loads.tractions[0]", "10 MPa would strain 'rock' (E = 0.1 GPa) by 10 %", "modulus"),
         # The flaw's upper end is 0.1 sin 30° above its centre: 1 mm below a top at 1.051 m, half a hundredth of 0.2 m.
@@ -188,3 +189,60 @@ def test_in_situ_stress_before_there_is_weight_is_told(scene_file, ramp, told):
         scene_file, overrides=["loads.gravity_m_s2=[0, -9.81]", f"loads.gravity_ramp_s={ramp}", *stress]
     )
     assert ["leave `gravity_ramp_s` out" in w.way_out for w in found] == [True] * told
+
+
+STANDING = """
+[[geometry.zones]]
+name = "block"
+rectangle = [0.0, 0.0, 1.0, 1.0]
+[[geometry.zones]]
+name = "ground"
+rectangle = [-1.0, -1.0, 2.0, 0.0]
+[[geometry.joints]]
+name = "seam"
+points = [[{x}, -0.5], [{x}, 1.5]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2500
+[zones.ground]
+fixed = true
+[joints.default]
+friction_angle_deg = 30
+[loads]
+gravity_m_s2 = [0.0, -9.81]
+[dda]
+dynamic_factor = 1.0
+[run]
+end_time_s = 1.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("overrides", "told"),
+    [
+        ([], []),
+        (["zones.ground.fixed=false"], ["all of them fall together"]),
+        (["loads.gravity_m_s2=[0, 9.81]"], ["gravity points upwards"]),
+        (["zones.ground.fixed=false", 'zones.ground.guided="x"'], []),
+        (["zones.ground.fixed=false", "loads.gravity_m_s2=[0, 0]"], []),
+        (["materials.rock.density_kg_m3=0"], []),
+    ],
+)
+def test_weight_that_nothing_bears_is_told(scene_file, overrides, told):
+    found = load_scene(scene_file(STANDING.format(x=0.5)), overrides).warnings
+    assert [w.message[-len(message) :] for w, message in zip(found, told, strict=True)] == told
+
+
+@pytest.mark.parametrize(("x", "told"), [(0.5, 0), (500.0, 1)])
+def test_a_drawn_joint_that_is_nowhere_in_the_rock_is_told(scene_file, x, told):
+    found = load_scene(scene_file(STANDING.format(x=x))).warnings
+    assert ["'joint:seam' cuts nothing" in w.message for w in found] == [True] * told
+    assert all(w.place.endswith("geometry.joints[0]") for w in found)
+
+
+@pytest.mark.parametrize(("increment", "told"), [(1.9, 0), (2.1, 1)])
+def test_an_advance_longer_than_the_rock_is_told(scene_file, increment, told):
+    """The plate is 1 × 2 m."""
+    found = warnings_of(scene_file, overrides=[f"growth.increment_m={increment}"])
+    assert ["crosses it at a stroke" in w.message for w in found] == [True] * told
