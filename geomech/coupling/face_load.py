@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+
 from ..model import Blocks
 from .face_pressure import linear, no_pull
 from .load_pieces import SAME, Pieces, add_corner_force, add_edge_force, add_on_side, line_of, on_grid, place_along
@@ -40,9 +42,9 @@ def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touc
             for a, b, p_a, p_b in found:
                 t_a, t_b = ((p * per_push[0], p * per_push[1]) for p in (p_a, p_b))
                 add_on_side(pieces, blocks, side, line, (first + a, first + b), t_a, t_b)
-            for force, (_, touch) in ((at_first, low), (at_last, high)):
+            for force, place in ((at_first, first), (at_last, last)):
                 if force:
-                    add_lone(pieces, blocks, touch, (force * per_push[0], force * per_push[1]))
+                    add_at_end(pieces, blocks, side, line, place, (force * per_push[0], force * per_push[1]))
             if even:
                 q = share * shear / (last - first)
                 add_on_side(pieces, blocks, side, line, (first, last), (q * ax, q * ay), (q * ax, q * ay))
@@ -60,6 +62,17 @@ def _ends(acting: list, gapes: list, length: float, way: int) -> list[tuple[tupl
     give, gap = max(-closed[1].gap, 0.0), max(nearest[1].gap, 0.0)
     share = give / (give + gap) if give > 0 else 0.0
     return [(of, part) for of, part in ((closed, 1.0 - share), (nearest, share)) if part > 0]
+
+
+def add_at_end(
+    pieces: Pieces, blocks: Blocks, side: list[int], line: tuple, place: float, force: tuple[float, float]
+) -> None:
+    """A ``force`` at a ``place`` of a straight side where its pressure ends: that on the grid, from which moments are taken, and
+    not that of the contact, which is off it."""
+    start, _, (ax, ay), _ = line
+    marks = [place_along(blocks.vertices[k].tolist(), start, (ax, ay)) for k in side[1:-1]]
+    edge = side[bisect_right(marks, place)]
+    add_edge_force(pieces, blocks, edge, (start[0] + place * ax, start[1] + place * ay), force)
 
 
 def add_lone(pieces: Pieces, blocks: Blocks, touch: Touch, force: tuple[float, float]) -> None:

@@ -19,6 +19,7 @@ import numpy as np
 
 from .. import dda
 from ..conventions import normal_of, traction
+from ..dda.overlap import REFUSED
 from ..model import OPEN, Blocks, Loads, State
 from .splitting import Split
 from .tractions import BoundaryLoad
@@ -31,9 +32,13 @@ _ALIGNED = 0.9975
 _IN_ROCK = 12
 #: Gauss points on a piece of a load that is linear: its moment is a cubic at most.
 _IN_LOAD = 2
-#: Faces that are farther apart than this part of the smaller block's size (√area) are told to be so far: contacts are sought as
-#: far off as faces pass each other by, which must not reach the blocks' other sides.
+#: Faces that are farther apart than this part of the smaller block's size (√area) are told to be so far, and press no deeper into
+#: each other: contacts are sought as far off as faces pass each other by, which must not reach the blocks' other sides.
 _FARTHEST = 0.02
+#: Faces have opened, beyond the width that they were given, by no more than this part of that size. Parts stand where their parent
+#: did, face on face, and as they close lie in each other by the gap that is told; one that hung by a thread had opened by any
+#: amount, without inertia. Half of what is refused in a drawing.
+_OPENED = 0.5 * REFUSED
 #: Mean strains of cracks up to here are small: strains of rock that breaks are a few thousandths.
 _SMALL = 0.01
 #: Forces below this part of the largest are round-off.
@@ -49,7 +54,8 @@ class _Faces:
     share: np.ndarray  # (k,) m
     traction: np.ndarray  # (k, 2) Pa
     ends: np.ndarray  # (n, 2, 2) of each element
-    gap: np.ndarray  # (n, 2) m
+    width: np.ndarray  # (n, 1) m, apart as given
+    opening: np.ndarray  # (n, 2) m
     slip: np.ndarray  # (n, 2) m
 
     @classmethod
@@ -71,7 +77,8 @@ class _Faces:
             np.linalg.solve(table, whole).ravel(),
             faces.traction[:, 1:-1].reshape(-1, 2),
             ends,
-            np.maximum(faces.opening[:, [0, -1]] + aperture, 0.0),
+            aperture,
+            faces.opening[:, [0, -1]],
             faces.slip[:, [0, -1]],
         )
 
@@ -83,12 +90,13 @@ class _Faces:
             return None
         return _along(self.nodes[here], a, b)[0], self.share[here], self.traction[here]
 
-    def ends_at(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(2,) gap and (2,) slip at the ends of the segment from ``a`` to ``b``."""
+    def ends_at(self, a: np.ndarray, b: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
+        """(2,) gap and (2,) slip at the ends of the segment from ``a`` to ``b``, opened by ``most`` m."""
         here = self._elements_on(a, b)
         points = self.ends[here].reshape(-1, 2)
         nearest = [int(np.argmin(np.hypot(*(points - end).T))) for end in (a, b)]
-        return self.gap[here].ravel()[nearest], self.slip[here].ravel()[nearest]
+        gap = np.maximum(self.width[here] + np.minimum(self.opening[here], most), 0.0)
+        return gap.ravel()[nearest], self.slip[here].ravel()[nearest]
 
     def _elements_on(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """(n,) which elements have their middle on the segment from ``a`` to ``b``."""
@@ -184,7 +192,7 @@ def _turned(vectors: np.ndarray, angle: float) -> np.ndarray:
 def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rotation: float) -> None:
     """The tractions, gaps and slip of the faces along which ``parent`` is cut, to the contacts between its parts."""
     blocks = split.blocks
-    faces = _Faces.of(solution)
+    faces, size = _Faces.of(solution), np.sqrt(blocks.areas())
     points, following, owner = blocks.vertices, blocks.next_vertex, blocks.vertex_block
     own = np.flatnonzero((split.edge_origin < 0) & (split.parent[owner] == parent))
     edge_of = {(*points[e].tolist(), *points[following[e]].tolist()): int(e) for e in own}
@@ -206,7 +214,7 @@ def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rota
             gap, slip = np.zeros(2), np.zeros(2)
         else:
             place, share, stress = known
-            gap, slip = faces.ends_at(a, b)
+            gap, slip = faces.ends_at(a, b, _OPENED * float(min(size[part] for part in pair)))
         along = -normal_of(normal)
         force = -share[:, None] * (stress[:, :1] * normal + stress[:, 1:] * along)
         weight = np.clip(np.stack([1 - place, place]), 0.0, 1.0)

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ddm.loads import resultants
+from ..ddm.loads import first_moments, resultants
 from ..model import Blocks, Motion
 from .face_load import add_face, add_lone
 from .load_pieces import Pieces, add_edge_piece, add_point_load
@@ -39,7 +39,8 @@ class BoundaryLoad:
     segments (m, 2, 2) pieces of the outline, directed along it; tractions (m, 2, 2) at their two ends, linear between;
     points and forces (k, 2) what acts at points, None without, ``kelvin`` as in `ddm.BodyLoad`;
     body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
-    resultant that inertia had to balance beyond the solver's own acceleration, relative to the forces' size.
+    resultant that inertia had to balance beyond the solver's own acceleration on the block as it is strained, relative to the
+    forces' size.
     """
 
     segments: np.ndarray
@@ -97,42 +98,50 @@ def boundary_load(
     segments, tractions = pieces.arrays()
     inside = pieces.inside()
     return _balanced(
-        block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
+        block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
         route == "kelvin-springs",
     )  # fmt: skip
 
 
 def _balanced(
-    block, blocks, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction, kelvin
-) -> BoundaryLoad:
+    block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
+    kelvin,
+) -> BoundaryLoad:  # fmt: skip
     area, centroid, second = blocks.area_moments(block)
-    (xx, xy), (_, yy) = second.tolist()
     (c, s), _ = turn_back.tolist()
     bxx = bxy = byy = 0.0  # the body force's gradient, still symmetric
-    carried, angular = np.zeros(2), 0.0
+    carried, turned = np.zeros(2), 0.0
     if density:
         g = np.zeros(2) if gravity is None else np.asarray(gravity, dtype=float)
         ax, ay, angular, exx, eyy, shear = (0.0,) * 6 if acceleration is None else acceleration.tolist()
         bxx = density * (spin**2 - c * c * exx - s * s * eyy - s * c * shear)
         byy = density * (spin**2 - s * s * exx - c * c * eyy + s * c * shear)
         bxy = -density * (s * c * (eyy - exx) + 0.5 * (c * c - s * s) * shear)
-        carried, angular = turn_back @ (density * (g - (ax, ay))), density * angular
+        carried, turned = turn_back @ (density * (g - (ax, ay))), density * angular
+    held = 0.0
     if reaction is not None:
-        carried = carried + turn_back @ reaction[:2] / area
-        angular -= float(reaction[2]) / (xx + yy)
-    force, moment, size = resultants(segments, tractions, centroid)
+        carried, held = carried + turn_back @ reaction[:2] / area, float(reaction[2])
+    force, _, size = resultants(segments, tractions, centroid)
+    spread = first_moments(segments, tractions, centroid)
     if inside is not None:
-        arm, (fx, fy) = (inside[0] - centroid).T, inside[1].T
         force = force + inside[1].sum(axis=0)
-        moment += float(np.sum(arm[0] * fy - arm[1] * fx))
+        spread = spread + (inside[0] - centroid).T @ inside[1]
         size += float(np.abs(inside[1]).sum())
-    # ∫ (x b_y − y b_x) dA of b = B x
-    moment += bxy * xx + byy * xy - bxx * xy - bxy * yy
-    body_force, torque = -force / area, moment / (xx + yy)
-    gradient = np.array([[bxx, bxy + torque], [bxy - torque, byy]])
+    symmetric = np.array([[bxx, bxy], [bxy, byy]])
+    moment = _turning(spread + second @ symmetric)
+    body_force, torque = -force / area, moment / float(np.trace(second))
+    gradient = symmetric + np.array([[0.0, torque], [-torque, 0.0]])
     imbalance = 0.0
     if size > 0:
-        missed = math.hypot(*(body_force - carried)) * area + abs(torque - angular) * (xx + yy) / math.sqrt(area)
-        imbalance = missed / size
+        # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as much.
+        strain = turn_back @ motion.gradient[block]
+        strained = strain @ second @ strain.T
+        missed = _turning(strain @ spread + strained @ symmetric) + held - turned * float(np.trace(strained))
+        imbalance = (math.hypot(*(body_force - carried)) * area + abs(missed) / math.sqrt(area)) / size
     points, forces = inside or (None, None)
     return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, points, forces, kelvin)
+
+
+def _turning(spread: np.ndarray) -> float:
+    """The moment of forces f at arms r, of which ``spread`` is Σ r ⊗ f."""
+    return float(spread[0, 1] - spread[1, 0])

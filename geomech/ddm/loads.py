@@ -289,13 +289,24 @@ def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -
     """(force (2,), moment about ``about``, sum of the sizes of all forces) of linear tractions on ``segments``."""
     if not len(segments):
         return np.zeros(2), 0.0, 0.0
+    arms, forces = _arms_and_forces(segments, tractions, about)
+    moment = float((arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]).sum())
+    return 3 * forces.sum(axis=(0, 1)), moment, 3 * float(np.hypot(forces[..., 0], forces[..., 1]).sum())
+
+
+def first_moments(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> np.ndarray:
+    """(2, 2) ∫ r ⊗ t ds of linear ``tractions`` on ``segments``, with the arms r from ``about``, N m."""
+    arms, forces = _arms_and_forces(segments, tractions, about)
+    return arms.reshape(-1, 2).T @ forces.reshape(-1, 2)
+
+
+def _arms_and_forces(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 2, 2) twice, of which the products at all ends add up to those of arms and tractions along the segments: ∫ x t of two
+    functions linear along a length L is L/6 Σ x_i t_j, those of the same end counted twice."""
     ends = segments - about
     along = ends[:, 1] - ends[:, 0]
     forces = (np.hypot(along[:, 0], along[:, 1]) / 6)[:, None, None] * tractions
-    # ∫ x × t of two functions linear along a length L is L/6 Σ x_i × t_j, those of the same end counted twice.
-    arms = ends + ends.sum(axis=1, keepdims=True)
-    moment = float((arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]).sum())
-    return 3 * forces.sum(axis=(0, 1)), moment, 3 * float(np.hypot(forces[..., 0], forces[..., 1]).sum())
+    return ends + ends.sum(axis=1, keepdims=True), forces
 
 
 @dataclass(frozen=True, eq=False)

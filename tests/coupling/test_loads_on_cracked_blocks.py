@@ -87,11 +87,11 @@ ALL = {
 def test_equilibrium_of_a_cracked_block_closes_under_every_load(name):
     records = list(cycles(problem(ALL[name])))
     assert records[-1].state.time == pytest.approx(2.0)
-    # Forces act where the blocks were as the step began; from the second step on that is off the reference frame by the
-    # block's strain, 1e-5, of which the moment of the forces misses a part. The first step is exact.
+    # Forces act where the blocks were as the step began, and are weighed against inertia there. From the second step on contacts are
+    # off the outline by their gaps, of a part in 1e7, at which shear has an arm. The first step is exact.
     first, last = records[1].statistics["traction_imbalance"], records[-1].statistics["traction_imbalance"]
     assert first < 1e-10
-    assert last < 1e-4
+    assert last < 1e-6
     assert np.abs(records[-1].tips["k_ii"]).max() > 0
 
 
@@ -101,7 +101,7 @@ def test_shaking_strains_a_cracked_block_by_its_inertia(frame):
     loads = Loads(gravity=GRAVITY, base=BaseMotion(record, frame))
     records = list(cycles(problem(loads, end=0.02, dynamic=1.0)))
     assert records[1].statistics["traction_imbalance"] < 1e-9
-    assert records[-1].statistics["traction_imbalance"] < 1e-4
+    assert records[-1].statistics["traction_imbalance"] < 1e-6
 
 
 def test_a_cracked_block_that_is_taken_out_has_no_tips_any_more():

@@ -12,6 +12,7 @@ from geomech.coupling import split_forces
 from geomech.coupling.balance import balanced
 from geomech.coupling.cracked_blocks import CrackedBlocks
 from geomech.coupling.growing import take_growth
+from geomech.dda.overlap import REFUSED
 from geomech.ddm.growth import Growth, Join
 from geomech.model import (
     OPEN,
@@ -210,6 +211,29 @@ def test_a_slot_closes_by_its_width_before_it_bears():
     assert shut["lift"] == pytest.approx(mouth["lift"], rel=1e-12)
 
 
+def test_faces_that_a_thread_held_apart_meet_before_they_lie_in_each_other(monkeypatch):
+    """What a crack has opened by is told, but no more than a part of the blocks' size below what is refused in a drawing: the parts
+    stand face on face, and close by as much. The width of a slot is told, besides."""
+
+    def widest(width):
+        now = stepped(plate((0.0, 1e6), 0.6, aperture=width))
+        # Held by a thousandth of its length it opens by several times the plate's σ H / E'.
+        assert now.solutions[0].faces.opening.max() > 1e-4
+        cut(now)
+        rows = now.state.contacts
+        return rows["gap"][rows["state"] == OPEN].max(), float(np.sqrt(now.blocks.areas().min()))
+
+    monkeypatch.setattr(split_forces, "_OPENED", 1e-5)
+    gap, size = widest(0.0)
+    assert gap == pytest.approx(1e-5 * size, rel=1e-6)
+    gap, size = widest(1e-3)
+    assert gap == pytest.approx(1e-3 + 1e-5 * size, rel=1e-6)
+    monkeypatch.undo()
+    assert split_forces._OPENED < REFUSED
+    gap, size = widest(0.0)
+    assert gap <= split_forces._OPENED * size * (1 + 1e-9)
+
+
 def test_platens_press_on_parts_as_on_the_whole():
     """A crack along the load divides the faces under the platens: each part bears its share of the width at once."""
     now = stepped(plate((0.0, -1e6), 0.6, line=[[0.1, -1.0], [0.1, 0.0], [0.1, 0.999]], platen=True))
@@ -269,7 +293,7 @@ def test_elements_graded_to_a_corner_are_no_part_of_the_segment_that_leaves_it()
     nodes = ends[:, :1] + np.array([0.02, 0.5, 0.98])[:, None] * (ends[:, 1:] - ends[:, :1])
     length = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 3, 3)
     nothing = np.zeros((2, 2))
-    faces = split_forces._Faces(nodes.reshape(-1, 2), length, np.ones((6, 2)), ends, nothing, nothing)
+    faces = split_forces._Faces(nodes.reshape(-1, 2), length, np.ones((6, 2)), ends, nothing[:, :1], nothing, nothing)
     assert faces.on(np.zeros(2), np.array([1.0, -0.3])) is None
     place, share, _ = faces.on(*ends[0])
     assert share.sum() == pytest.approx(np.hypot(1.0, 0.5))

@@ -203,6 +203,24 @@ def test_turned_block_sees_its_forces_in_its_own_frame():
     assert there.tractions == pytest.approx(here.tractions, abs=1e-13)
 
 
+@pytest.mark.parametrize("share", [1e-3, 0.02, 0.2])
+def test_a_force_at_the_end_of_a_face_that_is_off_the_grid_keeps_its_moment(share):
+    """Pressures end on a grid; where the resultant is near an end, of which the contact lies off it by up to 1.2e-4 of the side,
+    part of it is a lone force there."""
+    blocks = Blocks.from_polygons([SQUARE, SQUARE + [0.3333, 1.0]])
+    top, bottom = edge_between(blocks, 0, [1, 1], [0, 1]), edge_between(blocks, 1, [0.3333, 1], [1.3333, 1])
+    ends = np.array([[0.3333, 1.0], [1.0, 1.0]])
+    rows = [
+        contact(vertex_at(blocks, 1, ends[0]), top, 1, 0, ends[0], [0, 1], 1 - share, 0.2 * (1 - share)),
+        contact(vertex_at(blocks, 0, ends[1]), bottom, 0, 1, ends[1], [0, -1], share, 0.2 * share),
+    ]
+    load = load_of(0, blocks, rows)
+    force, moment, _ = resultants(load.segments, load.tractions, np.zeros(2))
+    assert force == pytest.approx([0.2, -1.0], abs=1e-13)
+    # Of the pushes at both ends, and of the shear along y = 1.
+    assert moment == pytest.approx(-(0.3333 * (1 - share) + share) - 0.2, abs=1e-12)
+
+
 def test_bonds_that_pull_have_linear_pressure_and_no_jump():
     """The resultant of two bonded contacts leaves the face: tractions change as little as it does. A face without tensile
     strength is a triangle, and at last a lone force, before; a bond goes on as the linear pressure it has beyond."""
