@@ -33,7 +33,7 @@ SIZES = (100, 1000, 10_000, 100_000)
 #: Blocks up to which the last equations are solved iteratively too (block Jacobi takes minutes beyond), in a quick run and else.
 ITERATED = 100, 1000
 #: CPU seconds from which on no further step is begun, in a quick run and else; blocks beyond which walls only are stepped: the
-#: first step of 100 000 bricks takes four minutes of CPU, of so many blocks of a slope it is not known to end.
+#: first step of 100 000 bricks takes 31 iterations, 190 s of CPU and 3.2 GB, of so many blocks of a slope it is not known to end.
 LONGEST, WALLS = (2.0, 15.0), 10_000
 SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
 

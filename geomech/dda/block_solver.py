@@ -127,7 +127,7 @@ class BlockSolver:
         return self._solved(data, right, within)
 
     def _hold(self, dtype: type) -> None:
-        """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.6 GB."""
+        """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.4 GB."""
         tree, self._has_factors = self._factors.tree, False
         del self._factors
         self._factors = Factors(*self._pattern, dtype, tree)
