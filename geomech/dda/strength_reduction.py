@@ -126,7 +126,7 @@ def factor_of_safety(
     Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what stands,
     and another way there may find a factor that differs by some thousandths where contacts slide and stick again.
 
-    Raises ValueError when there is no strength to reduce or nothing that moves, `NotConverged` when the blocks do not stand
+    Raises ValueError when there is no strength to reduce, nothing that moves, or a ground that does, `NotConverged` when the blocks do not stand
     even with joints 64 times as strong.
     """
     names = [law.name for law in joints]
@@ -140,6 +140,11 @@ def factor_of_safety(
         raise ValueError(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
     if blocks.fixed.all():
         raise ValueError("all blocks are fixed: none could fail")
+    if loads.base is not None and loads.base.frame == "ground":
+        raise ValueError(
+            'statics know no ground that moves: leave the base\'s motion out, or give it the frame "base", in which it is the'
+            " weight's own kind of force, the one of the time that is asked for"
+        )
     trials: list[Trial] = []
     settings = replace(settings or DdaSettings(), dynamic_factor=0.0)
 

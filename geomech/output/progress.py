@@ -15,6 +15,9 @@ from geomech.model import Cycle, Problem, counted
 from . import checkpoint
 from .condition import closing, told
 
+#: Events at which a run may have been asked to stop, `run.stop_at`; it can go on beyond them.
+STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split")
+
 
 class Progress:
     """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
@@ -131,6 +134,8 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
             f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with growth, "
             f"{1e3 * summary['crack_growth_m']:.3g} mm of new crack in {summary.get('wall_s', math.nan):.2f} s"
         )
+    if summary.get("end") in STOPS:
+        lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")
     return [*lines, f"  {folder}"]
 
 

@@ -31,6 +31,9 @@ from .world import moved
 #: The file that a pipeline folder holds.
 SCENE_FILE = "scene.toml"
 
+#: What a scene's geometry.model may be, and is taken for a scene at times.
+MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf")
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -198,6 +201,9 @@ def _file(path: FilePath) -> FilePath:
             way = f"name one of {others}" if others else "name a scene file, or a folder that holds one"
             raise SceneError([Fault(str(path), f"the folder holds no {SCENE_FILE}", way)])
         return inside
+    if path.is_file() and path.suffix.lower() in MODELS:
+        way = f'write a scene file with [geometry] model = "{path.name}"; a folder\'s is called {SCENE_FILE}'
+        raise SceneError([Fault(str(path), "this is a drawing, not a scene", way)])
     if not path.is_file():
         near = [str(path.parent / p.name) for p in path.parent.iterdir()] if path.parent.is_dir() else []
         near = [n for n in near if n.endswith(".toml") or FilePath(n, SCENE_FILE).is_file()]

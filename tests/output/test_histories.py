@@ -294,3 +294,10 @@ def test_writing_imports_no_vtk(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_closing_lines_say_how_to_go_on_beyond_a_stop(tmp_path):
+    from geomech.output.progress import closing_lines
+
+    assert f"geomech resume {tmp_path} --set 'run.stop_at=[]'" in "\n".join(closing_lines({"end": "split"}, tmp_path))
+    assert "resume" not in "\n".join(closing_lines({"end": "collapse"}, tmp_path))

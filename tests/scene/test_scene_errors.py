@@ -534,3 +534,10 @@ def test_coincident_cracks_are_named(scene_file):
     )
     (error,) = faults(scene_file, GOOD.replace("[[geometry.edges]]", again, 1))
     assert "'flaw' and 'twin' lie on one another" in error.message and "geometry.cracks[1]" in error.place
+
+
+def test_a_drawing_is_not_a_scene(tmp_path):
+    drawing = tmp_path / "slope.geo"
+    drawing.write_text("Point(1) = {0, 0, 0};\n")
+    with pytest.raises(SceneError, match=r'drawing, not a scene[^\n]*\n?[^\n]*model = "slope\.geo"'):
+        load_scene(drawing)

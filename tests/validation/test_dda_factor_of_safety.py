@@ -8,7 +8,19 @@ from block_problems import GRAVITY, WEIGHT, rectangle, turned
 
 from geomech import dda
 from geomech.dda.strength_reduction import reduced
-from geomech.model import GROUND, Blocks, Bolt, DdaSettings, Excavation, History, JointLaw, Loads, Material, Roughness
+from geomech.model import (
+    GROUND,
+    BaseMotion,
+    Blocks,
+    Bolt,
+    DdaSettings,
+    Excavation,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Roughness,
+)
 from geomech.reference import rock_slopes, toppling_slope
 
 DIP = np.radians(35)
@@ -46,6 +58,20 @@ def test_plane_failure_with_cohesion(friction_deg, cohesion):
     found = slab(law)
     print(f"φ = {friction_deg}°, c = {cohesion / 1e3:g} kPa: {found.factor:.4f}, should be {expected:.4f}")
     assert found.factor == pytest.approx(expected, rel=2e-3)
+
+
+def test_plane_failure_in_an_earthquake():
+    """Pseudo-static: seen from the base its acceleration is a body force; a ground that moves is none, and refused."""
+    along, up, law = np.array([np.cos(DIP), np.sin(DIP)]), np.array([0.0, 2.0]), JointLaw("plane", np.radians(50))
+    polygons = [turned(rectangle(-3, -2, 8, 0), DIP), np.array([0 * along, 4 * along, 4 * along + up, up])]
+    blocks, a = Blocks.from_polygons(polygons, fixed=[True, False]), 2.0
+    record = History.constant([a, 0.0])
+    found = dda.factor_of_safety(blocks, [ROCK], [law], Loads(WEIGHT.gravity, base=BaseMotion(record, "base")))
+    c, s = np.cos(DIP), np.sin(DIP)
+    expected = np.tan(law.friction_angle) * (GRAVITY * c - a * s) / (GRAVITY * s + a * c)
+    assert found.factor == pytest.approx(expected, rel=1e-9)
+    with pytest.raises(ValueError, match='frame "base"'):
+        dda.factor_of_safety(blocks, [ROCK], [law], Loads(WEIGHT.gravity, base=BaseMotion(record)))
 
 
 def test_plane_failure_of_a_rough_joint():
