@@ -57,14 +57,15 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`, also where blocks and cracks agree at no
     step.
     """
-    begun = now.response
-    for _ in range(1 if now.problem.dda.dynamic_factor == 0.0 else 1 + SHORTER):
+    begun, static = now.response, now.problem.dda.dynamic_factor == 0.0
+    # At rest nothing is taken to hang for its softness (`hanging`), but where there is no answer without it.
+    for soft_ones_hang in (False, True) if static else (True,) * (1 + SHORTER):
         now.response = begun
-        found, differences = _passes(now, dt, load_time)
+        found, differences = _passes(now, dt, load_time, soft_ones_hang)
         lost = np.flatnonzero(differences > NO_ANSWER)
         if not len(lost):
             return found
-        dt = 0.5 * found.result.dt
+        dt = dt if static else 0.5 * found.result.dt
     blocks = [now.blocks.names[b] for b in np.array(list(now.solutions), int)[lost]]
     raise dda.NotConverged(
         f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and the cracks in it find no common strain in "
@@ -72,7 +73,9 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     )
 
 
-def _passes(now: CrackedBlocks, dt: float, load_time: float | None) -> tuple[Balance, np.ndarray]:
+def _passes(
+    now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool
+) -> tuple[Balance, np.ndarray]:
     """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative strain)."""
     settling = Settling()
     static = now.problem.dda.dynamic_factor == 0.0
@@ -90,8 +93,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None) -> tuple[Bal
         now.acted = result.statistics
         if not now.bodies:
             return Balance(result, {}, np.empty(0, TIP)), np.zeros(0)
-        # At rest nothing is taken to hang for its softness alone (`hanging`).
-        if not static:
+        if soft_ones_hang:
             now.hanging.find(now.bodies, now.system.compliance, result.contacts)
         _solve_bodies(now, result)
         response, differences = _take_response(now, result.state, settling, tolerance)

@@ -9,7 +9,7 @@ a uniform stress, faces closing or not. W is convex: blocks and cracks agree in 
 tips is solved under the actual forces as ever.
 
 In statics no motion can take energy from anywhere, and passes that agree are an equilibrium of the forces that act: there a block
-hangs only where its passes do not agree. (A specimen sheared between the halves of a box has no shear on its sides, which its mean
+hangs only where its passes do not agree, and all soft ones only in a step in which that is not enough. (A specimen sheared between the halves of a box has no shear on its sides, which its mean
 stress would put there: as it came to hang it bore 4 % less at once, and its cracks then ran through.)
 """
 
