@@ -73,9 +73,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     )
 
 
-def _passes(
-    now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool
-) -> tuple[Balance, np.ndarray]:
+def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool) -> tuple[Balance, np.ndarray]:
     """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative strain)."""
     settling = Settling()
     static = now.problem.dda.dynamic_factor == 0.0

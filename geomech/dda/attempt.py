@@ -129,8 +129,8 @@ class Attempt:
         held = self._held()
         own = self.matrix, self.right
         self.iterations = 0
-        for _ in range(_PLACED):
-            if found.points is not None:
+        for tries in range(1, 2 * _PLACED + 1):
+            if found.points is not None or tries > 1:
                 self.matrix, self.right = own[0].copy(), own[1].copy()
             springs, gap, weight, curved = self._over_the_step(found)
             vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, self.moments)
@@ -152,6 +152,9 @@ class Attempt:
             better = found.misplaced(settled)
             if better is None:
                 break
+            if tries % _PLACED == 0:
+                # Which part touches may follow contacts that jump at any step: these faces stand on their corners in this one.
+                better = found.cornered(better)
             found = better.trying(found.rows(settled))
         else:
             raise Unsettled("faces do not settle on the part of them that touches")

@@ -125,6 +125,10 @@ class ContactSet:
         better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
         return None if better is None else self.lumped.placed(better)
 
+    def cornered(self, better: ContactSet) -> ContactSet:
+        """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other parts."""
+        return self.lumped.placed(self.points.but(better.points))
+
     @cached_property
     def gap(self) -> np.ndarray:
         """(n,) m from where the faces meet, negative where the vertex penetrates."""

@@ -110,6 +110,14 @@ class FacePoints:
         """The same faces on the parts that forces ``normal`` (n,) N at the corners press on."""
         return replace(self, part=_pressed(normal[self.ends], self.held, self.shortest))
 
+    def but(self, others: FacePoints) -> FacePoints | None:
+        """These faces without those that ``others``, the same faces, have on other parts; None where none is left."""
+        kept = (self.part == others.part).all(axis=1)
+        if not kept.any():
+            return None
+        own = {name: getattr(self, name)[kept] for name in self.__dataclass_fields__ if name != "corners"}
+        return replace(self, **own)
+
     @property
     def place(self) -> np.ndarray:
         """(m, 2) where along the face the springs of its contacts stand, in parts of it."""

@@ -150,3 +150,18 @@ def test_the_same_step_again_begins_with_the_parts_that_it_has_ended_with():
     assert first.statistics["open_close_iterations"] > 3
     assert again.statistics["open_close_iterations"] == 1
     assert again.state.rotation == pytest.approx(first.state.rotation, rel=1e-3)
+
+
+def test_a_face_that_goes_back_and_forth_stands_on_its_corners(monkeypatch):
+    """One step's worth of it: the rotation is that of springs k ℓ/2 at the corners, M/(k ℓ³/4)."""
+    tried = []
+
+    def restless(self, gap, state, holds):
+        tried.append(len(self.ends))
+        there = np.array([[0.0, 0.9]]) if len(tried) % 2 else np.array([[0.1, 1.0]])
+        return replace(self, part=np.broadcast_to(there, self.part.shape).copy())
+
+    monkeypatch.setattr(FacePoints, "better", restless)
+    _, turn = pressed(on_a_bed(beside=0.5), 0.1, steps=1)
+    assert tried == [1] * 20
+    assert turn == pytest.approx(-THRUST * 0.1 / (STIFFNESS * FACE**3 / 4), rel=1e-5)
