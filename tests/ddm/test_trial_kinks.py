@@ -37,6 +37,7 @@ def test_short_kinks_are_those_of_no_length():
         np.testing.assert_allclose(angle, expected[0], atol=math.radians(2))
 
 
+@pytest.mark.slow
 def test_confined_cracks_grow_in_shear():
     """A closed crack with friction at 55°, σ3/σ1 = 0.2: kinks of no length make wings, at 76°; those of a tenth of
     the crack's half are pressed shut and go straight on, driven by shear, at a K_eq that is K_II K_Ic/K_IIc (growth

@@ -65,6 +65,7 @@ def test_joints_link_from_the_toe_up_and_the_path_cuts_the_slope(four):
     assert area * 2600 * 9.81 == pytest.approx(seen.weight, rel=0.01)
 
 
+@pytest.mark.slow
 def test_loads_go_with_the_toughness(four, tmp_path):
     """Friction alone: stresses go with gravity, so that a tip of twice the toughness asks for twice the gravity. Here half, which
     the ramp reaches sooner."""
