@@ -155,7 +155,7 @@ def _loads(runs: dict[int, Watch]) -> Part:
     after.append(
         "Coalescence: the inner wings run towards each other and tips join what is nearer than 1 mm. With finer increments the load"
         " tends to 218, 351, about 340 and 227 MPa (φ = 0, 30, 60, 90); at φ = 0 and 30 growth is unstable there, and any join"
-        " length from 1 to 2 mm gives the same. Increments of 1 mm miss the peaks between them, by 3 to 8 %: see convergence."
+        " length from 1 to 2 mm gives the same. Increments of 1 mm miss the peaks between them, by 3 to 10 %: see convergence."
     )
     after.append("σ_F is taken as the stress of coalescence. The paper prints no numbers with Figures 16 and 17.")
     return Part("Loads and strains (Figures 15, 16, 17)", headers, rows, after=after)
