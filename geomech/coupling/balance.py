@@ -57,7 +57,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`, also where blocks and cracks agree at no
     step.
     """
-    begun, static = now.response, now.problem.dda.dynamic_factor == 0.0
+    begun, static = now.response, now.system.scheme.static
     # At rest nothing is taken to hang for its softness (`hanging`), but where there is no answer without it.
     for soft_ones_hang in (False, True) if static else (True,) * (1 + SHORTER):
         now.response = begun
@@ -76,7 +76,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool) -> tuple[Balance, np.ndarray]:
     """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative strain)."""
     settling = Settling()
-    static = now.problem.dda.dynamic_factor == 0.0
+    static = now.system.scheme.static
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     asked, response = dt, now.response
     result, iterations, tried_whole = None, 0, False

@@ -47,7 +47,8 @@ class BlockSystem:
     ``compliance`` (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
     contacts and the ``load_map``; and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
     (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
-    ``allowed_penetration`` (m) is zero where penalty springs hold alone.
+    ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``slack`` (m) is the rounding of coordinates: less is
+    no motion.
 
     Raises ValueError when materials or joints are missing or a block has no area.
     """
@@ -96,7 +97,7 @@ class BlockSystem:
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self.mass = self.density * areas
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
-        self._slack = _SLACK * float(np.abs(vertices).max())
+        self.slack = _SLACK * float(np.abs(vertices).max())
         self._limit = min(
             self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
         )
@@ -111,12 +112,7 @@ class BlockSystem:
             raise ValueError(f'contact is "penalty" or "augmented", not {self.settings.contact!r}')
         if not 0 < share < 1:
             raise ValueError(f"penetration_tolerance must lie between 0 and 1, got {share!r}")
-        return max(share * size, _FINEST * self._slack)
-
-    @property
-    def slack(self) -> float:
-        """The rounding of coordinates, m: less is no motion."""
-        return self._slack
+        return max(share * size, _FINEST * self.slack)
 
     @property
     def allowed_ratio(self) -> float:

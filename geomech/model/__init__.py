@@ -11,7 +11,7 @@ from .joint import JointLaw, Roughness
 from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
 from .material import Material
 from .motion import Motion
-from .problem import WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
+from .problem import STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, State
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "OPEN",
     "SLIP",
     "STICK",
+    "STOPS",
     "TIP",
     "UNKNOWNS",
     "WEIGHT",

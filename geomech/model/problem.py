@@ -102,6 +102,10 @@ class GrowthSettings:
     speed_limit: float = 0.4
 
 
+#: Kinds of events that may end a run, of which `RunSettings.stop_at` names some.
+STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split")
+
+
 @dataclass(frozen=True)
 class RunSettings:
     """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``.

@@ -10,13 +10,10 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from geomech.model import Cycle, Problem, counted
+from geomech.model import STOPS, Cycle, Problem, counted
 
 from . import checkpoint
 from .condition import closing, told
-
-#: Events at which a run may have been asked to stop, `run.stop_at`; it can go on beyond them.
-STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split")
 
 
 class Progress:

@@ -27,12 +27,12 @@ DIP = np.radians(35)
 ROCK = Material("rock", 50e9, 0.0, density=2600.0)
 
 
-def slab(law: JointLaw, penalty: float | None = None, **kwargs) -> dda.FactorOfSafety:
+def slab(law: JointLaw, penalty: float | None = None, loads: Loads = WEIGHT, **kwargs) -> dda.FactorOfSafety:
     """4 m along a plane that dips 35°, 2 m high, with upright sides."""
     along, up = np.array([np.cos(DIP), np.sin(DIP)]), np.array([0.0, 2.0])
     polygons = [turned(rectangle(-3, -2, 8, 0), DIP), np.array([0 * along, 4 * along, 4 * along + up, up])]
     blocks = Blocks.from_polygons(polygons, fixed=[True, False])
-    return dda.factor_of_safety(blocks, [ROCK], [law], WEIGHT, DdaSettings(normal_penalty=penalty), **kwargs)
+    return dda.factor_of_safety(blocks, [ROCK], [law], loads, DdaSettings(normal_penalty=penalty), **kwargs)
 
 
 SLAB = 2600 * GRAVITY * 2 * 4 * np.cos(DIP)
@@ -62,16 +62,14 @@ def test_plane_failure_with_cohesion(friction_deg, cohesion):
 
 def test_plane_failure_in_an_earthquake():
     """Pseudo-static: seen from the base its acceleration is a body force; a ground that moves is none, and refused."""
-    along, up, law = np.array([np.cos(DIP), np.sin(DIP)]), np.array([0.0, 2.0]), JointLaw("plane", np.radians(50))
-    polygons = [turned(rectangle(-3, -2, 8, 0), DIP), np.array([0 * along, 4 * along, 4 * along + up, up])]
-    blocks, a = Blocks.from_polygons(polygons, fixed=[True, False]), 2.0
+    law, a = JointLaw("plane", np.radians(50)), 2.0
     record = History.constant([a, 0.0])
-    found = dda.factor_of_safety(blocks, [ROCK], [law], Loads(WEIGHT.gravity, base=BaseMotion(record, "base")))
+    found = slab(law, loads=Loads(WEIGHT.gravity, base=BaseMotion(record, "base")))
     c, s = np.cos(DIP), np.sin(DIP)
     expected = np.tan(law.friction_angle) * (GRAVITY * c - a * s) / (GRAVITY * s + a * c)
     assert found.factor == pytest.approx(expected, rel=1e-9)
     with pytest.raises(ValueError, match='frame "base"'):
-        dda.factor_of_safety(blocks, [ROCK], [law], Loads(WEIGHT.gravity, base=BaseMotion(record)))
+        slab(law, loads=Loads(WEIGHT.gravity, base=BaseMotion(record)))
 
 
 def test_plane_failure_of_a_rough_joint():

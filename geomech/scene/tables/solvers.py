@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from ...model import rayleigh_coefficients
+from ...model import STOPS, rayleigh_coefficients
 from .entries import NotNegative, Pair, Positive, Table
 
 
@@ -159,9 +159,9 @@ class GrowthTable(Table):
 
 class RunTable(Table):
     end_time_s: Positive = Field(description="the run ends at this time, s")
-    stop_at: Annotated[
-        tuple[Literal["initiation", "birth", "coalescence", "self", "daylighting", "split"], ...], Strict(False)
-    ] = Field(("coalescence", "split"), description="the run ends at the first event of these kinds")
+    stop_at: Annotated[tuple[Literal[STOPS], ...], Strict(False)] = Field(
+        ("coalescence", "split"), description="the run ends at the first event of these kinds"
+    )
     stepping: Literal["fixed", "events"] = Field(
         "fixed",
         description='static load steps: "fixed", of `dda.time_step_s`; "events", that end at the very load at which a tip '
