@@ -105,6 +105,7 @@ def boundary_loads(
             None if forces.reaction is None else forces.reaction[b],
             problem.run.boundary_stress,
             strengths,
+            None if forces.overstress is None else forces.overstress[b],
         )
         for b in bodies
     }
@@ -166,7 +167,17 @@ def threads_for(bodies: dict[int, Body]) -> int | None:
 
 
 #: What of a `BoundaryLoad` is a load.
-_ASKED = ("segments", "tractions", "body_force", "body_force_gradient", "about", "points", "forces", "kelvin")
+_ASKED = (
+    "segments",
+    "tractions",
+    "body_force",
+    "body_force_gradient",
+    "about",
+    "remote_stress",
+    "points",
+    "forces",
+    "kelvin",
+)
 
 
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:

@@ -4,7 +4,7 @@ at their tips as they grow, and set free where blocks part.
 The block solver knows the work of its mean stress on the strain of its cracks, A σ : dε_c. By Clapeyron's theorem a body with
 jumps [u] whose faces bear t where the same loads would bring t₀ without them stores ½ ∫ (t₀ − t)·[u] more; what a tip
 releases over an increment is ∫ G da, G = (K_I² + K_II²)/E' (Irwin 1957), by the trapezoidal rule of G before, of K_eq, for the
-way it turns, and after. So four quantities found apart from each other have to add up; what is left over is told.
+way it turns, and after, of the load between that of the step's begin and its end. So four quantities found apart from each other have to add up; what is left over is told.
 """
 
 from __future__ import annotations
@@ -19,6 +19,12 @@ from ..model import Blocks, Material, State
 if TYPE_CHECKING:
     from ..ddm import Solution
     from .hanging import Hanging
+
+_Key = tuple[int, int]
+
+
+def _keys(tips: np.ndarray) -> list[_Key]:
+    return list(zip(tips["crack"].tolist(), tips["end"].tolist()))
 
 
 @dataclass(eq=False)
@@ -44,10 +50,17 @@ class CrackEnergy:
     _released: float = 0.0
     _parted: bool = False
     _hanging: frozenset[int] = frozenset()
-    _growing: dict[tuple[int, int], tuple[float, float]] = field(default_factory=dict)
+    #: (crack, end) → way, G before it, J/m², and what part of G there was over the step, of its end's.
+    _growing: dict[_Key, tuple[float, float, float]] = field(default_factory=dict)
+    #: Tips as the present step began, and in its first pass.
+    _began: np.ndarray | None = None
+    _first: np.ndarray | None = None
+    _last: np.ndarray | None = None
 
     def passed(self, tips: np.ndarray, blocks: Blocks, materials: tuple[Material, ...], hanging: Hanging) -> None:
         """A pass of the present step has ended with ``tips``, of which some are about to grow, or none; some are in blocks ``hanging``."""
+        self._first = tips if self._first is None else self._first
+        self._last = tips
         if not len(tips) or not (self._growing or (tips["grown"] > 0).any()):
             return
         hangs = np.array([block in hanging for block in tips["block"].tolist()])
@@ -56,18 +69,36 @@ class CrackEnergy:
         tips = tips[~hangs]
         modulus = np.array([m.plane_modulus for m in materials])[blocks.material[tips["block"]]]
         release = (tips["k_i"] ** 2 + tips["k_ii"] ** 2) / modulus
-        keys = list(zip(tips["crack"].tolist(), tips["end"].tolist()))
+        keys = _keys(tips)
         now = dict(zip(keys, release.tolist()))
-        for key, (grown, before) in self._growing.items():
+        for key, (grown, before, share) in self._growing.items():
             if key in now:
-                self._released += 0.5 * grown * (before + now[key])
+                self._released += 0.5 * grown * share * (before + now[key])
             else:
                 # A tip that has met something: G rises without bound as the last ligament goes, its integral by no rule.
                 self._parted = True
         turned = (tips["k_eq"] ** 2 / modulus).tolist()
+        shares = self._shares()
         self._growing = {
-            key: (grown, before) for key, grown, before in zip(keys, tips["grown"].tolist(), turned) if grown > 0
+            key: (grown, before, shares.get(key, 1.0))
+            for key, grown, before in zip(keys, tips["grown"].tolist(), turned)
+            if grown > 0
         }
+
+    def _shares(self) -> dict[_Key, float]:
+        """What part of a tip's G there is over the present step, in which its load has changed: K·K₀/K² with K₀ as the step
+        began. Passes grow tips by the load of the step's end, but they grow all the time; forces that rise by a part of
+        themselves would release that part too much."""
+        if self._began is None or self._first is None:
+            return {}
+        before = {key: (row["k_i"], row["k_ii"]) for key, row in zip(_keys(self._began), self._began)}
+        shares = {}
+        for key, row in zip(_keys(self._first), self._first):
+            size = row["k_i"] ** 2 + row["k_ii"] ** 2
+            if key in before and size > 0:
+                k_i, k_ii = before[key]
+                shares[key] = max(0.0, float((k_i * row["k_i"] + k_ii * row["k_ii"]) / size))
+        return shares
 
     def parts(self) -> None:
         """Blocks part in the present step."""
@@ -96,6 +127,9 @@ class CrackEnergy:
             self.residual += rest
         self.stored, self.friction = stored, friction
         self._released, self._parted = 0.0, False
+        self._began, self._first = self._last, None
+        # What grows now does so as the next step begins.
+        self._growing = {key: (grown, g, 1.0) for key, (grown, g, _) in self._growing.items()}
 
     def statistics(self) -> dict[str, float]:
         """Columns of a history, J/m."""

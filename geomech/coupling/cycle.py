@@ -193,6 +193,7 @@ class Coupling:
                 if ends or parts:
                     now.crack_energy.after(now.state, result.state, now.blocks, now.felt(), now.hanging)
                 statistics |= now.crack_energy.statistics()
+            statistics["budget_residual"] = budget.left_over(now.crack_energy.residual)
             if self.tips is not None and len(tips):
                 statistics["fastest_tip"] = self.tips.speed.fastest(result.dt)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)

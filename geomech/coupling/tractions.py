@@ -15,6 +15,11 @@ on the boundary; "kelvin-springs" takes these by Kelvin's solution for the infin
 All of it lives in the block's reference frame: points are mapped back by the block's affine motion, forces turned
 back by its rotation. What the forces then leave out of balance is the block's inertia (d'Alembert): it is put on as
 a body force, linear in x, so that the elastic problem is in equilibrium to round-off.
+
+What the forces leave out of the block's mean stress, its strain's inertia and viscosity take: in the block solver an even
+stress, and an even stress it is here. The mean stress of the load is then the block's own, whose work on the strain of the cracks is all
+that the block spends on them. (As a body force, the strain's inertia would load a crack in the middle by half as much again, with
+nobody to do that work: cracks that run under waves gained 2 % of the load's work, and viscous stress that opened them took as much.)
 """
 
 from __future__ import annotations
@@ -27,6 +32,7 @@ import numpy as np
 
 from ..ddm.loads import first_moments, resultants
 from ..model import Blocks, Motion
+from .compliance import stress_rotation
 from .face_load import add_face, add_lone
 from .load_pieces import Pieces, add_edge_piece, add_point_load
 from .touches import faces_and_lone, on_outline, touches_of
@@ -37,6 +43,7 @@ class BoundaryLoad:
     """Load of one block's elastic body, reference frame.
 
     segments (m, 2, 2) pieces of the outline, directed along it; tractions (m, 2, 2) at their two ends, linear between;
+    remote_stress (3,) the even stress besides, Pa;
     points and forces (k, 2) what acts at points, None without, ``kelvin`` as in `ddm.BodyLoad`;
     body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
     resultant that inertia had to balance beyond the solver's own acceleration on the block as it is strained, relative to the
@@ -49,6 +56,7 @@ class BoundaryLoad:
     body_force_gradient: np.ndarray
     about: np.ndarray
     imbalance: float
+    remote_stress: np.ndarray | None = None
     points: np.ndarray | None = None
     forces: np.ndarray | None = None
     kelvin: bool = False
@@ -70,6 +78,7 @@ def boundary_load(
     reaction: np.ndarray | None = None,
     route: str = "contacts",
     tensile_strength: Sequence[float] | None = None,
+    overstress: np.ndarray | None = None,
 ) -> BoundaryLoad:
     """The load of ``block``.
 
@@ -77,7 +86,8 @@ def boundary_load(
     that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
     ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which
     is spread over the block as its inertia is; ``route``: "contacts", "springs" or "kelvin-springs";
-    ``tensile_strength`` of the joint laws, Pa (None: none has any).
+    ``tensile_strength`` of the joint laws, Pa (None: none has any); ``overstress`` (3,) what the forces balance beyond
+    the stress of the block, Pa, current axes (None: at rest).
     """
     c, s = math.cos(rotation), math.sin(rotation)
     pieces = Pieces()
@@ -99,13 +109,13 @@ def boundary_load(
     inside = pieces.inside()
     return _balanced(
         block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
-        route == "kelvin-springs",
+        route == "kelvin-springs", overstress,
     )  # fmt: skip
 
 
 def _balanced(
     block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
-    kelvin,
+    kelvin, overstress,
 ) -> BoundaryLoad:  # fmt: skip
     area, centroid, second = blocks.area_moments(block)
     (c, s), _ = turn_back.tolist()
@@ -128,9 +138,14 @@ def _balanced(
         spread = spread + (inside[0] - centroid).T @ inside[1]
         size += float(np.abs(inside[1]).sum())
     symmetric = np.array([[bxx, bxy], [bxy, byy]])
-    moment = _turning(spread + second @ symmetric)
-    body_force, torque = -force / area, moment / float(np.trace(second))
-    gradient = symmetric + np.array([[0.0, torque], [-torque, 0.0]])
+    whole = _with_torque(symmetric, spread, second)
+    gradient, remote = whole, None
+    if overstress is not None:
+        gradient = _with_torque(density * spin**2 * np.eye(2), spread, second)
+        even = second @ (whole - gradient).T / area
+        remote = np.array([even[0, 0], even[1, 1], 0.5 * (even[0, 1] + even[1, 0])])
+        remote -= stress_rotation(-math.atan2(s, c)) @ overstress
+    body_force = -force / area
     imbalance = 0.0
     if size > 0:
         # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as much.
@@ -139,7 +154,13 @@ def _balanced(
         missed = _turning(strain @ spread + strained @ symmetric) + held - turned * float(np.trace(strained))
         imbalance = (math.hypot(*(body_force - carried)) * area + abs(missed) / math.sqrt(area)) / size
     points, forces = inside or (None, None)
-    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, points, forces, kelvin)
+    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, remote, points, forces, kelvin)
+
+
+def _with_torque(symmetric: np.ndarray, spread: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """The gradient of a body force, ``symmetric`` but for the angular inertia that leaves no moment beside forces of ``spread``."""
+    torque = _turning(spread + second @ symmetric) / float(np.trace(second))
+    return symmetric + np.array([[0.0, torque], [-torque, 0.0]])
 
 
 def _turning(spread: np.ndarray) -> float:

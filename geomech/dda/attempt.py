@@ -279,7 +279,10 @@ class Attempt:
         if system.taken_out is not None:
             new_stress[system.taken_out] = 0.0
         inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
-        forces = AppliedForces(points, self.edges, self.centroid, self.moments[:, 0].copy(), inertia, reaction)
+        beyond = None
+        if not scheme.static:
+            beyond = scheme.overstress(self.increment[:, 3:], self.tangent, system.stiffness, system.mass, dt)
+        forces = AppliedForces(points, self.edges, self.centroid, self.moments[:, 0].copy(), inertia, reaction, beyond)
         imposed = None if actions is None else actions.imposed
         new_state = State(
             time=self.time,

@@ -4,7 +4,7 @@ Every step solves M ā = (weight, loads, centrifugal force) + contacts − elast
 displacement d of the step, this is a balance of works, and each work is a change of what is stored plus what is lost:
 
     kinetic    d·M ā      = ΔT + (loss of the time scheme; none where d = ½ (v + v′) dt, as in Shi's)
-    elastic    A σ̄·Δε     = ΔU + (θ − ½) A Δσ·C⁻¹Δσ + A σ′·Δe_c (the strain of cracks)
+    elastic    A σ̄·Δε     = ΔU + ½ A (σ + σ′)·Δe_c (the strain of cracks) + (θ − ½) A Δσ·Δε
     contact   −N̄ Δn − S̄ Δs = ΔΦ + friction + dashpots + broken bonds + (θ − ½) k Δg² + (θ − ½) ΔS²/kₛ …
 
 with the forces weighed between the step's start and its end (θ; 1 in Shi's scheme, see `time_integration`). What the
@@ -184,7 +184,7 @@ def step_energies(
                 u0 += 0.5 * old_stress[b, k] * compliance[b, k, m] * old_stress[b, m]
                 u1 += 0.5 * now[k] * compliance[b, k, m] * now[m]
                 opened -= compliance[b, k, m] * (now[m] - old_stress[b, m])
-            cracked += now[k] * opened
+            cracked += 0.5 * (old_stress[b, k] + now[k]) * opened
         elastic += area * u1
         before += area * u0
         # A fixed block may be made to move: what drives it works.
@@ -327,6 +327,10 @@ class EnergyBudget:
     @property
     def losses(self) -> float:
         return float(self.totals[_LOSSES].sum())
+
+    def left_over(self, at_cracks: float = 0.0) -> float:
+        """The residual as a part of all energy turned over; ``at_cracks`` J/m of the work on them are not accounted for there."""
+        return (self.residual - at_cracks) / self.turnover if self.turnover else 0.0
 
     def statistics(self) -> dict[str, float]:
         """The columns of a history, J/m."""

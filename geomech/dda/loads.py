@@ -51,6 +51,8 @@ class AppliedForces:
                                             part included; b(x) = body_force + body_force_gradient (x − centroid)
     reaction              (n_blocks, 6)     N, N m: what it takes to give moving blocks the motion that is imposed on their
                                             unknowns, about their centroids; None where none is
+    overstress            (n_blocks, 3)     Pa, current axes: what the forces balance beyond the stress of the step's end
+                                            (`TimeScheme.overstress`); None at rest
     """
 
     points: np.ndarray
@@ -59,6 +61,7 @@ class AppliedForces:
     area: np.ndarray
     inertia: Inertia
     reaction: np.ndarray | None = None
+    overstress: np.ndarray | None = None
 
     @cached_property
     def _body_forces(self) -> tuple[np.ndarray, np.ndarray]:

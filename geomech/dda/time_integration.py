@@ -80,6 +80,15 @@ class TimeScheme:
             stiffness_damping=settings.rayleigh_stiffness,
         )
 
+    def overstress(
+        self, strain: np.ndarray, tangent: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, dt: float
+    ) -> np.ndarray:
+        """(n_blocks, 3) Pa by which the stress that the forces over a step balance is more than that of its end: viscosity's, less
+        what they weigh of its start. ``strain`` (n_blocks, 3) of the step, ``tangent`` and ``stiffness`` (n_blocks, 3, 3), ``mass``
+        (n_blocks,)."""
+        drag = self.stiffness_damping + 2.0 * self.block_damping * np.sqrt(mass / (12.0 * stiffness[:, 0, 0]))
+        return (self.weight - 1.0 + drag / dt)[:, None] * (tangent @ strain[..., None])[..., 0]
+
     def begun(self, carried: np.ndarray, before: np.ndarray | None, dt: float) -> tuple[np.ndarray, float]:
         """Velocity (n_blocks, 6) that a step begins with, and by how much inertia counts more, 1/w; with no acceleration from
         ``before`` it is a step of Shi's."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,20 +72,15 @@ def last_told(problem: Problem, longest: float = np.inf) -> dict[str, float]:
     return told
 
 
-def test_sliding_and_wings_under_compression_add_up():
+@pytest.mark.parametrize("dt", [0.4, 0.2])
+def test_sliding_and_wings_under_compression_add_up(dt):
     """A closed crack at 45° that rubs and grows wings, pressed ever harder: what it stores, rubs off and releases, against
-    the work on it. What is left over is first order in the step (tips grow at its end, by what it has brought), and below 1 % with
-    34 steps."""
-    left, share = [], []
-    for dt in (0.2, 0.1):
-        told = last_told(loaded(-2e6, 3.4, dt, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0, increment=0.02))
-        parts = [told[name] for name in ("crack_elastic", "crack_friction", "fracture_energy")]
-        assert min(parts) > 0.1 * sum(parts)
-        left.append(abs(told["crack_residual"]))
-        share.append(left[-1] / sum(parts))
-        assert abs(told["energy_residual"]) < 1e-3 * told["load_work"]
-    assert share[1] < 0.01
-    assert 1.6 < left[0] / left[1] < 2.8
+    the work on it. Whatever the step, what is left over is that of the increment, 1e-3 for a twelfth of the crack."""
+    told = last_told(loaded(-2e6, 3.4, dt, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0, increment=0.02))
+    parts = [told[name] for name in ("crack_elastic", "crack_friction", "fracture_energy")]
+    assert min(parts) > 0.1 * sum(parts)
+    assert abs(told["crack_residual"]) < 2e-3 * sum(parts)
+    assert abs(told["energy_residual"]) < 1e-3 * told["load_work"]
 
 
 @pytest.mark.parametrize("dt", [0.4, 0.1])
@@ -96,21 +93,28 @@ def test_sliding_alone_adds_up_whatever_the_step(dt):
     assert abs(told["crack_residual"]) < 2e-4 * told["crack_work"]
 
 
-@pytest.mark.parametrize(("dt", "left"), [(1e-4, 0.02), pytest.param(2.5e-5, 0.006, marks=pytest.mark.slow)])
-def test_a_running_crack_adds_up_in_dynamics(dt, left):
+@pytest.mark.parametrize(
+    ("dt", "scheme"),
+    [
+        (2e-4, {}),
+        (1e-4, {}),
+        (1e-4, {"damping": 0.0, "newmark": (0.25, 0.5)}),
+        pytest.param(2.5e-5, {"damping": 0.0}, marks=pytest.mark.slow),
+    ],
+)
+def test_a_running_crack_adds_up_in_dynamics(dt, scheme):
     """A crack across a plate that is pulled within some ten passages of waves runs at 0.4 c_R to three times its length: load
-    work = elastic + kinetic + damping + scheme + stored at cracks + released at tips. What is left over is in the crack's part and
-    of first order in the step, whatever the increment: 1.5, 1.0, 0.4 % of the load's work for 100, 50, 25 µs (a step's
-    acceleration, and so the inertia that loads the crack, is that of its middle)."""
-    told = last_told(loaded(4e8, 2e-2, dt, [[-0.1, 0.0], [0.1, 0.0]], dynamic=1.0, increment=0.02), 0.7)
+    work = elastic + kinetic + damping + scheme + stored at cracks + released at tips, whatever the step, its scheme and its
+    damping: 6e-5 of the load's work are left over, of the increment and of the strain that the load turns the plate by."""
+    given = loaded(4e8, 2e-2, dt, [[-0.1, 0.0], [0.1, 0.0]], dynamic=1.0, increment=0.02)
+    told = last_told(replace(given, dda=replace(given.dda, **scheme)), 0.7)
     names = (
         "elastic_energy", "kinetic_energy", "damping_loss", "scheme_loss", "crack_elastic", "fracture_energy",
     )  # fmt: skip
     assert told["fracture_energy"] > 0.1 * told["load_work"]
-    assert abs(told["energy_residual"]) < 1e-3 * told["load_work"]
-    assert abs(told["crack_residual"]) < left * told["load_work"]
-    # Within a step the blocks' budget has the work on cracks at the stress of its end.
-    assert sum(told[name] for name in names) == pytest.approx(told["load_work"], rel=1.5 * left)
+    assert abs(told["crack_residual"]) < 2e-4 * told["load_work"]
+    assert sum(told[name] for name in names) == pytest.approx(told["load_work"], rel=2e-4)
+    assert abs(told["budget_residual"]) < 2e-4
 
 
 def test_what_parts_sets_free_what_was_stored_at_its_crack():

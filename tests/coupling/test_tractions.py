@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from geomech.coupling.compliance import stress_rotation
 from geomech.coupling.face_pressure import no_pull
 from geomech.coupling.tractions import boundary_load
 from geomech.dda import EDGE_FORCE, POINT_FORCE
@@ -181,6 +182,36 @@ def test_inertia_balances_what_contacts_leave():
     of_body = load.body_force_gradient @ second
     assert force + area * load.body_force == pytest.approx([0, 0], abs=1e-14)
     assert moment + of_body[1, 0] - of_body[0, 1] == pytest.approx(0, abs=1e-14)
+
+
+def test_inertia_and_viscosity_of_a_strain_are_an_even_stress():
+    """∫σ dV = Σ x ⊗ f + ∫ x ⊗ b: of the load's body force only that of rigid motion, and with the even stress what the whole field of
+    inertia, less the stress that viscosity bears, would make of it. For a block that has turned, too."""
+    blocks = two_squares(0.3)
+    lower_top = edge_between(blocks, 0, [1.0, 1.0], [0.0, 1.0])
+    row = contact(vertex_at(blocks, 1, [0.3, 1.0]), lower_top, 1, 0, [0.3, 1.0], [0, 1], 2.0, 0.7)
+    given = {
+        "density": 3.0,
+        "gravity": np.array([0.0, -9.81]),
+        "acceleration": np.array([0.1, 0.2, 0.7, 0.3, -0.4, 0.9]),
+    }
+    beyond = np.array([0.2, -0.3, 0.5])
+    motion = Motion.of(blocks, blocks.vertices)
+    rows = np.array([row], CONTACT)
+    for angle in (0.0, 0.4):
+        whole, even = (
+            boundary_load(1, blocks, blocks.vertices, motion, angle, rows, *NOTHING, **given, overstress=stress)
+            for stress in (None, beyond)
+        )
+        _, _, second = area_moments(blocks.loops(1))
+        assert whole.remote_stress is None
+        assert even.body_force_gradient == pytest.approx(-even.body_force_gradient.T, abs=1e-14)
+        assert even.body_force == pytest.approx(whole.body_force, abs=1e-14)
+        # (The square's area is one.)
+        missing = second @ (whole.body_force_gradient - even.body_force_gradient).T
+        assert missing[0, 1] == pytest.approx(missing[1, 0], abs=1e-14)
+        bears = even.remote_stress + stress_rotation(-angle) @ beyond
+        assert bears == pytest.approx([missing[0, 0], missing[1, 1], missing[0, 1]], abs=1e-14)
 
 
 def test_turned_block_sees_its_forces_in_its_own_frame():
