@@ -133,6 +133,9 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
         if len(i):
             _check_crossing(cracks, segments, new[i], edges[j], span, name)
         _check_mouths(cracks, new, edges, span, name)
+    elif cracks.surface[cracks.segments[new]].any():
+        s = new[int(np.argmax(cracks.surface[cracks.segments[new]].any(axis=1)))]
+        raise ValueError(f"{name(s)}: has a mouth, but in the infinite plane there is no boundary for it to be on")
     _check_pairs(cracks, segments, new, span, name)
     _check_folds(cracks, new, name)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -74,6 +75,16 @@ class DdmSettings:
     target_error: float | None = None
     grading_error: float | None = None
 
+    def __post_init__(self) -> None:
+        for name, least in (("order", 0), ("elements_per_crack", 1), ("elements_per_side", 1), ("grading_layers", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, (int, np.integer)) or value < least:
+                raise ValueError(f"{name} must be a whole number of at least {least}, got {value!r}")
+        if not 0 < self.grading_ratio < 1:
+            raise ValueError(f"grading_ratio must lie between 0 and 1, got {self.grading_ratio!r}")
+        if self.grading_error is not None and not 0 < self.grading_error < 1:
+            raise ValueError(f"grading_error must lie between 0 and 1, got {self.grading_error!r}")
+
 
 @dataclass(frozen=True)
 class GrowthSettings:
@@ -100,6 +111,19 @@ class GrowthSettings:
     initiation_spacing: float = 0.0
     trial_kink: float = 0.0
     speed_limit: float = 0.4
+
+    def __post_init__(self) -> None:
+        if not 0 < self.increment < math.inf:
+            raise ValueError(f"increment must be a length, got {self.increment!r} m")
+        if not 0 < self.min_increment <= self.increment:
+            raise ValueError(
+                f"min_increment must be a length of at most the increment of {self.increment:g} m, got {self.min_increment!r} m"
+            )
+        for name in ("join_distance", "initiation_distance", "initiation_spacing"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must not be negative, got {getattr(self, name)!r}")
+        if self.join_length is not None and not 0 < self.join_length < math.inf:
+            raise ValueError(f"join_length must be a length, got {self.join_length!r} m")
 
 
 #: Kinds of events that may end a run, of which `RunSettings.stop_at` names some.

@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 from geomech import ddm
-from geomech.ddm.criteria import kink_factors
-from geomech.model import Cracks, GrowthSettings, Material
+from geomech.ddm.criteria import kink_factors, maximum_tangential_stress
+from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
 from geomech.reference.single_flaw import wing_horii_nemat_nasser
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=1e6)
@@ -37,11 +37,13 @@ def grown(cracks, load, increment, length, loops=(), **settings):
 @pytest.mark.parametrize("beta", [15, 30, 45, 60, 75])
 def test_first_angle_of_a_slanted_crack_in_tension(beta):
     """Erdogan & Sih (1963): sin θ + cot β (3 cos θ − 1) = 0 at β from the pull, solved here by bisection. The factors of a
-    straight crack are right to 4e-5 (p = 4), the angles by as much."""
-    (step,) = grown(slanted(90 - beta), TENSION, 1e-3, 0, correct=False)
+    straight crack are right to 4e-5 (p = 4), the angles by as much; as one element it is exact, and so are they."""
     cot = 1 / math.tan(math.radians(beta))
     root = brentq(lambda t: math.sin(t) + cot * (3 * math.cos(t) - 1), 1e-9 - math.acos(1 / 3), -1e-9, xtol=1e-14)
+    (step,) = grown(slanted(90 - beta), TENSION, 1e-3, 0, correct=False)
     np.testing.assert_allclose(step.tips["angle"], root, atol=1e-4)
+    tips = ddm.Body([], slanted(90 - beta), ROCK, DdmSettings(elements_per_crack=1)).solve(TENSION).tips
+    np.testing.assert_allclose(maximum_tangential_stress(tips["k_i"], tips["k_ii"])[0], root, atol=1e-9)
 
 
 @pytest.mark.parametrize(("degrees", "load", "aperture"), [(60, TENSION, math.inf), (45, COMPRESSION, 0.0)])
