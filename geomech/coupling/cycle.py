@@ -18,7 +18,7 @@ import numpy as np
 from .. import dda
 from ..dda.excavation import until_next_event
 from ..model import TIP, Cycle, Event, Problem
-from .balance import balanced
+from .balance import Balance, balanced
 from .collapse import lost, relax
 from .cracked_blocks import CrackedBlocks
 from .elastic_range import ElasticRange
@@ -43,13 +43,16 @@ def cycles(problem: Problem) -> Iterator[Cycle]:
 @dataclass(frozen=True)
 class UnderWay:
     """A load step of which a pass has grown cracks: what its next pass, number ``next_pass``, goes on with. ``told`` are the
-    events of the pass before, ``pending`` those that taking the growth has brought."""
+    events of the pass before, ``pending`` those that taking the growth has brought; ``until``, in dynamics, the time at which the
+    pass before has ended, ``whole`` s after the step began."""
 
     dt: float
     load_time: float | None
     told: tuple[Event, ...]
     pending: tuple[Event, ...]
     next_pass: int
+    until: float | None = None
+    whole: float = 0.0
 
 
 class Coupling:
@@ -129,6 +132,7 @@ class Coupling:
             dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
             begun, self._brought = UnderWay(dt, None, (), self._brought + self._excavated(), 0), ()
         dt, load_time, pending, stops = begun.dt, begun.load_time, begun.pending, self._stops(begun.told)
+        until, whole = begun.until, begun.whole
         if begun.next_pass == 0 and static and self.problem.dda.equilibrium == "loads":
             load_time = now.state.time + until_next_event(now.problem.loads, now.state.time, dt)
             collapse = relax(now, load_time)
@@ -144,7 +148,7 @@ class Coupling:
                     found = self.events.first_pass(now, self.problem.run.end_time)
                     dt = found.result.dt
                 else:
-                    found = balanced(now, dt, load_time)
+                    found = balanced(now, dt, load_time) if until is None else self._until(until)
             except dda.NotConverged as failure:
                 if not (stops or self._stops(pending)):
                     raise
@@ -159,6 +163,8 @@ class Coupling:
             if static:
                 # The passes of a step share its load, also when one of them has to take a shorter step.
                 load_time = result.state.time
+            elif until is None:
+                until, whole = result.state.time, result.dt
             tips = found.tips
             may_grow = growth_pass < growing.max_passes
             if self.follows and not self.events.reached:
@@ -166,7 +172,7 @@ class Coupling:
             events, stops = pending, stops or self._stops(pending)
             growth = None
             if may_grow and not stops:
-                longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, result.dt, now.loads)
+                longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, whole, now.loads)
                 growth = growth_of_tips(now, tips, enough, together, longest)
             if growth is None and may_grow and not stops and growing.initiation:
                 growth, born = births(now, solutions, result.state, enough)
@@ -195,7 +201,7 @@ class Coupling:
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual)
             if self.tips is not None and len(tips):
-                statistics["fastest_tip"] = self.tips.speed.fastest(result.dt)
+                statistics["fastest_tip"] = self.tips.speed.fastest(whole)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)
             if ends:
                 if growth_pass == growing.max_passes:
@@ -207,7 +213,7 @@ class Coupling:
                 self.under_way = None
                 self.length.after(result, dt, now.system.allowed_ratio)
                 if self.tips is not None:
-                    self.tips.end(tips, now.blocks, result.dt, now.loads)
+                    self.tips.end(tips, now.blocks, whole, now.loads)
                 now.take_step(result.state, budget)
                 if growth is not None:
                     if self.events is not None:
@@ -219,9 +225,23 @@ class Coupling:
             if parts:
                 now.take_step(result.state, budget)
             pending = take_growth(now, growth, result.state, solutions)
-            self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1)
+            self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1, until, whole)
             self.between()
         raise AssertionError("unreachable: the last pass takes no growth")
+
+    def _until(self, until: float) -> Balance:
+        """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of that time: where
+        the blocks now need shorter steps, it takes as many as lead there, and all but the last are gone on from."""
+        now = self.now
+        while True:
+            found = balanced(now, until - now.state.time, None)
+            result = found.result
+            if until - result.state.time <= 1e-9 * result.dt:
+                return replace(found, result=replace(result, state=replace(result.state, time=until)))
+            self.range.check(now.motion(result.state), now.blocks, result.state.time)
+            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, now.hanging)
+            now.crack_energy.after(now.state, result.state, now.blocks, now.felt(), now.hanging)
+            now.take_step(result.state, now.budget.after(result.energy, result.state.time))
 
     def _excavated(self) -> tuple[Event, ...]:
         """Take out the blocks whose time has come; an event for each."""

@@ -15,19 +15,29 @@ def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touc
     line = start, _, (ax, ay), length = line_of(blocks, side)
     places = [place_along(touch.point, start, (ax, ay)) for touch in touches]
     acting = [(place, touch) for place, touch in zip(places, touches) if touch.acts]
-    total = moment = shear = size = 0.0
-    for place, (x, y) in ((place, touch.force) for place, touch in acting):
+    total = moment = shear = size = turned = stretched = 0.0
+    for place, touch in acting:
+        (x, y), (px, py) = touch.force, touch.point
         push = ax * y - ay * x  # inward: the direction turned by +90°
+        along = ax * x + ay * y
         total += push
         moment += push * place
-        shear += ax * x + ay * y
+        shear += along
+        stretched += along * place
+        # A contact that is pressed in, or gapes, has its shear off the side.
+        turned -= along * (ax * (py - start[1]) - ay * (px - start[0]))
         size += abs(x) + abs(y)
     # The force that goes with a unit of pressure: shear in proportion to it, evenly spread where faces are held
     # together besides and there is none to go by. Pressure on a bond that may pull is linear, and shear even, wherever
     # its resultant is: it goes on without a jump as that leaves the face.
     reach = [place for place, _ in acting]
     holds = all(touch.holds for _, touch in acting)
-    even = holds or abs(total) <= 1e-9 * size or not min(reach) <= moment / total <= max(reach)
+    inside = total > 0 and min(reach) <= moment / total <= max(reach)
+    moment += turned
+    if inside and not holds:
+        # What only pushes cannot do so beyond its ends.
+        moment = min(max(moment, total * min(reach)), total * max(reach))
+    even = holds or abs(total) <= 1e-9 * size or not inside
     slope = 0.0 if even else shear / total
     per_push = (slope * ax - ay, slope * ay + ax)
     gapes = [(place, touch) for place, touch in zip(places, touches) if not touch.acts]
@@ -48,6 +58,8 @@ def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touc
             if even:
                 q = share * shear / (last - first)
                 add_on_side(pieces, blocks, side, line, (first, last), (q * ax, q * ay), (q * ax, q * ay))
+                stretched -= share * 0.5 * (first + last) * shear
+    pieces.left_out.append(((ax, ay), stretched - slope * moment))
 
 
 def _ends(acting: list, gapes: list, length: float, way: int) -> list[tuple[tuple[float, Touch], float]]:

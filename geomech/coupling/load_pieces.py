@@ -31,12 +31,17 @@ LONE_SPREAD = 1.0 / 20.0
 
 
 class Pieces:
-    """Loaded pieces of the outline as they are found: pairs of x and y at their two ends."""
+    """Loaded pieces of the outline as they are found: pairs of x and y at their two ends.
+
+    ``left_out``: directions of faces, and by what moment (N m) shears along each of them stretch the block beyond what the
+    tractions on it do: those of two contacts that oppose each other have neither resultant nor moment.
+    """
 
     def __init__(self) -> None:
         self.segments: list[tuple] = []
         self.tractions: list[tuple] = []
         self.points: list[tuple[np.ndarray, np.ndarray]] = []
+        self.left_out: list[tuple[tuple[float, float], float]] = []
 
     def add(self, a, b, t_a, t_b) -> None:
         if any(t_a) or any(t_b):
@@ -45,6 +50,10 @@ class Pieces:
 
     def arrays(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.segments).reshape(-1, 2, 2), np.array(self.tractions).reshape(-1, 2, 2)
+
+    def stretch(self) -> np.ndarray:
+        """Σ r ⊗ f (2, 2) of what is ``left_out``."""
+        return sum((amount * np.outer(along, along) for along, amount in self.left_out), np.zeros((2, 2)))
 
     def inside(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Points (k, 2) inside the rock and the forces (k, 2) on them; None without."""

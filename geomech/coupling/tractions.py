@@ -109,13 +109,13 @@ def boundary_load(
     inside = pieces.inside()
     return _balanced(
         block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
-        route == "kelvin-springs", overstress,
+        pieces.stretch(), route == "kelvin-springs", overstress,
     )  # fmt: skip
 
 
 def _balanced(
     block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
-    kelvin, overstress,
+    left_out, kelvin, overstress,
 ) -> BoundaryLoad:  # fmt: skip
     area, centroid, second = blocks.area_moments(block)
     (c, s), _ = turn_back.tolist()
@@ -151,7 +151,9 @@ def _balanced(
         # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as much.
         strain = turn_back @ motion.gradient[block]
         strained = strain @ second @ strain.T
-        missed = _turning(strain @ spread + strained @ symmetric) + held - turned * float(np.trace(strained))
+        missed = (
+            _turning(strain @ (spread + left_out) + strained @ symmetric) + held - turned * float(np.trace(strained))
+        )
         imbalance = (math.hypot(*(body_force - carried)) * area + abs(missed) / math.sqrt(area)) / size
     points, forces = inside or (None, None)
     return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, remote, points, forces, kelvin)

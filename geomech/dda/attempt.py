@@ -273,7 +273,8 @@ class Attempt:
         if scheme.mass_damping:
             acceleration = acceleration + scheme.mass_damping / dt * self.increment
         memory = rows
-        if scheme.weight != 1.0:
+        if scheme.weight != 1.0 or found.points is not None:
+            # Of what springs inside faces bear in shear, each goes on with its own.
             memory = rows.copy()
             memory["shear_force"] = end_shear
         if system.taken_out is not None:

@@ -147,7 +147,8 @@ class ContactSet:
         geometry = self.geometry
         if (points := self.points) is not None:
             geometry = points.corners
-            rows["normal_force"] = points.at_corners(settled.normal_force)
+            for name in ("normal_force", "shear_force"):
+                rows[name] = points.at_corners(rows[name])
             rows["gap"] = points.gap_at_corners(settled.gap)
         rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
         rows["length"] = geometry[:, 4]

@@ -18,7 +18,8 @@ under the moment on its face has to be given at the face. Half of a block of the
 and so far inside their corners stand the two springs that give it. Otherwise rectangles glued together lock: between
 displacements that agree at four corners and are linear, none bends. A triangle's three do not lock.
 
-Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and moment.
+Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and moment, and bring
+the same stress. (What a state carries over of shear is that of the springs.)
 """
 
 from __future__ import annotations
@@ -172,7 +173,8 @@ class FacePoints:
         return out
 
     def at_corners(self, force: np.ndarray) -> np.ndarray:
-        """(n,) N at the corners: what has the resultant and the moment of the springs' normal ``force``."""
+        """(n,) N at the corners: what has the resultant and the moment of the springs' normal ``force``; of their shear, whose arms,
+        the gaps, are linear along the face too, what stretches the blocks as much besides."""
         out, (first, second) = force.copy(), self.place.T
         on_first, on_second = force[self.ends].T
         out[self.ends[:, 0]] = on_first * (1 - first) + on_second * (1 - second)

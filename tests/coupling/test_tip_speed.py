@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from geomech.coupling import cycles
+from geomech.coupling import Coupling, cycles
 from geomech.model import (
     Blocks,
     Cracks,
@@ -94,3 +96,37 @@ def test_statics_know_no_speed():
     *_, cycle = cycles(given)
     assert "split" in [event.kind for event in cycle.events]
     assert cycle.load_step == 1 and "fastest_tip" not in cycle.statistics
+
+
+def test_passes_of_a_dynamic_step_end_together_where_growth_calls_for_shorter_ones():
+    """A step of several increments whose later passes find no answer but in parts: time goes on, the speed limit holds, and energy is
+    accounted for as it is by whole passes."""
+    dt, taken = 1e-4, []
+
+    def run(most: float):
+        coupling = Coupling(pulled(dt))
+        step = coupling.now.system.step
+
+        def cut(state, loads, asked, *rest):
+            taken.append(asked if coupling.under_way is None else min(asked, most))
+            return step(state, loads, taken[-1], *rest)
+
+        coupling.now.system.step = cut
+        found, length = [], 0.2
+        for cycle in coupling.cycles():
+            length += float(cycle.tips["grown"].max(initial=0.0))
+            if length > 0.5:
+                break
+            found.append(cycle)
+        return found
+
+    whole, parts = run(dt), run(0.4 * dt)
+    assert min(taken) < 0.21 * dt  # 0.4, 0.4 and what is left
+    assert max(cycle.growth_pass for cycle in parts) >= 2
+    for before, after in pairwise(parts[1:]):
+        same = before.load_step == after.load_step
+        assert after.state.time == (before.state.time if same else pytest.approx(before.state.time + dt, rel=1e-12))
+        assert after.statistics["fastest_tip"] <= LIMIT + 5e-3 / dt
+    lost, usual = (run[-1].statistics["energy_residual"] / run[-1].statistics["load_work"] for run in (parts, whole))
+    assert abs(lost) < 1.5 * abs(usual) < 1e-4
+    assert parts[-1].state.time == pytest.approx(whole[-1].state.time, abs=1.5 * dt)

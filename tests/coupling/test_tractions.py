@@ -275,3 +275,40 @@ def test_bonds_that_pull_have_linear_pressure_and_no_jump():
         moments = moments_of(found)
         assert np.allclose(moments[:, 0], [0.6, -1.0], rtol=0, atol=1e-8)
         assert moments[1, 1] - moments[0, 2] == pytest.approx(-0.6, abs=1e-8)
+
+
+@pytest.mark.parametrize("holds", [False, True])
+def test_shears_off_the_side_and_against_each_other_leave_a_strained_block_in_balance(holds):
+    """A square that is sheared, pulled and turned bears forces at contacts that are pressed in or gape, its shears against each other: in
+    equilibrium where they act, and so nothing is out of balance (1e-3 with the forces on the side: the gaps; 2e-4 without what the shears stretch: the strain)."""
+    blocks, gap = two_squares(), 1e-3
+    gradient = np.array([[1.0003, 2e-4], [1e-4, 0.9995]])
+    vertices = blocks.vertices.copy()
+    vertices[4:] = (vertices[4:] - [0, 1]) @ gradient.T + [0, 1]
+    corner, end, top = vertices[4], vertices[5], vertices[6:]
+    along = (end - corner) / np.hypot(*(end - corner))
+    normal = np.array([-along[1], along[0]])
+    at = [corner - gap * normal, end + 0.5 * gap * normal]
+    force = [2.0 * normal + 1.7 * along, 1.5 * normal - 1.6 * along]
+    # Two forces on the upper corners, and one in the middle, hold it.
+    centre = vertices[4:].mean(axis=0)
+    moment = sum(float(np.cross([*(p - centre), 0], [*f, 0])[2]) for p, f in zip(at, force))
+    arm = top[0] - top[1]
+    couple = -moment / (arm @ arm) * np.array([-arm[1], arm[0]])
+    points = np.zeros(3, POINT_FORCE)
+    points["block"] = 1
+    for row, point, f in zip(
+        points, (blocks.vertices[6], blocks.vertices[7], [0.5, 1.5]), (couple, -couple, -sum(force))
+    ):
+        row["at"], row["force"] = point, f
+    vertex = [vertex_at(blocks, 0, p) for p in ([0.0, 1.0], [1.0, 1.0])]
+    bottom = edge_between(blocks, 1, [0.0, 1.0], [1.0, 1.0])
+    rows = [contact(v, bottom, 0, 1, p, -normal, f @ normal, -f @ along) for v, p, f in zip(vertex, at, force)]
+    for row in rows:
+        row["bonded"] = holds
+    load = boundary_load(
+        1, blocks, vertices, Motion.of(blocks, vertices), 0.0, np.array(rows, CONTACT), NOTHING[0], points,
+        tensile_strength=[float(holds)],
+    )  # fmt: skip
+    # What is left is the gaps' change by strain.
+    assert load.imbalance < 1e-6

@@ -165,3 +165,20 @@ def test_a_face_that_goes_back_and_forth_stands_on_its_corners(monkeypatch):
     _, turn = pressed(on_a_bed(beside=0.5), 0.1, steps=1)
     assert tried == [1] * 20
     assert turn == pytest.approx(-THRUST * 0.1 / (STIFFNESS * FACE**3 / 4), rel=1e-5)
+
+
+@pytest.mark.parametrize("eccentricity", [0.2, -0.4])
+def test_rows_tell_of_forces_that_hold_the_block(eccentricity):
+    """Springs inside a face that gives and turns: forces at its corners, off the block by what it gives there, are in equilibrium with the
+    thrust where they are said to act."""
+    system, at = on_a_bed(beside=0.5), np.array([FACE / 2 + eccentricity, 1.0])
+    push = PointLoad(1, tuple(at), History.constant([0.3 * THRUST, -THRUST]))
+    state = State.at_rest(system.blocks)
+    for _ in range(4):
+        result = system.step(state, Loads(point_loads=(push,)), 1e4)
+        before, state = state, result.state
+    turn = state.rotation[1]
+    at = before.vertices[4] + np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ at
+    x, y, moment = dda.contact_resultants(result.contacts, 2, np.array([at, at]))[1]
+    assert [x, y] == pytest.approx([-0.3 * THRUST, THRUST], rel=1e-6)
+    assert abs(moment) < 1e-8 * THRUST * FACE
