@@ -106,9 +106,9 @@ def _watched() -> Iterator[Watch]:
         watch.last = self, data, right
         return timed(solve, self, data, right, *within)
 
-    def timed_roughly(self, data, within):
-        solution = timed(roughly, self, data, within)
-        return lambda right: timed(solution, right)
+    def timed_roughly(self, data):
+        solution = timed(roughly, self, data)
+        return lambda *given: timed(solution, *given)
 
     ContactFinder.find, BlockSolver.solve, BlockSolver.rough_solution = timed_find, timed_solve, timed_roughly
     try:

@@ -5,7 +5,7 @@ again; where blocks have hardly moved, none. What is kept so, or factored in sin
 Schultz 1986), which brings the residual down to round-off.
 
 Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for a
-factorisation and a substitution, ms): these factors 10 + 3 and 224 + 32, in single precision 6 + 0.4 and 128 + 16; PARDISO of
+factorisation and a substitution, ms): these factors 9 + 1.1 and 210 + 19, in single precision 6 + 0.6 and 122 + 11; PARDISO of
 MKL 2026 11 to 19 + 6 and 245 to 478 + 61; an incomplete factorisation with GMRES 234 and 5400; smoothed aggregation (pyamg 5, six
 fields an aggregate) and block Jacobi do not come to 1e-10 in 500 iterations.
 """
@@ -132,59 +132,64 @@ class BlockSolver:
         del self._factors
         self._factors = Factors(*self._pattern, dtype, tree)
 
-    def rough_solution(self, data: np.ndarray, within: float) -> Callable[[np.ndarray], np.ndarray]:
-        """What gives x (6n,) for one right side after the other with a residual ``within`` that part of it, from factors in single
-        precision (half the time of double ones, where that is all the digits asked for), which leave those of `solve`
-        alone, unless they are of so many blocks that single ones take their place. Raises numpy.linalg.LinAlgError."""
+    def rough_solution(self, data: np.ndarray) -> Callable[..., np.ndarray]:
+        """What gives x (6n,) for one right side after the other, ``solution(right, within, start)``, with a residual ``within`` that
+        part of it, from where it is known to ``start`` (6n,), from factors in single precision (half the time of double ones,
+        where that is all the digits asked for), which leave those of `solve` alone, unless they are of so many blocks that
+        single ones take their place. Raises numpy.linalg.LinAlgError."""
 
-        def exactly(right: np.ndarray) -> np.ndarray:
-            single = self._factors.single
-            x = self.solve(data, right, within)
-            self._rough_serves &= not single or self._factors.single
-            return x
+        def exactly(right: np.ndarray, within: float, start: np.ndarray | None = None) -> np.ndarray:
+            return self.solve(data, right, within)
 
-        if self.n >= SINGLE and self._rough_serves and not self._factors.single:
-            self._hold(np.float32)
-        if self._factors.single or not self._rough_serves:
+        factors = self._rough_factors()
+        if factors is None:
             return exactly
-        if self._rough is None:
-            self._rough = Factors(*self._pattern, np.float32, self._factors.tree)
         try:
-            self._rough.factor(data)
+            if factors is self._factors:
+                self._bring(data, 0)
+            else:
+                factors.factor(data)
+                self._count(1.0)
         except np.linalg.LinAlgError:
             self._rough_serves = False
             return exactly
-        self.counts["factorisations"] += 1
-        self.counts["shares"] += 1.0
 
-        def solution(right: np.ndarray) -> np.ndarray:
-            x = np.zeros(len(right))
-            for k in range(2 + REFINEMENTS):
-                rest, target = (right, 0.0) if k == 0 else self._residual(data, right, x, within)
-                if np.abs(rest).max(initial=0.0) <= target:
+        def solution(right: np.ndarray, within: float, start: np.ndarray | None = None) -> np.ndarray:
+            if self._rough_serves:
+                x = self._iterate(data, right, within, factors, start)
+                if x is not None:
                     return x
-                x += self._rough.substitute(rest)
-                self.counts["substitutions"] += 1
-            self._rough_serves = False
-            return exactly(right)
+                self._rough_serves = False
+            if self._factors.single:
+                self._hold(np.float64)
+            return self.solve(data, right, within)
 
         return solution
+
+    def _rough_factors(self) -> Factors | None:
+        """Factors in single precision, with room of their own or, of many blocks, in the place of those of `solve`; None where
+        they do not serve."""
+        if not self._rough_serves:
+            return None
+        if self.n >= SINGLE:
+            if not self._factors.single:
+                self._hold(np.float32)
+            return self._factors
+        if self._rough is None:
+            self._rough = Factors(*self._pattern, np.float32, self._factors.tree)
+        return self._rough
 
     def _solved(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
         """`solve` with the factors as they are; None where single precision does not do."""
         if self._has_factors:
-            fresh = False
-            changed = _changed(data, self._diagonal, self._factored, CHANGED)
-            if np.count_nonzero(changed) > (0 if self._factors.tree.kept else FEW):
-                self.factor(data, changed)
-                # Single precision knows no more of this matrix than that, in full or in part.
-                fresh = self._factors.single
-            x = self._iterate(data, right, within)
-            if x is not None or fresh:
+            fresh = self._bring(data, 0 if self._factors.tree.kept else FEW)
+            x = self._iterate(data, right, within, self._factors)
+            # Single precision knows no more of this matrix than that, in full or in part.
+            if x is not None or (fresh and self._factors.single):
                 return x
         self.factor(data)
         if self._factors.single:
-            return self._iterate(data, right, within)
+            return self._iterate(data, right, within, self._factors)
         x = self.substitute(right)
         for _ in range(REFINEMENTS):
             rest, target = self._residual(data, right, x, within)
@@ -198,6 +203,18 @@ class BlockSolver:
         product, size = multiply(data, self.pointer, self.columns, x)
         return right - product, max(within * float(np.abs(right).max(initial=0.0)), ROUND_OFF * size)
 
+    def _bring(self, data: np.ndarray, few: int) -> bool:
+        """Factor what has changed in the matrix of ``data`` where more than ``few`` blocks have; whether any was."""
+        changed = _changed(data, self._diagonal, self._factored, CHANGED) if self._has_factors else None
+        if changed is not None and np.count_nonzero(changed) <= few:
+            return False
+        self.factor(data, changed)
+        return True
+
+    def _count(self, share: float) -> None:
+        self.counts["factorisations"] += 1
+        self.counts["shares"] += share
+
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> None:
         """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only. Raises
         numpy.linalg.LinAlgError when it is singular."""
@@ -205,21 +222,28 @@ class BlockSolver:
         share = self._factors.factor(data, changed)
         _take(data, self._diagonal, np.ones(self.n, np.bool_) if changed is None else changed, self._factored)
         self._has_factors = True
-        self.counts["factorisations"] += 1
-        self.counts["shares"] += share
+        self._count(share)
 
-    def substitute(self, right: np.ndarray) -> np.ndarray:
+    def substitute(self, right: np.ndarray, factors: Factors | None = None) -> np.ndarray:
         """The solution of the factored system for ``right`` (6n,)."""
         self.counts["substitutions"] += 1
-        return self._factors.substitute(right)
+        return (factors or self._factors).substitute(right)
 
     def multiply(self, data: np.ndarray, x: np.ndarray) -> np.ndarray:
         """The product with the matrix of ``data``."""
         return multiply(data, self.pointer, self.columns, x)[0]
 
-    def _iterate(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
-        """GMRES with the factors at hand on the right; None when it takes too long."""
-        x = self.substitute(right)
+    def _iterate(
+        self, data: np.ndarray, right: np.ndarray, within: float, factors: Factors, start: np.ndarray | None = None
+    ) -> np.ndarray | None:
+        """GMRES with ``factors`` on the right, from ``start`` (6n,) on; None when it takes too long."""
+        if start is None:
+            x = self.substitute(right, factors)
+        else:
+            rest, target = self._residual(data, right, start, within)
+            if np.abs(rest).max(initial=0.0) <= target:
+                return start
+            x = start + self.substitute(rest, factors)
         for _ in range(3):
             rest, target = self._residual(data, right, x, within)
             largest = float(np.abs(rest).max(initial=0.0))
@@ -227,13 +251,13 @@ class BlockSolver:
                 return x
             if not np.isfinite(largest):
                 return None
-            step = self._krylov(data, rest, target)
+            step = self._krylov(data, rest, target, factors)
             if step is None:
                 return None
             x += step
         return None
 
-    def _krylov(self, data: np.ndarray, rest: np.ndarray, target: float) -> np.ndarray | None:
+    def _krylov(self, data: np.ndarray, rest: np.ndarray, target: float, factors: Factors) -> np.ndarray | None:
         """The correction that brings ``rest`` down to ``target``, None if it would take more than ``TRIES`` solutions."""
         size = float(np.linalg.norm(rest))
         basis, directions = [rest / size], []
@@ -241,7 +265,7 @@ class BlockSolver:
         first = np.zeros(TRIES + 1)
         first[0] = size
         for k in range(TRIES):
-            directions.append(self.substitute(basis[-1]))
+            directions.append(self.substitute(basis[-1], factors))
             v = self.multiply(data, directions[-1])
             for _ in range(2):  # twice is enough for orthogonality to round-off
                 for i, q in enumerate(basis):

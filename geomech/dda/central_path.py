@@ -53,8 +53,9 @@ _BLOCKED, _SHORT = 5, 0.05
 #: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their difference.
 _LEAST_LEFT = 1e-14
 #: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. Walls of 1 000
-#: bricks take as many steps as with 1e-12, of 10 000 as with 1e-6.
-_WITHIN = 1e-4
+#: bricks take as many steps as with 1e-12, of 10 000 as with 1e-6. The predictor, which only says how far to aim, needs less, and
+#: correctors begin with it.
+WITHIN, _GUESSED = 1e-4, 1e-2
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -110,17 +111,18 @@ def assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, 
                         line[m] += my_push[a] * its_pull[m] + drag * its_across[m]
 
 
-def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """What solves with the matrix of ``data`` for one right side after the other. Raises numpy.linalg.LinAlgError."""
+def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
+    """What solves with the matrix of ``data`` for one right side after the other, to a residual ``within`` that part of it, from a
+    ``start`` (6 n,) on that is nearly it. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is not None:
-        return pattern.solver.rough_solution(data, _WITHIN)
+        return pattern.solver.rough_solution(data)
     from scipy.linalg.lapack import dgetrf, dgetrs
 
     factors, pivots, info = dgetrf(data.reshape(6 * pattern.n, -1))
     if info != 0:
         raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
-    return lambda right: dgetrs(factors, pivots, right)[0]
+    return lambda right, within=WITHIN, start=None: dgetrs(factors, pivots, right)[0]
 
 
 def _reach(number: np.ndarray, change: np.ndarray) -> float:
@@ -266,13 +268,13 @@ class CentralPath:
         )  # fmt: skip
         solve = solution_of(pattern, self._data)
 
-        def newton(to_normal, to_back, to_ahead):
+        def newton(to_normal, to_back, to_ahead, within=WITHIN, start=None):
             """Changes of the unknowns, of gap and motion along, of N and S, and of the six positive numbers."""
             given = (to_normal - normal * (width + gap_missed)) / soft
             given_along = stiff_along * (to_ahead / below - ahead - to_back / above + back - slip_missed)
             side = residual.copy()
             add_forces(side, *self._at, given, given_along + slope * given)
-            step = solve(side)
+            step = solve(side, within, start)
             motion = contact_states.moved(step, *self._at)
             motion[:, 0] -= self._lift * motion[:, 1]
             d_normal = given - stiff * motion[:, 0]
@@ -290,14 +292,14 @@ class CentralPath:
             sliding = zip(numbers[2:], changes[2:], strict=True)
             return min(longest, *(_reach(number[rough], change[rough]) for number, change in sliding))
 
-        *_, changes = newton(0.0, 0.0, 0.0)
+        guess, *_, changes = newton(0.0, 0.0, 0.0, _GUESSED)
         far = reach(changes)
         ahead_of = [number + far * change for number, change in zip(numbers, changes, strict=True)]
         left = float(self._products(*ahead_of).sum()) / float(self._products(*numbers).sum())
         target = epsilon * left**3 * unit
         dn, dw, db, da, d_above, d_below = changes
         goals = [target - dn * dw, target - db * d_above, target - da * d_below]
-        step, moved, d_shear, changes = newton(*goals)
+        step, moved, d_shear, changes = newton(*goals, start=guess)
         far = reach(changes)
         for _ in range(_CORRECTORS):
             if far > _FAR:
@@ -308,7 +310,7 @@ class CentralPath:
                 goal + np.maximum(np.clip(product, target / _SPREAD, target * _SPREAD) - product, -target * _SPREAD)
                 for goal, product in zip(goals, (n * w, b * up, a * low), strict=True)
             ]
-            tried = newton(*nearer)
+            tried = newton(*nearer, start=step)
             reached = reach(tried[-1])
             if reached < far + _GAIN * (wanted - far):
                 break

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
-from .central_path import acting, add_forces, assemble, solution_of
+from .central_path import WITHIN, acting, add_forces, assemble, solution_of
 from .contact_springs import Springs
 from .contact_states import moved
 from .contacts import ContactSet
@@ -118,12 +118,12 @@ class RoundedLaws:
             )  # fmt: skip
             solve = solution_of(p, self._data)
             self.solutions += 1
-            step = solve(residual)
+            step = solve(residual, WITHIN)
             along, length, share = self._motion(step), float(np.linalg.norm(step)), min(1.0, 4.0 * share)
             while True:
                 forces = self._laws(motion + share * along, force)
                 residual = self._residual(unknowns + share * step, *forces[:2])
-                if np.linalg.norm(solve(residual)) <= (1.0 - 0.25 * share) * length:
+                if np.linalg.norm(solve(residual, WITHIN)) <= (1.0 - 0.25 * share) * length:
                     break
                 share *= 0.5
                 if not share > _LEAST:

@@ -96,11 +96,11 @@ def test_single_precision_is_refined_to_the_same_residual(monkeypatch):
     assert not solver._factors.single
     assert np.abs(1e50 * x - expected).max() <= 1e-8 * np.abs(expected).max()
     # … until few digits will do: then single precision takes its place, not one beside it, unless it does not serve there either.
-    x = solver.rough_solution(data.ravel(), 1e-4)(right)
+    x = solver.rough_solution(data.ravel())(right, 1e-4)
     assert solver._factors.single and solver._rough is None
     assert np.abs(solver.multiply(data.ravel(), x) - right).max() <= 1e-4 * np.abs(right).max()
     for _ in range(2):
-        x = solver.rough_solution(1e50 * data.ravel(), 1e-4)(right)
+        x = solver.rough_solution(1e50 * data.ravel())(right, 1e-4)
         assert not solver._factors.single
     assert np.abs(1e50 * x - expected).max() <= 1e-8 * np.abs(expected).max()
 
@@ -110,14 +110,14 @@ def test_rough_solutions_have_the_residual_asked_for_and_leave_the_exact_ones_al
     data[rows == columns] += 1e3 * np.eye(6)
     right, solver = np.random.default_rng(2).normal(size=3600), BlockSolver(points, rows, columns)
     exact = solver.solve(data.ravel(), right)
-    rough = solver.rough_solution(3.0 * data.ravel(), 1e-4)
-    x = rough(right)
+    rough = solver.rough_solution(3.0 * data.ravel())
+    x = rough(right, 1e-4)
     assert 0.0 < np.abs(solver.multiply(3.0 * data.ravel(), x) - right).max() <= 1e-4 * np.abs(right).max()
     done = solver.counts["factorisations"]
     assert np.array_equal(solver.solve(data.ravel(), right), exact)
     assert solver.counts["factorisations"] == done
     # Beyond the range of single precision they are the exact ones.
-    x = solver.rough_solution(1e50 * data.ravel(), 1e-4)(right)
+    x = solver.rough_solution(1e50 * data.ravel())(right, 1e-4)
     assert np.abs(1e50 * x - exact).max() <= 1e-8 * np.abs(exact).max()
 
 
