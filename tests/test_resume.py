@@ -570,3 +570,14 @@ def test_time_spent_goes_on(write, tmp_path):
     began = time.perf_counter()
     after = resume(tmp_path / "out", quiet=True)["wall_s"]
     assert before * 0.5 < after < before + time.perf_counter() - began
+
+
+def test_a_run_broken_off_between_changes_of_faces_is_gone_on_with(tmp_path):
+    """What contacts and faces did before is known again: between the first slip of two joints and their sliding all along."""
+    scene = load_scene(ROOT / "pipelines" / "joint_shear", ["run.end_time_s=31", "output.interior=false"])
+    last = run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))["cycles"] - 1
+    kinds = Run(tmp_path / "whole").events["kind"].tolist()
+    assert kinds == ["slip", "slip", "sliding", "sliding"]
+    broken_off(scene, tmp_path / "parts", last - 2)
+    resume(tmp_path / "parts", quiet=True)
+    assert differing(tmp_path / "whole", tmp_path / "parts") == []

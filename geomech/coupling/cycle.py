@@ -169,7 +169,8 @@ class Coupling:
             may_grow = growth_pass < growing.max_passes
             if self.follows and not self.events.reached:
                 may_grow = False  # on the way to a lower load
-            events, stops = pending, stops or self._stops(pending)
+            events = pending if self.events is None else pending + self.events.changes.events(now, found)
+            stops = stops or self._stops(events)
             growth = None
             if may_grow and not stops:
                 longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, whole, now.loads)

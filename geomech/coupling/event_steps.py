@@ -1,5 +1,6 @@
 """Load steps that end where something happens: at the time, and so at the load, at which the most driven tip has just
-K_eq = K_Ic, or whole rock its strength, instead of at the end of the fixed step in which that comes about.
+K_eq = K_Ic, or whole rock its strength, or a contact or a crack face changes its state (`first_change`), instead of at the end
+of the fixed step in which that comes about.
 
 While nothing changes state K is nearly linear in the load, so secants find that time in two or three solutions, all of them
 steps from the same start. On the way there steps are as long as blocks may move in one. Loads at which tips start, join
@@ -13,6 +14,7 @@ dead load). Time is then no more than what the loads are functions of, and goes 
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from ..model import History, Loads, Problem
 from .balance import Balance, balanced
 from .cracked_blocks import CrackedBlocks
 from .crossing import Crossing
+from .first_change import FOUND, FirstChange
 from .growing import drive
 
 #: An event is found when the drive, K_eq/K_Ic, is off one by less than this.
@@ -58,6 +61,8 @@ class EventSteps:
         self._pace: float | None = None
         #: Whether the last first pass ended at an event.
         self.reached = False
+        #: What contacts and faces do on the way.
+        self.changes = FirstChange(run.events)
 
     def first_pass(self, now: CrackedBlocks, end: float) -> Balance:
         """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; with control
@@ -83,10 +88,12 @@ class EventSteps:
         before, self._drive = self._drive, drive(now, found)
         # Where loads are proportional to time, and in most other cases nearly, the rate changes as the drive does.
         self._rate *= self._drive / before if before else 1.0
+        self.changes.after(now, found)
 
     def grown(self) -> None:
         """The cracks have grown at the end of the load step."""
         self._drive = None
+        self.changes.grown()
 
     def _ahead(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
         start = now.state.time
@@ -97,12 +104,16 @@ class EventSteps:
             event = limit = min(limit, start + self.time_step)
         whole = event <= limit and not self._far(event - start)
         aim = event if whole else min(start + APPROACH * (event - start), limit)
+        if self.changes.expected is not None:
+            aim = min(aim, max(self.changes.expected * (1 + FOUND), start + FOUND * limit))
+            self.changes.expected = None
         for k in range(MOST):
             found, excess = self._at(now, aim, free=k == 0)
             at = found.result.state.time
             search.add(at, excess)
             self.reached = abs(excess) <= SETTLED or (excess > 0 and search.width <= JUMP * abs(at))
-            if self.reached or (excess < 0 and not (whole and (search.enclosed or (at < limit and k < OPEN)))):
+            goes_on = whole and (search.enclosed or (at < limit and k < OPEN)) and not self.changes.reached
+            if self.reached or (excess < 0 and not goes_on):
                 break
             if search.next <= start:
                 # Driven from the start on, by tips that growth has not brought to rest: the load does not go back for them.
@@ -125,9 +136,11 @@ class EventSteps:
         aim = search.next if whole else max(start - APPROACH * (start - search.next), limit)
         for _ in range(MOST):
             found, excess = self._at(now, aim)
-            search.add(aim, excess)
-            self.reached = abs(excess) <= SETTLED or (excess > 0 and (aim == 0.0 or search.width <= JUMP * aim))
-            if self.reached or (excess > 0 and not (whole and (search.enclosed or aim > limit))):
+            at = found.result.state.time
+            search.add(at, excess)
+            self.reached = abs(excess) <= SETTLED or (excess > 0 and (at == 0.0 or search.width <= JUMP * at))
+            goes_on = whole and (search.enclosed or at > limit) and not self.changes.reached
+            if self.reached or (excess > 0 and not goes_on):
                 break
             aim = max(search.next, limit)
             whole = whole or not self._far(start - aim)
@@ -138,15 +151,26 @@ class EventSteps:
         return found, excess
 
     def _at(self, now: CrackedBlocks, time: float, free: bool = False) -> tuple[Balance, float]:
-        """A pass at the loads of ``time`` from the start of the step, and how far the drive then is above one. A ``free`` one
-        may be cut short by how far blocks may move."""
+        """A pass at the loads of ``time`` from the start of the step, or at those at which something changes its state on the way
+        there, and how far the drive then is above one. A ``free`` one may be cut short by how far blocks may move."""
+        found = self._solve(now, time, free)
+        found = self.changes.first(
+            now, found, partial(self._solve, now), partial(self._towards, now.state.time), self._most(now)
+        )
+        return found, drive(now, found) - 1
+
+    def _solve(self, now: CrackedBlocks, time: float, free: bool = False) -> Balance:
         way = time - now.state.time
         # The length of a static step is no more than its inertia: short ones would hold the blocks back.
         found = balanced(now, max(abs(way), self.time_step), None if free and way >= self.time_step else time)
         way = found.result.state.time - now.state.time
         if way != 0:
             self._pace = found.result.statistics["max_displacement_ratio"] / abs(way)
-        return found, drive(now, found) - 1
+        return found
+
+    def _towards(self, start: float, event: float) -> float:
+        """How far a step from ``start`` may go to be right at the ``event``: there, or most of the way."""
+        return start + APPROACH * (event - start) if self._far(abs(event - start)) else event
 
     def _far(self, way: float) -> bool:
         return self._pace is None or self._pace * way > NEAR

@@ -17,6 +17,7 @@ from . import assembly
 from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
 from .contact_springs import Springs, end_of_step, over_a_step
+from .contact_states import reserves
 from .contacts import ContactSet
 from .energy import StepEnergy, sliding, step_energies
 from .held import balanced, hold, with_rigid_motion
@@ -311,7 +312,10 @@ class Attempt:
             "unbalanced_ratio": ratio,
             **acted,
         }
-        return StepResult(new_state, dt, rows, forces, acceleration, energy, statistics)
+        reserve = reserves(
+            settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs
+        )
+        return StepResult(new_state, dt, rows, forces, acceleration, energy, reserve, statistics)
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
         """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""

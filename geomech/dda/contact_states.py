@@ -132,3 +132,14 @@ def check_states(
                 new_state[c] = STICK
                 violation[c] = strength - trial
     return new_state, new_direction, new_bonded, violation
+
+
+def reserves(state, bonded, normal_force, shear_force, gap, springs) -> np.ndarray:
+    """(n,) N: how far contacts in these states are from leaving them, linear in the load while all states stand. Open ones: the
+    force that closing their gap would make; sticking ones: what is left of their strength, or of what presses them; sliding ones
+    the latter."""
+    lifts = normal_force + np.where(bonded == 1, springs.tension, 0.0)
+    held = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
+    strength = np.maximum(0.0, springs.peak * normal_force + held)
+    closed = np.where(state == STICK, np.minimum(lifts, strength - np.abs(shear_force)), lifts)
+    return np.where(state == OPEN, springs.normal * gap, closed)

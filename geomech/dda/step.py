@@ -44,6 +44,7 @@ class StepResult:
     forces         whatever else acted, on the same geometry
     acceleration   (n_blocks, 6) mean of the unknowns over the step, with what mass-proportional damping adds
     energy         the terms of the step's energy balance
+    reserve        (n_contacts,) N, how far each of ``contacts`` is from leaving its state (`contact_states.reserves`)
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
                    worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
                    motion over the largest force in them), unbalanced_ratio (0 at rest, 1 in free flight: see `imbalance`)
@@ -55,6 +56,7 @@ class StepResult:
     forces: AppliedForces
     acceleration: np.ndarray
     energy: StepEnergy
+    reserve: np.ndarray
     statistics: dict[str, float] = field(default_factory=dict)
 
 

@@ -151,6 +151,22 @@ class Solution:
         )
 
     @cached_property
+    def reserve(self) -> np.ndarray:
+        """(n_elements, p+1) Pa: how far faces are from leaving their `states`, linear in the load while all states stand. Open
+        ones: the stress that closes a crack as long as their element by their gap (inf: they never meet); sticking ones: what
+        is left of their strength, or of what presses them; others that are closed the latter."""
+        laws, faces = self.body.laws, self.faces
+        normal, shear = faces.traction[:, 1:-1].transpose(2, 0, 1)
+        broken = np.zeros(len(laws.closes), bool) if self.memory is None else self.memory.broken
+        shape = normal.shape
+        aperture = np.where(laws.closes, laws.aperture / laws.twice_mu, np.inf).reshape(shape)
+        stiffness = self.body.material.plane_modulus / self.body.faces.length[:, None]
+        lifts = -normal + np.where(laws.cemented(broken), laws.strength, 0.0).reshape(shape)
+        left = laws.limit(-normal.ravel(), broken).reshape(shape) - np.abs(shear)
+        closed = np.where(self.states == STICK, np.minimum(lifts, left), lifts)
+        return np.where(self.states == OPEN, stiffness * (faces.opening[:, 1:-1] + aperture), closed)
+
+    @cached_property
     def crack_strain(self) -> np.ndarray:
         """(3,) mean strain of the cracks, (1/A) Σ ∫ sym(n ⊗ [u]) ds, engineering shear. ValueError without outline."""
         if not self.body.outlined:

@@ -11,11 +11,12 @@ from .joint import JointLaw, Roughness
 from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
 from .material import Material
 from .motion import Motion
-from .problem import STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
+from .problem import CHANGES, STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, State
 
 __all__ = [
     "BOLT",
+    "CHANGES",
     "CONTACT",
     "GROUND",
     "OPEN",

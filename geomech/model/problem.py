@@ -126,8 +126,11 @@ class GrowthSettings:
             raise ValueError(f"join_length must be a length, got {self.join_length!r} m")
 
 
+#: Kinds of events that contacts and crack faces make: one opens, none touches any more, one closes, one slips, none sticks any more,
+#: one sticks again, one loses its bond.
+CHANGES = ("opening", "parting", "closure", "slip", "sliding", "stick", "debonding")
 #: Kinds of events that may end a run, of which `RunSettings.stop_at` names some.
-STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split")
+STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", *CHANGES)
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,8 @@ class RunSettings:
     """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``.
 
     ``stepping`` "fixed": steps of `DdaSettings.time_step`; "events": static steps that end where a tip has just reached its
-    toughness, otherwise as long as blocks may move in one, or ``longest_step`` s. ``control`` "load": loads and imposed motion
+    toughness or, as ``events`` says, a contact or a crack face changes its state, otherwise as long as blocks may move in one, or
+    ``longest_step`` s. ``control`` "load": loads and imposed motion
     rise with time; "toughness" (with "events"): they are those at which the most driven tip has K_eq = K_Ic, more or less
     than before. ``boundary_stress`` says how contact forces load cracked blocks: "contacts" spread over faces, "springs" at
     points, "kelvin-springs" at points of the infinite plane. Without ``skip`` every body is made anew and every answer worked out anew in every
@@ -146,6 +150,7 @@ class RunSettings:
     stop_at: tuple[str, ...] = ("coalescence", "split")
     boundary_stress: str = "contacts"
     stepping: str = "fixed"
+    events: tuple[str, ...] = ("tips", "contacts", "faces")
     longest_step: float | None = None
     control: str = "load"
     skip: bool = True

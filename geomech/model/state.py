@@ -108,7 +108,8 @@ class State:
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened: ``kind`` is initiation, coalescence, daylighting, split, arrest, failure …"""
+    """Something that happened: ``kind`` is initiation, coalescence, daylighting, split, arrest, failure …, or one of
+    `CHANGES` (of `model.problem`)."""
 
     kind: str
     cycle: int

@@ -177,7 +177,7 @@ REACTIONS: dict[str, str] = {
 
 #: Columns of ``events.csv``.
 EVENTS: dict[str, str] = {
-    "kind": "initiation, coalescence, daylighting, split, arrest, failure …",
+    "kind": "initiation, coalescence, daylighting, split, arrest, failure …; opening, parting, closure, slip, sliding, stick, debonding",
     "cycle": "-",
     "time": "s",
     "load": "Pa",

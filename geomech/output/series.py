@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from geomech.model import Cycle, Problem
+from geomech.model import CHANGES, Cycle, Problem
 
 from . import grids
 from .beside import Beside
@@ -133,7 +133,7 @@ class Series:
         if not self.interior_every or cycle.number == 0 or not (cycle.bodies or self._last_interior >= 0):
             return False
         cut = self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks
-        if cycle.events or cut or self._last_interior < 0:
+        if any(event.kind not in CHANGES for event in cycle.events) or cut or self._last_interior < 0:
             return True
         grew = cycle.cracks.n_segments != self._segments_then
         return cycle.number - self._last_interior >= self.interior_every * (1 if grew else QUIET)

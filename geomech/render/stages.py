@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from geomech.model import CHANGES
 from geomech.output.reading import Run
 
 from .field import agreeing
@@ -56,7 +57,7 @@ def moments(run: Run) -> dict[int, str]:
         if (
             event["cycle"] < last
             and event["time"] < end
-            and str(event["kind"]) not in found.values()
+            and str(event["kind"]) not in (*found.values(), *CHANGES)
             and len(found) < MOST - 1
         ):
             found.setdefault(int(event["cycle"]), str(event["kind"]))

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import (
+    CHANGES,
+    Blocks,
     Cracks,
     DdaSettings,
     DdmSettings,
@@ -33,6 +35,9 @@ from .held_blocks import fixed_blocks, held_unknowns
 from .joints import joint_law
 from .tables import SceneTables
 from .tables.rock import MaterialTable
+
+#: Contacts of more blocks are watched only where that is asked for: in a wall, they change at every load.
+MOST_WATCHED = 30
 
 
 def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Problem:
@@ -83,6 +88,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
             stop_at=tables.run.stop_at,
             boundary_stress=tables.run.boundary_stress,
             stepping=tables.run.stepping,
+            events=_events(tables, blocks),
             longest_step=tables.run.longest_step_s,
             control=tables.run.control,
             skip=tables.run.skip,
@@ -94,6 +100,14 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
             for k, m in enumerate(tables.monitors)
         },
     )
+
+
+def _events(tables: SceneTables, blocks: Blocks) -> tuple[str, ...]:
+    """What steps from event to event end at."""
+    if tables.run.events is not None:
+        return ("tips", *tables.run.events)
+    watched = blocks.n_blocks <= MOST_WATCHED or bool(set(tables.run.stop_at) & set(CHANGES))
+    return ("tips", "contacts", "faces") if watched else ("tips", "faces")
 
 
 def _set_of(crack: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import Blocks
+from ..model import CHANGES, Blocks
 from ..shapes import cutting_cracks
 from .edges import check_edges
 from .errors import Check
@@ -91,10 +91,24 @@ def _stepping(c: Check) -> None:
                     f"steps to the next event are for static runs, and dda.{key} is {str(value).lower()}",
                     f'{way_out}, or stepping = "fixed"',
                 )
+        if run.events is not None and not set(run.events) - {"tips"}:
+            for kind in sorted(set(run.stop_at) & set(CHANGES)):
+                c.refuse(
+                    ("run", "stop_at"),
+                    f'"{kind}" is of contacts and crack faces, and run.events names neither',
+                    'add "contacts" or "faces" to run.events, or leave it out',
+                )
         return
-    for key, given in (("control", run.control != "load"), ("longest_step_s", run.longest_step_s is not None)):
-        if given:
+    given = c.data.get("run", {})
+    for key, belongs in (
+        ("control", run.control != "load"),
+        ("longest_step_s", run.longest_step_s is not None),
+        ("events", "events" in given),
+    ):
+        if belongs:
             c.refuse(("run", key), f'run.{key} belongs to stepping "events"', 'set run.stepping = "events"')
+    for kind in sorted(set(run.stop_at) & set(CHANGES)):
+        c.refuse(("run", "stop_at"), f'"{kind}" is told of by stepping "events" only', 'set run.stepping = "events"')
 
 
 def _growth_lengths(c: Check) -> None:

@@ -160,12 +160,21 @@ class GrowthTable(Table):
 class RunTable(Table):
     end_time_s: Positive = Field(description="the run ends at this time, s")
     stop_at: Annotated[tuple[Literal[STOPS], ...], Strict(False)] = Field(
-        ("coalescence", "split"), description="the run ends at the first event of these kinds"
+        ("coalescence", "split"),
+        description="the run ends at the first event of these kinds. Of the contacts of two blocks, or the faces of a crack, the first "
+        "that opens is an opening, the last one a parting; the first that slips a slip, the last one a sliding; what meets a closure, "
+        'what sticks again a stick, a lost bond a debonding: these need stepping "events"',
     )
     stepping: Literal["fixed", "events"] = Field(
         "fixed",
         description='static load steps: "fixed", of `dda.time_step_s`; "events", that end at the very load at which a tip '
         "reaches its toughness, and else are as long as blocks may move in one",
+    )
+    events: Annotated[tuple[Literal["tips", "contacts", "faces"], ...], Strict(False)] | None = Field(
+        None,
+        description='what steps of stepping "events" end at, and events.csv tells: tips that reach their toughness (always), crack '
+        "faces and contacts of blocks that open, close, slip, stick or lose their bond; loads are exact, of more than a hundred "
+        "contacts to 1e-3, and what comes in a rush is taken together (unset: tips and faces, and contacts of up to 30 blocks)",
     )
     longest_step_s: Positive | None = Field(
         None,
