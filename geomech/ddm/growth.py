@@ -8,7 +8,7 @@ A step is straight, from the tip by its increment along its growth angle. In ord
    without crossing anything, goes there instead;
 4. otherwise ends in the rock, a tip again.
 
-The network stays a planar graph throughout: segments meet at common nodes and nowhere else.
+The network stays a planar graph: segments meet at common nodes and nowhere else.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 
 from ..model import Cracks, GrowthSettings
 from .network import Network, Obstacle, Point, Row, nearest_on, passage
+from .shared_mouths import beside, chain_between, own_mouth_at, part_mouths
 
 #: Shorter segments than this part of the shortest increment are not made: ends snap to what they nearly touch.
 SLIVER = 0.1
@@ -189,9 +190,11 @@ def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[in
         if not (_clear(work, a, at, set(), None) and _clear(work, b, at, set(), None)):
             continue
         crack, other = network.crack_at(a.node), network.crack_at(b.node)
+        chain = chain_between(network, a.node, (b.node,))
         node = network.add_node(at)
         network.extend(a.node, node)
         network.extend(b.node, node)
+        _open_ring(work, a.block, chain, node)
         grown[a.row], grown[b.row] = math.dist(a.start, at), math.dist(b.start, at)
         work.log(a.node, crack, other, at)
         met |= {a.row, b.row}
@@ -205,6 +208,11 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
         ways = _attracted(work, step)
     crack = network.crack_at(step.node)
     for obstacle, node, at in ways:
+        mouth = own_mouth_at(network, step.node, obstacle, node, at, work.sliver)
+        if mouth is not None:
+            if node is not None:
+                continue
+            at = beside(mouth, obstacle, step.start, work.sliver)
         if node is None and _grazes(step.start, at, obstacle):
             _, at = nearest_on(step.start, obstacle.a, obstacle.b)
             if obstacle.row is not None and min(math.dist(at, obstacle.a), math.dist(at, obstacle.b)) < work.sliver:
@@ -215,10 +223,14 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
         if not (_clear_when_drawn if drawn else _clear)(work, step, at, allowed, obstacle):
             continue
         other = _other_crack(network, obstacle, node, step.node)
+        met = (node,) if node is not None else () if obstacle.row is None else (obstacle.row.start, obstacle.row.end)
+        chain = chain_between(network, step.node, met)
         if drawn:
-            _draw(network, step.node, obstacle, node, at)
+            joined = _draw(network, step.node, obstacle, node, at)
         else:
-            network.extend(step.node, _anchor(network, obstacle, node, at))
+            joined = _anchor(network, obstacle, node, at)
+            network.extend(step.node, joined)
+        _open_ring(work, step.block, chain, joined)
         grown[step.row] = math.dist(step.start, at)
         work.log(step.node, crack, other, at)
         return
@@ -337,15 +349,27 @@ def _free_path(
     return True
 
 
-def _draw(network: Network, tip: int, obstacle: Obstacle, node: int | None, at: Point) -> None:
-    """Move ``tip`` onto the obstacle, or onto its ``node``."""
+def _open_ring(work: _Work, block: int, chain: list[int], joined: int) -> None:
+    """Part the cracks of a mouth through which a ``chain`` of nodes has closed at ``joined``."""
+
+    def free(node: int, at: Point, edge: Obstacle, row: Row) -> bool:
+        return _free_path(work, node, block, work.network.nodes[node], at, set(), edge, row)
+
+    if chain:
+        part_mouths(work.network, block, chain, joined, work.sliver, free)
+
+
+def _draw(network: Network, tip: int, obstacle: Obstacle, node: int | None, at: Point) -> int:
+    """Move ``tip`` onto the obstacle, or onto its ``node``; the node where it then is."""
     network.move(tip, at)
     if node is not None:
         network.merge(tip, node)
-    elif obstacle.row is None:
+        return node
+    if obstacle.row is None:
         network.surface[tip] = True
     else:
         network.split(obstacle.row, tip)
+    return tip
 
 
 def _anchor(network: Network, obstacle: Obstacle, node: int | None, at: Point) -> int:

@@ -153,6 +153,11 @@ class Network:
             self._edges[block] = boxes, [Obstacle(tuple(p), tuple(q), None) for p, q in zip(a.tolist(), b.tolist())]
         return self._edges[block]
 
+    def edges_at(self, block: int, point: Point, part: float) -> list[Obstacle]:
+        """The edges of ``block`` that are nearer to ``point`` than a ``part`` of their length."""
+        _, edges = self._edges_of(block)
+        return [edge for edge in edges if nearest_on(point, edge.a, edge.b)[0] <= part * math.dist(edge.a, edge.b)]
+
     def nodes_on(self, obstacle: Obstacle, block: int) -> list[tuple[int, Point]]:
         """Nodes that a step can join on ``obstacle``: the ends of a segment, the crack mouths on an edge."""
         if obstacle.row is not None:
@@ -217,6 +222,14 @@ class Network:
     def move(self, node: int, at: Point) -> None:
         self.nodes[node] = at
         self._changed += [row for row in self._at[node] if row not in self._changed]
+
+    def detach(self, row: Row, node: int, other: int) -> None:
+        """Let ``row`` end at ``other``, which nothing ends at yet, instead of at ``node``."""
+        row.start, row.end = (other if n == node else n for n in (row.start, row.end))
+        self._at[node].remove(row)
+        self._at[other].append(row)
+        if row not in self._changed:
+            self._changed.append(row)
 
     def merge(self, node: int, into: int) -> None:
         """Let the segments of ``node`` end at ``into`` instead; ``node`` is left unused."""

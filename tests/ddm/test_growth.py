@@ -1,6 +1,7 @@
 """Crack growth as geometry: single cases by hand, and random networks whose invariants are checked with Shapely."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -201,6 +202,56 @@ def test_a_mouth_that_is_there_is_used_again():
     growth = grow(cracks, only(tips_of(cracks, angle=np.array([0, 0, 0.0])), (0.02, -9.5)))
     assert growth.joins and growth.joins[0].other_crack == 0
     assert growth.cracks.surface.sum() == 1
+
+
+def one_node_a_place(cracks):
+    _, first, number = np.unique(cracks.nodes, axis=0, return_index=True, return_inverse=True)
+    segments = number.reshape(-1)[cracks.segments]
+    return replace(cracks, nodes=cracks.nodes[first], segments=segments, surface=cracks.surface[first])
+
+
+def pieces_of(cracks, loop=SQUARE[0]):
+    """What the cracks cut the square into, by Shapely."""
+    edges = [shapely.LinearRing(loop), *shapely.linestrings(cracks.nodes[cracks.segments])]
+    return shapely.get_parts(shapely.polygonize(shapely.get_parts(shapely.node(shapely.union_all(edges)))))
+
+
+@pytest.mark.parametrize("mouth", [(0.0, -10.0), (10.0, -10.0)])
+@pytest.mark.parametrize("flip", [False, True])
+@pytest.mark.parametrize("third", [False, True])
+def test_a_ring_that_closes_through_a_mouth_gets_two(mouth, flip, third):
+    """Two cracks from one point of the boundary, the end of one growing into the other: the piece would touch the boundary at that
+    point, and the rock around it hang by it. With a third one beside them it is the other mouth that moves."""
+    way = np.array([[-0.5, 3.0], [-3.0, 3.0], [-2.0, 1.3]])
+    lines = [mouth + np.array([[0.0, 0.0], [-4.0, 2.0]]), mouth + np.array([[0.0, 0.0], *way])]
+    if third:
+        lines.append(mouth + np.array([[0.0, 0.0], [-4.0, 1.0] if mouth[0] else [3.0, 1.0]]))
+    lines = [line[::-1] for line in lines] if flip else lines
+    surface = [(not flip, flip)] * len(lines)
+    cracks = one_node_a_place(Cracks.from_polylines(lines, surface=surface))
+    tips = only(tips_of(cracks), mouth + way[-1])
+    growth = grow(cracks, tips)
+    assert [join.kind for join in growth.joins] == ["coalescence"]
+    assert growth.cracks.surface.sum() == 2
+    found = np.array(sorted(growth.cracks.nodes[growth.cracks.surface].tolist()))
+    assert np.hypot(*(found[1] - found[0])) == pytest.approx(SLIVER * SETTINGS.min_increment, rel=1e-9)
+    pieces = pieces_of(growth.cracks)
+    assert len(pieces) == 2 and not any(len(piece.interiors) for piece in pieces)
+    assert sum(piece.area for piece in pieces) == pytest.approx(400.0, rel=1e-12)
+
+
+def test_a_tip_that_comes_back_to_its_own_mouth_ends_beside_it():
+    line = np.array([[0.0, -10.0], [0.0, -7.0], [-2.0, -7.0], [-0.6, -9.4]])
+    cracks = Cracks.from_polylines([line], surface=[(True, False)])
+    tips = tips_of(cracks)
+    tips["angle"] = np.arctan2(-0.6, 0.6) - np.arctan2(-2.4, 1.4)
+    growth = grow(cracks, tips)
+    assert [join.kind for join in growth.joins] == ["daylighting"]
+    assert sorted(growth.cracks.nodes[growth.cracks.surface][:, 0]) == pytest.approx(
+        [-SLIVER * SETTINGS.min_increment, 0.0]
+    )
+    pieces = pieces_of(growth.cracks)
+    assert len(pieces) == 2 and not any(len(piece.interiors) for piece in pieces)
 
 
 def test_tips_that_face_each_other_meet_half_way():
