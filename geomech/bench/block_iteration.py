@@ -8,7 +8,6 @@ the motion of a first-order block, for every few blocks.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -16,9 +15,10 @@ import numpy as np
 
 from ..dda.block_solver import BlockSolver
 from ..dda.multifrontal import Factors
+from .figures import stopwatch
 
-#: Residual at which iterations stop, relative to the right side (norms).
-TOLERANCE = 1e-10
+#: Residuals at which iterations stop, relative to the right side (norms).
+TOLERANCES = 1e-2, 1e-4, 1e-7, 1e-10
 #: Blocks of a domain, rows of neighbours it is widened by, blocks of a coarse field (least time on walls of 10 000 bricks).
 DOMAIN, OVERLAP, AGGREGATE = 1000, 2, 30
 
@@ -32,11 +32,13 @@ class Iterated:
     solution: np.ndarray
 
 
-def block_jacobi(solver: BlockSolver, data: np.ndarray, right: np.ndarray, most: int = 3000) -> Iterated:
+def block_jacobi(
+    solver: BlockSolver, data: np.ndarray, right: np.ndarray, tolerance: float = TOLERANCES[-1], most: int = 3000
+) -> Iterated:
     """BiCGStab behind the diagonal blocks; gives up after ``most`` iterations."""
     from scipy.sparse.linalg import LinearOperator, bicgstab
 
-    began = time.perf_counter()
+    spent_on = stopwatch()
     rows = np.repeat(np.arange(solver.n), np.diff(solver.pointer))
     inverse = np.linalg.inv(data.reshape(-1, 6, 6)[rows == solver.columns])
     size = len(right)
@@ -49,15 +51,20 @@ def block_jacobi(solver: BlockSolver, data: np.ndarray, right: np.ndarray, most:
     def tell(_: np.ndarray) -> None:
         count[0] += 1
 
-    x, _ = bicgstab(matrix, right, rtol=TOLERANCE, maxiter=most, M=behind, callback=tell)
-    return _told("block Jacobi", solver, data, right, x, count[0], began)
+    x, _ = bicgstab(matrix, right, rtol=tolerance, maxiter=most, M=behind, callback=tell)
+    return _told("block Jacobi", solver, data, right, x, count[0], spent_on())
 
 
 def two_levels(
-    solver: BlockSolver, points: np.ndarray, sizes: np.ndarray, data: np.ndarray, right: np.ndarray
+    solver: BlockSolver,
+    points: np.ndarray,
+    sizes: np.ndarray,
+    data: np.ndarray,
+    right: np.ndarray,
+    tolerance: float = TOLERANCES[-1],
 ) -> Iterated:
     """GMRES behind domains and coarse fields; ``points`` (n, 2) and ``sizes`` (n,) m are the blocks' centroids and √area."""
-    began = time.perf_counter()
+    spent_on = stopwatch()
     n, columns = solver.n, solver.columns
     rows = np.repeat(np.arange(n), np.diff(solver.pointer))
     blocks = data.reshape(-1, 6, 6)
@@ -86,11 +93,13 @@ def two_levels(
         np.add.at(total, of, np.einsum("nab,na->nb", fields, rest))
         return (z + np.einsum("nab,nb->na", fields, coarse.substitute(total.ravel()).reshape(-1, 6)[of])).ravel()
 
-    x, iterations = _flexible_gmres(lambda x: solver.multiply(data, x), behind, right)
-    return _told("two levels of domains", solver, data, right, x, iterations, began)
+    x, iterations = _flexible_gmres(lambda x: solver.multiply(data, x), behind, right, tolerance)
+    return _told("two levels of domains", solver, data, right, x, iterations, spent_on())
 
 
-def _flexible_gmres(matrix: Callable, behind: Callable, right: np.ndarray, most: int = 100) -> tuple[np.ndarray, int]:
+def _flexible_gmres(
+    matrix: Callable, behind: Callable, right: np.ndarray, tolerance: float, most: int = 100
+) -> tuple[np.ndarray, int]:
     """Solution and iterations; what stands ``behind`` need not be linear to round-off (Saad 1993): single precision is not."""
     size = float(np.linalg.norm(right))
     basis, directions = [right / size], []
@@ -104,14 +113,13 @@ def _flexible_gmres(matrix: Callable, behind: Callable, right: np.ndarray, most:
             v -= hessenberg[i, k] * q
         hessenberg[k + 1, k] = np.linalg.norm(v)
         y = np.linalg.lstsq(hessenberg[: k + 2, : k + 1], first[: k + 2], rcond=None)[0]
-        if np.linalg.norm(first[: k + 2] - hessenberg[: k + 2, : k + 1] @ y) <= TOLERANCE * size:
+        if np.linalg.norm(first[: k + 2] - hessenberg[: k + 2, : k + 1] @ y) <= tolerance * size:
             break
         basis.append(v / hessenberg[k + 1, k])
     return np.column_stack(directions) @ y, len(directions)
 
 
-def _told(method: str, solver: BlockSolver, data, right, x, iterations: int, began: float) -> Iterated:
-    seconds = time.perf_counter() - began
+def _told(method: str, solver: BlockSolver, data, right, x, iterations: int, seconds: float) -> Iterated:
     rest = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
     return Iterated(method, iterations, seconds, rest, x)
 

@@ -7,7 +7,6 @@ given blocks to the last state.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from ..reference.base_shaking import sliding_block
 from ..reference.block_motion import column_shortening
 from . import block_scenes
 from .block_scenes import GRAVITY, ROCK, WEIGHT
-from .figures import Measured
+from .figures import Measured, stopwatch
 
 #: Where the picture and the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_schemes")
@@ -50,11 +49,11 @@ class Point:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes the three
-    coarsest sizes, each once."""
+    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes the two
+    coarsest sizes."""
     from ..render.work_precision import draw
 
-    points = list(_points(3, 1) if quick else _points(None, 2))
+    points = list(_points(2 if quick else None))
     FOLDER.mkdir(parents=True, exist_ok=True)
     told = {"points": [asdict(p) for p in points], "quick": quick}
     write_json(FOLDER / "work_precision.json", told)
@@ -79,18 +78,18 @@ def errors() -> dict[str, float]:
     }
 
 
-def _points(sizes_of_each: int | None, repeats: int) -> Iterator[Point]:
+def _points(sizes_of_each: int | None) -> Iterator[Point]:
+    """The shortest of as many times as a tenth of a second has room for; of a method's coarsest size the first is not counted, which
+    may compile."""
     for problem, (sizes, methods, scene) in PROBLEMS.items():
         for method in methods:
-            # The first run of a method may compile.
-            scene(sizes[0], SCHEMES[method])()
             for size in sizes[:sizes_of_each]:
                 run = scene(size, SCHEMES[method])
-                times = []
-                while len(times) < repeats or (sum(times) < 0.1 and len(times) < 10 * repeats):
-                    began = time.perf_counter()
+                times, error = [], run() if size == sizes[0] else math.nan
+                while not times or (sum(times) < 0.1 and len(times) < 10):
+                    spent_on = stopwatch()
                     error = run()
-                    times.append(time.perf_counter() - began)
+                    times.append(spent_on())
                 yield Point(problem, method, size, max(error, 1e-16), min(times))
 
 

@@ -23,6 +23,8 @@ from .figures import Measured
 
 FOLDER = Path("outputs/bench_geometry")
 SIZES = (100, 1000, 10_000, 100_000)
+#: The largest size of a quick run.
+QUICK = 4000
 #: Goals: exponent of the time in the number of blocks, seconds for the largest size.
 EXPONENT, SECONDS = 1.15, 10.0
 SIDE = 100.0
@@ -96,15 +98,15 @@ def exponent(costs: list[Cost]) -> float:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``cost_of_size.json`` and ``cost_of_size.png`` in `FOLDER`. ``quick`` leaves out the largest size and takes
-    each of the others once."""
+    """The table; leaves ``cost_of_size.json`` and ``cost_of_size.png`` in `FOLDER`. ``quick``: up to `QUICK`
+    blocks, each size once."""
     from ..render.cost_of_size import draw_cutting
 
     # The first cut imports what all need.
     cost("two sets", 10, 1)
     costs = [
-        cost(network, n, 1 if quick or n > 10_000 else 3)
-        for n in (SIZES[:-1] if quick else SIZES)
+        cost(network, n, 1 if quick or n > 1000 else 3)
+        for n in ((*SIZES[:2], QUICK) if quick else SIZES)
         for network in NETWORKS
     ]
     by_network = {network: [c for c in costs if c.network == network] for network in NETWORKS}

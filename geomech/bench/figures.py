@@ -13,7 +13,7 @@ import os
 import platform
 import statistics
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -95,27 +95,60 @@ def said(about: dict) -> str:
     )
 
 
+def stopwatch() -> Callable[[], float]:
+    """Starts; what it returns tells the seconds since then, by the clock or of this process's processors, whichever are fewer.
+
+    Waiting while other programs have the processor is left out so; work on several threads is still told by the clock. Not
+    for what waits for a disk or for a child process.
+    """
+    clock, processor = time.perf_counter(), time.process_time()
+    return lambda: min(time.perf_counter() - clock, time.process_time() - processor)
+
+
+def processor_seconds() -> float:
+    """Of this process and of its children that have ended, user and system; of this process alone where the system tells no
+    more."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
+
+
+def told_times(spent: Mapping[str, Mapping[str, float]]) -> str:
+    """The table of what every topic took, and all of them."""
+    rows = [(name, took["seconds"], took["of processor"]) for name, took in spent.items()]
+    rows.append(("all", sum(row[1] for row in rows), sum(row[2] for row in rows)))
+    lines = ["what the benchmarks themselves took        s   of processor"]
+    return "\n".join(lines + [f"  {name:<34}{seconds:8.1f}{own:15.1f}" for name, seconds, own in rows])
+
+
 def yardstick(repeats: int = 7) -> float:
     """Seconds of a fixed piece of work, the median of ``repeats``."""
     rng = np.random.default_rng(0)
     square, long = rng.standard_normal((300, 300)), rng.standard_normal(1_000_000)
     spent = []
     for _ in range(repeats):
-        began = time.perf_counter()
+        spent_on = stopwatch()
         (square @ square).sum()
         np.sort(long)
         sum(k * k for k in range(300_000))
-        spent.append(time.perf_counter() - began)
+        spent.append(spent_on())
     return statistics.median(spent)
 
 
-def write(path: Path, topics: dict[str, Measured], *, quick: bool, unit: float) -> Path:
-    """``topics`` as JSON; ``unit`` is the yardstick's time."""
+def write(
+    path: Path,
+    topics: dict[str, Measured],
+    *,
+    quick: bool,
+    unit: float,
+    spent: Mapping[str, Mapping[str, float]] | None = None,
+) -> Path:
+    """``topics`` as JSON; ``unit`` is the yardstick's time, ``spent`` what the topics took."""
     path.parent.mkdir(parents=True, exist_ok=True)
     told = {
         "machine": machine(),
         "quick": quick,
         "yardstick_s": unit,
+        "spent": spent or {},
         "topics": {
             name: {kind: {f.name: f.value for f in found.figures if f.kind == kind} for kind in (ERROR, TIME)}
             for name, found in topics.items()
@@ -125,14 +158,18 @@ def write(path: Path, topics: dict[str, Measured], *, quick: bool, unit: float) 
     return path
 
 
-def read(path: Path) -> dict:
-    """What `write` wrote. Raises FileNotFoundError, and ValueError for a file of something else."""
+def read(path: Path, *, quick: bool | None = None) -> dict:
+    """What `write` wrote. Raises FileNotFoundError, and ValueError for a file of something else, or of a run that was ``quick`` where
+    this one is not (or the other way round): figures of the same name are then of other sizes."""
     try:
         told = json.loads(Path(path).read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:
         raise ValueError(f"{path} is no JSON ({error}); give a file that `geomech bench` wrote") from error
     if not isinstance(told, dict) or not {"topics", "yardstick_s"} <= set(told):
         raise ValueError(f"{path} holds no figures of a benchmark; give a file that `geomech bench` wrote")
+    if quick is not None and bool(told.get("quick")) != quick:
+        this, other = ("this run is quick", "was not") if quick else ("this run is not quick", "was")
+        raise ValueError(f"{this}, that of {path} {other}: compare quick with quick, and full with full")
     return told
 
 

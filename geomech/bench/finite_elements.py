@@ -10,11 +10,11 @@ the triangles' mesh takes comes on top and is not counted.
 from __future__ import annotations
 
 import importlib.util
-import time
 
 import numpy as np
 
 from .crack_problems import ROCK, CrackProblem
+from .figures import stopwatch
 
 
 def available() -> bool:
@@ -27,7 +27,7 @@ def edge_crack(problem: CrackProblem, refinement: int) -> tuple[np.ndarray, int,
     of two in ``refinement`` steps, eight times farther with each refinement."""
     from skfem import Basis, ElementQuad1, ElementQuad2, ElementVector, MeshQuad, condense, solve
 
-    began = time.perf_counter()
+    spent_on = stopwatch()
     (width, height), tip = problem.outline[2], problem.polylines[0][1, 0]
     graded = 0.5 ** (np.arange((5 + 3 * refinement) * refinement, -1, -1) / refinement)
     reach = min(tip + width, width - tip)
@@ -45,7 +45,7 @@ def edge_crack(problem: CrackProblem, refinement: int) -> tuple[np.ndarray, int,
     q = np.clip(2 - 2 * distance / reach, 0, 1)
     j = 2 * _energy_release(basis.interpolate(u), weight.interpolate(q), basis.dx)
     k = np.array([[np.sqrt(ROCK.plane_modulus * j), 0.0]])
-    return k, len(u), time.perf_counter() - began
+    return k, len(u), spent_on()
 
 
 def specimen(problem: CrackProblem, refinement: int) -> tuple[np.ndarray, int, float]:
@@ -56,7 +56,7 @@ def specimen(problem: CrackProblem, refinement: int) -> tuple[np.ndarray, int, f
 
     half = 0.5 * float(np.hypot(*np.diff(problem.polylines[0], axis=0)[0]))
     drawn = mesh_interior([problem.outline], problem.cracks, 1.6 * half / 2**refinement, 0.1 * half / 3**refinement)
-    began = time.perf_counter()
+    spent_on = stopwatch()
     mesh = MeshTri(np.ascontiguousarray(drawn.points.T), np.ascontiguousarray(drawn.triangles.T.astype(np.int64)))
     basis = Basis(mesh, ElementVector(ElementTriP2()), intorder=4)
     height = problem.outline[2, 1]
@@ -79,7 +79,7 @@ def specimen(problem: CrackProblem, refinement: int) -> tuple[np.ndarray, int, f
             q = weight.interpolate(np.clip(2 - 2.5 * distance, 0, 1))
             local = np.einsum("ab,b...->a...", turn, x - tip[:, None, None])
             out.append([_interaction(field, q, local, turn, mode, basis.dx) for mode in (0, 1)])
-    return np.array(out), len(u), time.perf_counter() - began
+    return np.array(out), len(u), spent_on()
 
 
 def _stiffness(basis):

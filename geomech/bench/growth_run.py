@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import statistics
-import time
 from dataclasses import replace
 
 import numpy as np
 
 from ..model import Cracks, DdmSettings
 from .crack_problems import ROCK, factors, specimen
+from .figures import stopwatch
 
 
 def measure(increments: int = 40) -> dict:
@@ -26,14 +26,14 @@ def measure(increments: int = 40) -> dict:
     body = Body([problem.outline], networks[0], ROCK, settings)
     body.solve(problem.load)
     for cracks in networks[1:]:
-        began = time.perf_counter()
+        spent_on = stopwatch()
         body = Body([problem.outline], cracks, ROCK, settings, previous=body, work=body.work)
         k = factors(body.solve(problem.load))
-        incremental.append(time.perf_counter() - began)
-        began = time.perf_counter()
+        incremental.append(spent_on())
+        spent_on = stopwatch()
         alone = Body([problem.outline], cracks, ROCK, settings)
         k_alone = factors(alone.solve(problem.load))
-        fresh.append(time.perf_counter() - began)
+        fresh.append(spent_on())
         difference = max(difference, float(np.abs(k - k_alone).max() / np.abs(k_alone).max()))
         elements = alone.counts["elements"]
     return {

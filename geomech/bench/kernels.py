@@ -20,7 +20,7 @@ def measure(quick: bool = False) -> Measured:
     """The table: ns a pair, CPU time of the fastest of some repeats."""
     threads, matrices.THREADS = matrices.THREADS, 1
     try:
-        rows = [*_matrices(5 if quick else 25), *_fields(3 if quick else 9)]
+        rows = [*_matrices(3 if quick else 9), *_fields(2 if quick else 5)]
     finally:
         matrices.THREADS = threads
     width = max(len(label) for label, _ in rows)

@@ -1,10 +1,12 @@
 """What a command loads before it does anything: modules by layer, heavy libraries, and the kernels that it compiles.
 
-Python tells the time of every import (``-X importtime``); Numba leaves an index file for every function it compiled.
+Python tells the time of every import (``-X importtime``); Numba leaves an index file for every function it compiled. A command
+is cold when what it loads has to come from the disk: the files of the packages are put out of the system's memory before.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -13,12 +15,16 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 #: Libraries that a command which does not need them must not load.
 HEAVY = ("gmsh", "vtkmodules", "pyvista", "matplotlib", "meshio", "shapely", "scipy", "numba", "pydantic", "ezdxf")
 #: Layers of the table that are told by name; the rest are libraries of Python itself and of others.
 LAYERS = ("geomech", "numpy", *HEAVY)
+
+#: In the arguments of a command: the folder of the last run.
+RUN = "RUN"
 
 _LINE = re.compile(r"^import time:\s+(\d+) \|\s+\d+ \|\s+(\S+)$", re.MULTILINE)
 
@@ -57,29 +63,61 @@ def compiled(folder: Path) -> dict[str, int]:
 
 
 def table(commands: Mapping[str, Sequence[str]]) -> list[str]:
-    """A line a command: seconds by layer, heavy libraries loaded."""
+    """A line a command: seconds by layer, heavy libraries loaded. A run's folder is ``RUN`` for those that come after it."""
     lines = ["imports by layer, ms (each module's own time, told by Python, which slows them)"]
-    for label, arguments in commands.items():
-        with tempfile.TemporaryDirectory() as folder:
-            found = loaded([*arguments, *(["--quiet", "--out", folder] if arguments[0] == "run" else [])])
-        layers = sorted(found.seconds.items(), key=lambda of: -of[1])
-        told = "  ".join(f"{name} {1e3 * spent:.0f}" for name, spent in layers if spent > 1e-3)
-        lines.append(f"  {label:<30}{1e3 * sum(found.seconds.values()):6.0f} in {found.modules} modules: {told}")
+    with tempfile.TemporaryDirectory() as scratch:
+        for label, arguments in commands.items():
+            last = f"{scratch}/{arguments[0]}" if arguments[0] in ("run", "build") else ""
+            out = (["--quiet"] * (arguments[0] == "run") + ["--out", last]) if last else []
+            found = loaded([*(f"{scratch}/run" if part == RUN else part for part in arguments), *out])
+            layers = sorted(found.seconds.items(), key=lambda of: -of[1])
+            told = "  ".join(f"{name} {1e3 * spent:.0f}" for name, spent in layers if spent > 1e-3)
+            lines.append(f"  {label:<30}{1e3 * sum(found.seconds.values()):6.0f} in {found.modules} modules: {told}")
     return lines
 
 
+def seconds(command: Sequence[str], environment: Mapping[str, str] | None = None) -> float:
+    """Of ``command`` from launch to exit, by the clock or of the processors (the process's own and its children's), whichever are
+    fewer: waiting while other programs have the processor is left out. Raises subprocess.CalledProcessError when it fails."""
+    clock, before = time.perf_counter(), os.times()
+    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    waited, after = time.perf_counter() - clock, os.times()
+    own = after.children_user - before.children_user + after.children_system - before.children_system
+    # Where the system does not count children's time there is the clock.
+    return min(waited, own) if own > 0 else waited
+
+
+def put_out_of_memory(names: Sequence[str] = ("geomech", *HEAVY, "numpy", "llvmlite")) -> float | None:
+    """Have the system forget the files of packages, as far as no other program uses them: their size, MB; None where it cannot be
+    asked to."""
+    if not hasattr(os, "posix_fadvise"):
+        return None
+    size = 0
+    for name in names:
+        found = find_spec(name)
+        if found is None or found.origin is None:
+            continue
+        folder = Path(found.origin).parent
+        # Shared libraries of wheels lie beside the package.
+        for place in (folder, folder.with_name(f"{name}.libs")):
+            for path in place.rglob("*") if place.is_dir() and found.submodule_search_locations else [Path(found.origin)]:
+                if path.is_file():
+                    with path.open("rb") as file:
+                        os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+                    size += path.stat().st_size
+    return 1e-6 * size
+
+
 def kernels(scenes: Mapping[str, Sequence[str]], environment: Mapping[str, str]) -> list[str]:
-    """A line a scene: the kernels that its run compiles into an empty cache, by package, and whole wall time of that and of
-    the next run."""
+    """A line a scene: the kernels that its run compiles into an empty cache, by package, and `seconds` of that and of the
+    next run."""
     lines = ["kernels compiled by a first run (seconds of it, and of the next)"]
     for label, arguments in scenes.items():
         with tempfile.TemporaryDirectory() as cache:
             own, spent = {**environment, "NUMBA_CACHE_DIR": cache}, []
             for k in range(2):
                 command = [sys.executable, "-m", "geomech", *arguments, "--quiet", "--out", f"{cache}/run_{k}"]
-                began = time.perf_counter()
-                subprocess.run(command, env=own, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-                spent.append(time.perf_counter() - began)
+                spent.append(seconds(command, own))
             counts = compiled(Path(cache))
         told = ", ".join(f"{name} {count}" for name, count in counts.items()) or "none"
         lines.append(f"  {label:<30}{spent[0]:6.1f} s {spent[1]:6.1f} s   {told}")

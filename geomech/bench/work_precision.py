@@ -1,24 +1,24 @@
 """Run time against error of the stress intensity factors: this solver, constant and quadratic elements, finite elements.
 
-Everything is timed in one run of one process: assembly and solution from nothing (mesh included), the median of
-repetitions after one that is not counted. The error is the largest of any tip's K_I or K_II, relative to the largest K.
+Everything is timed in one run of one process: assembly and solution from nothing (mesh included), the median of three
+repetitions or more after one that is not counted, which the error is of. The error is the largest of any tip's K_I or K_II, relative to the largest K.
 """
 
 from __future__ import annotations
 
 import math
 import statistics
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from ..model import DdmSettings
 from ..output.summary import write_json
 from . import constant_elements, crack_problems, finite_elements, free_surface, growth_run
 from .crack_problems import CrackProblem, factors, with_reference
-from .figures import Measured, machine
+from .figures import Measured, machine, stopwatch
 
 #: Where the picture and the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_ddm")
@@ -34,10 +34,20 @@ FITTED, CALIBRATED, FEM = (
 #: Below it an error is round-off (one element holds the whole solution of the Griffith crack).
 LEAST = 1e-13
 
+Found = TypeVar("Found")
+
 METHODS = (OURS, ASKED, LOW, QUADRATIC, FITTED, CALIBRATED, FEM)
 
 #: Goals: K to 1e-6 in so many seconds, and how many times less than constant elements at 1e-4.
 ONE_CRACK_S, SPECIMEN_S, RATIO, ERROR = 1e-3, 30e-3, 200.0, 1e-4
+#: Seconds that a method's last point may take about.
+LONGEST = 4.0
+#: Orders of this solver, digits asked for, elements of a crack of other methods, refinements of finite elements; those of a quick
+#: run for single cracks, bodies, and many cracks.
+ORDERS, DIGITS, COUNTS, REFINEMENTS = range(2, 11), range(2, 9), [2**k for k in range(2, 13)], (1, 2, 3, 4)
+QUICK_ORDERS = {"arc": (2, 4, 6), "50 random cracks": (2, 3, 4)}
+QUICK_DIGITS = {"arc": (2, 4), "50 random cracks": (2, 4)}
+QUICK_COUNTS = {"Griffith crack": (4, 16, 64, 256), "arc": (4, 16, 64, 256), "50 random cracks": (2, 4)}
 #: Constant elements are not given more unknowns than these: their matrix takes 2 GB, and its solution as much again.
 MOST_UNKNOWNS = 16000
 
@@ -55,14 +65,14 @@ class Point:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` stops each method after
-    about a quarter of a second; else constant elements are given `RATIO` times this solver's time to `ERROR` at least."""
+    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes few sizes, the same ones on
+    every machine; else constant elements are given `RATIO` times this solver's time to `ERROR` at least."""
     from ..render.work_precision import draw
 
-    points = [point for name in PROBLEMS for point in _curves(name, *((0.15, 0.0) if quick else (8.0, RATIO)))]
+    points = [point for name in PROBLEMS for point in _curves(name, quick)]
     surface = [
-        Point(free_surface.PROBLEM, method, size, unknowns, error, _seconds(work))
-        for method, size, unknowns, error, work in free_surface.rows()
+        Point(free_surface.PROBLEM, method, size, unknowns, error, timed(again)[1])
+        for method, size, unknowns, error, again in free_surface.rows()
     ]
     growth = growth_run.measure(5 if quick else 40)
     goals = _goals(points)
@@ -81,38 +91,37 @@ def measure(quick: bool = False) -> Measured:
     )
 
 
-def _seconds(work: Callable[[], object]) -> float:
-    """Median; as many repetitions as a tenth of a second has room for, three at least below a second."""
-    return _timed(work)[1]
-
-
-def _timed(work: Callable[[], object]) -> tuple[object, float]:
-    """What ``work`` gives and how long it takes, as `_seconds` has it."""
-    began = time.perf_counter()
+def timed(work: Callable[[], Found]) -> tuple[Found, float]:
+    """What ``work`` gives, and the seconds that it takes when it is done again: the median of three times, or of as many as a
+    twentieth of a second has room for; that of the first alone where it takes more than a third of a second."""
+    spent_on = stopwatch()
     found = work()
-    first = time.perf_counter() - began
-    if first > 1.0:
+    first = spent_on()
+    if first > 0.3:
         return found, first
-    spent = []
-    while len(spent) < 3 or (sum(spent) < 0.1 and len(spent) < 60):
-        began = time.perf_counter()
+    spent: list[float] = []
+    while len(spent) < 3 or (sum(spent) < 0.05 and len(spent) < 30):
+        spent_on = stopwatch()
         work()
-        spent.append(time.perf_counter() - began)
+        spent.append(spent_on())
     return found, statistics.median(spent)
 
 
-def _curves(name: str, longest: float, ratio: float) -> Iterator[Point]:
-    """``longest`` s a method, but constant elements ``ratio`` times this solver's time to `ERROR` where that is longer."""
+def _curves(name: str, quick: bool) -> Iterator[Point]:
+    """The sizes of a quick run, or `LONGEST` s a method, but constant elements `RATIO` times this solver's time to `ERROR` where
+    that is longer."""
+    orders, digits = (QUICK_ORDERS.get(name, (2, 3, 4, 6, 8)), QUICK_DIGITS.get(name, (2, 4, 6))) if quick else (ORDERS, DIGITS)
+    counts = QUICK_COUNTS.get(name, (4, 8, 16)) if quick else COUNTS
     make, low, ours = PROBLEMS[name]
     given = make()
     problem = with_reference(given) if given is not None else None
-    own = list(_until(longest, name, OURS, range(2, 11), lambda p: _solved(*ours(problem, p))))
+    own = list(_until(name, OURS, orders, lambda p: ours(problem, p)))
 
     def asked_for(digits: int):
         refined = ours(None, digits + 1)[0] if problem is None else problem
-        return _solved(refined, DdmSettings(target_error=10.0**-digits))
+        return refined, DdmSettings(target_error=10.0**-digits)
 
-    own += _until(longest, name, ASKED, range(2, 9), asked_for)
+    own += _until(name, ASKED, digits, asked_for)
     yield from own
 
     def with_elements(order: int, nodes: str):
@@ -121,58 +130,59 @@ def _curves(name: str, longest: float, ratio: float) -> Iterator[Point]:
             elements = 1 if problem is None else n
             side = max(2, round(n * low)) if refined.outline is not None else 1
             settings = DdmSettings(order, nodes, elements, side, grading_layers=0)
-            return _solved(refined, settings)
+            return refined, settings
 
         return solve
 
-    counts = [2**k for k in range(2, 13)]
-    yield from _until(longest, name, LOW, counts, with_elements(0, "chebyshev"))
-    yield from _until(longest, name, QUADRATIC, counts, with_elements(2, "equal"))
-    yield from _constant_elements(name, problem, low, max(longest, ratio * (own_time(own, name, ERROR) or 0.0)))
+    yield from _until(name, LOW, counts, with_elements(0, "chebyshev"))
+    yield from _until(name, QUADRATIC, counts, with_elements(2, "equal"))
+    given = None if quick else max(LONGEST, RATIO * (own_time(own, name, ERROR) or 0.0))
+    yield from _constant_elements(name, problem, low, counts, given)
     run = {"edge crack in a strip": finite_elements.edge_crack, "two-crack specimen": finite_elements.specimen}.get(
         name
     )
     if run and finite_elements.available():
         run(problem, 1)
-        for refinement in (1, 2, 3, 4):
+        for refinement in REFINEMENTS[:1] if quick else REFINEMENTS:
             k, unknowns, seconds = run(problem, refinement)
             yield Point(name, FEM, refinement, unknowns, problem.error(k), seconds)
-            if 4 * seconds > longest:
+            if 4 * seconds > LONGEST:
                 break
 
 
-def _constant_elements(name: str, problem: CrackProblem | None, low: float, longest: float) -> list[Point]:
-    """Both ways to K from one solution each, the last of which takes about ``longest`` s."""
+def _constant_elements(
+    name: str, problem: CrackProblem | None, low: float, counts: Sequence[int], longest: float | None
+) -> list[Point]:
+    """Both ways to K from one solution each: with the ``counts`` of elements, or on until the last takes ``longest`` s."""
     rows: dict[str, list[Point]] = {FITTED: [], CALIBRATED: []}
-    n = 4
+    n, rest = counts[0], iter(counts[1:])
     while True:
         refined = crack_problems.arc_of_chords(n) if problem is None else problem
-        (*found, unknowns), seconds = _timed(partial(constant_elements.stress_intensity, refined, n, round(n * low)))
+        (*found, unknowns), seconds = timed(partial(constant_elements.stress_intensity, refined, n, round(n * low)))
         for method, k in zip((FITTED, CALIBRATED), found):
             rows[method].append(Point(name, method, n, unknowns, refined.error(k), seconds))
+        if longest is None:
+            n = next(rest, 0)
+            if not n:
+                return rows[FITTED] + rows[CALIBRATED]
+            continue
         most = MOST_UNKNOWNS * n // unknowns
         if seconds >= longest or n >= most:
             return rows[FITTED] + rows[CALIBRATED]
         # Most of it goes with the third power of n.
-        rest = max(1.1, (1.2 * longest / seconds) ** (1 / 3))
-        n = min(2 * n if rest > 2 else math.ceil(n * rest), most)
+        growth = max(1.1, (1.2 * longest / seconds) ** (1 / 3))
+        n = min(2 * n if growth > 2 else math.ceil(n * growth), most)
 
 
-def _until(longest: float, name: str, method: str, sizes, solve) -> Iterator[Point]:
-    """Points for growing sizes until the next one would take longer than ``longest``."""
+def _until(name: str, method: str, sizes: Iterable[int], solve: Callable) -> Iterator[Point]:
+    """Points for growing sizes until the next one would take longer than `LONGEST`."""
     for size in sizes:
-        unknowns, error, again = solve(size)
-        seconds = _seconds(again)
-        yield Point(name, method, int(size), unknowns, max(error, LEAST), seconds)
-        if 4 * seconds > longest:
+        problem, settings = solve(size)
+        solution, seconds = timed(partial(problem.solve, settings))
+        unknowns = solution.body.boundary.n_unknowns + solution.body.faces.n_unknowns
+        yield Point(name, method, int(size), unknowns, max(problem.error(factors(solution)), LEAST), seconds)
+        if 4 * seconds > LONGEST:
             return
-
-
-def _solved(problem: CrackProblem, settings: DdmSettings):
-    """Unknowns, error, and what to time."""
-    solution = problem.solve(settings)
-    unknowns = solution.body.boundary.n_unknowns + solution.body.faces.n_unknowns
-    return unknowns, problem.error(factors(solution)), lambda: problem.solve(settings)
 
 
 def _one_crack(problem: CrackProblem, order: int):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import time
 from pathlib import Path
 
 from ..bench import TOPICS, topic
@@ -15,7 +16,9 @@ def declare(verbs: Verbs) -> None:
         "geomech bench startup\ngeomech bench --quick --out before.json\ngeomech bench --quick --against before.json",
     )  # fmt: skip
     bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(TOPICS)} (default: all)")
-    bench.add_argument("--quick", action="store_true", help="fewer repetitions, nothing compiled anew")
+    bench.add_argument(
+        "--quick", action="store_true", help="smaller sizes and fewer of them, nothing compiled anew: a minute for all (else a quarter of an hour)"
+    )  # fmt: skip
     bench.add_argument(
         "--out", type=Path, metavar="FILE", help="where the figures go, JSON (default outputs/bench/figures.json)"
     )
@@ -29,6 +32,11 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
 
 
+    bench.add_argument(
+        "--blocks", type=int, metavar="N", help="of dda: a wall of so many blocks too (100000: some minutes and 3 GB)"
+    )
+
+
 def _bench(options: argparse.Namespace) -> int:
     unknown = [name for name in options.topics if name not in TOPICS]
     if unknown:
@@ -36,21 +44,33 @@ def _bench(options: argparse.Namespace) -> int:
     from ..bench import figures
 
     try:
-        before = figures.read(options.against) if options.against else None
+        before = figures.read(options.against, quick=options.quick) if options.against else None
     except (OSError, ValueError) as error:
         raise BadInput(f"--against: {error}") from error
     seeds = _seeds(options)
+    if options.blocks is not None and ("dda" not in options.topics or options.blocks < 1):
+        raise BadInput("--blocks takes a number of blocks and belongs to dda: geomech bench dda --blocks 100000")
     unit, found = figures.yardstick(), {}
+    spent: dict[str, dict[str, float]] = {}
     print(figures.said(figures.machine()), end="\n\n")
     for name in options.topics or TOPICS:
+        began = time.perf_counter(), figures.processor_seconds()
         if name == "slopes" and seeds:
             from ..bench.fuzzed_slopes import measure_many
 
             found[name] = measure_many(seeds)
+        elif name == "dda":
+            found[name] = topic(name)(options.quick, options.blocks)
         else:
             found[name] = topic(name)(options.quick)
+        spent[name] = {
+            "seconds": time.perf_counter() - began[0],
+            "of processor": figures.processor_seconds() - began[1],
+        }
         print(found[name].text, end="\n\n", flush=True)
-    print(figures.write(options.out or Path("outputs/bench/figures.json"), found, quick=options.quick, unit=unit))
+    print(figures.told_times(spent), end="\n\n")
+    out = options.out or Path("outputs/bench/figures.json")
+    print(figures.write(out, found, quick=options.quick, unit=unit, spent=spent))
     if before is None:
         return DONE
     changes = figures.changes(before, found, unit)

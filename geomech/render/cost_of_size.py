@@ -1,4 +1,5 @@
-"""The pictures of `geomech bench dda` and `geomech bench geometry`: time against the number of blocks."""
+"""The pictures of `geomech bench dda` and `geomech bench geometry`: time against the number of blocks, or against what is left of
+the equations."""
 
 from __future__ import annotations
 
@@ -40,6 +41,36 @@ def draw(costs: Sequence[Measured], other: Mapping[int, float], path: Path) -> P
     n = [first.blocks, max(c.blocks for c in costs)]
     axes.loglog(n, [1e3 * first.iteration * k / n[0] for k in n], color="#999999", lw=0.8, ls="--", label="linear")
     return _saved(figure, axes, "ms an open–close iteration", path)
+
+
+def draw_solvers(solutions: Sequence[Mapping[str, Any]], path: Path) -> Path:
+    """Time against residual of ways to solve a step's equations, a panel a scene and size: ``solutions`` are rows of scene, blocks,
+    method, seconds, residual."""
+    from matplotlib.figure import Figure
+
+    scenes = list(dict.fromkeys((row["scene"], row["blocks"]) for row in solutions))
+    figure = Figure(figsize=(0.5 + 3.6 * len(scenes), 4.4), dpi=130, layout="constrained")
+    panels = figure.subplots(1, len(scenes), sharey=True, squeeze=False)[0]
+    for panel, (scene, blocks) in zip(panels, scenes):
+        here = [row for row in solutions if (row["scene"], row["blocks"]) == (scene, blocks)]
+        for method, (colour, marker) in zip(dict.fromkeys(row["method"] for row in here), _STYLES):
+            mine = [row for row in here if row["method"] == method]
+            panel.loglog(
+                [row["residual"] for row in mine], [1e3 * row["seconds"] for row in mine], color=colour, marker=marker,
+                lw=1.5, label=method,
+            )  # fmt: skip
+        panel.set_title(f"{scene}, {blocks} blocks", fontsize=10, loc="left")
+        panel.invert_xaxis()
+        panel.grid(which="major", color="#e4e4e4", lw=0.7)
+        panel.set_axisbelow(True)
+        for side in ("top", "right"):
+            panel.spines[side].set_visible(False)
+    panels[0].set_ylabel("solution, set-up included, ms")
+    panels[-1].legend(frameon=False, fontsize=9)
+    figure.supxlabel("residual over the right side, better to the right", fontsize=10)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+    return path
 
 
 def draw_cutting(costs: Sequence[Cut], path: Path) -> Path:

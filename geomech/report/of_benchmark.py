@@ -41,7 +41,9 @@ def _add_topics(page: Page, found: Mapping[str, Any], folder: Path) -> None:
     """The figures of `geomech bench`, topic by topic with the pictures that each has left beside, then the machine."""
     for topic, figures in found["topics"].items():
         page.section(topic)
-        page.figures(_pictures(folder.parent / f"bench_{topic}"), whole=True)
+        # The maps of stability have a folder of their own name.
+        for beside in (f"bench_{topic}", topic):
+            page.figures(_pictures(folder.parent / beside), whole=True)
         for kind, values in figures.items():
             if isinstance(values, Mapping) and values:
                 page.table(["", kind], list(values.items()))

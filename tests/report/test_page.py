@@ -19,6 +19,8 @@ from geomech.report import write_page
 from geomech.report.of_runs import differences
 from geomech.report.page import Page, written
 
+#: A picture of one black pixel.
+DOT = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGNgAAAAAgABSK+kcQAAAABJRU5ErkJggg=="
 EMPTY = {"meta", "img", "br", "hr", "input", "link"}
 
 
@@ -155,6 +157,17 @@ def test_page_of_a_benchmark(tmp_path, capsys):
     capsys.readouterr()
     read = Read((folder / "report.html").read_text(encoding="utf-8"))
     assert read.table("problem")[1:] == [["crack", "0.0001", "0.25"], ["star", "2·10⁻⁶", "0.5"]]
+    # The figures of all benchmarks take the pictures that each has left beside them.
+    figures = {"topics": {"made": {"error": {"k": 1e-4}}, "stability": {"error": {"wrong": 0.0}}}, "yardstick_s": 1.0}
+    (tmp_path / "bench").mkdir()
+    (tmp_path / "bench" / "figures.json").write_text(json.dumps(figures))
+    (tmp_path / "stability").mkdir()
+    for place in (folder, tmp_path / "stability"):
+        (place / "map.png").write_bytes(base64.b64decode(DOT))
+    assert main(["report", str(tmp_path / "bench")]) == DONE
+    capsys.readouterr()
+    page = (tmp_path / "bench" / "report.html").read_text(encoding="utf-8")
+    assert page.count(DOT) == 2 and Read(page).table("error")
     (folder / "points.json").write_text("{")
     assert main(["report", str(folder)]) != DONE
     assert "points.json is no JSON" in capsys.readouterr().err
