@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from .hanging import Hanging
 from .inherited_loads import on_children, on_moved
 from .phases import Phases
 from .tractions import BoundaryLoad
+
+if TYPE_CHECKING:
+    from ..ddm.path import Memory
 
 
 class CrackedBlocks:
@@ -44,6 +48,8 @@ class CrackedBlocks:
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self.hanging = Hanging()
+        #: What the last steps of the tips have told of their paths.
+        self.chords: Memory = {}
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
         self.solved_from: dict[int, object] = {}

@@ -45,7 +45,7 @@ def growth_of_tips(
         ahead = now.solve(trial, now.loads, now.solutions)
         return tip_rows(now.problem, now.blocks, ahead, nodes_of)
 
-    growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct)
+    growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct, now.chords)
     if growth is not None:
         now.bodies = trial  # most of it is what the corrected step needs
     return growth

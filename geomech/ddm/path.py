@@ -15,11 +15,15 @@ A chord that has half of the turn is the trapezoidal rule: stable for all κ, bu
 the next with the other sign, κ/(2 + κ) of it, and stiff paths zigzag for long. With the share s of the turn it is
 (1 − s) κ/(1 + s κ): s = 1 − 1/κ from κ = 2 on leaves 1/κ, and in the limit no shear at the end of a step (backward Euler).
 κ falls with √Δa, so that fine steps have half the turn, and second order.
+
+From step to step neither κ nor the turn from chord to chord changes much. So the first trial turns as the last chord did, and
+the κ found then says how far to correct it: mostly one look ahead is enough (`Remembered`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,9 +47,36 @@ LOOKS = 5
 SLOPES = (-39.0, 0.0)
 #: The largest κ that a first look is believed.
 GUESSED = 8.0
+#: By this part the slope may have changed since the last step: a correction by it is taken unseen where what it may leave is within
+#: the tolerance.
+CHANGED = 0.3
+#: A chord that turned on from its last trial by more than this tells the slope there.
+TELLING = np.radians(0.5)
+#: A tip's first trial is the turn of its last chord where the criterion's angle is no farther from it than this.
+NEAR = np.radians(10.0)
 #: The chord lies between the first trial and the first correction, since the condition falls by at least as much as the
 #: chord turns; by this part of their difference it may lie outside (tension along the crack, round-off).
 OUTSIDE = 0.2
+
+
+class Remembered(NamedTuple):
+    """Of a tip's last step: ``kappa`` (nan: not known), the ``angle`` of its chord, the angle last ``tried`` before and the one that
+    the criterion asked for at the end of that trial, ``ahead``."""
+
+    kappa: float
+    angle: float
+    tried: float
+    ahead: float
+
+    def kappa_at(self, start: float) -> float:
+        """κ now that the criterion asks for ``start`` at the end of the chord."""
+        if abs(self.angle - self.tried) > TELLING:
+            return -1 - float(np.clip((start - self.ahead) / (self.angle - self.tried), *SLOPES))
+        return self.kappa
+
+
+#: Place of a tip → what its last step has told.
+Memory = dict[tuple[float, float], Remembered]
 
 
 class Chords:
@@ -55,8 +86,18 @@ class Chords:
     its end and s the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀, and a falls by 1 + κ times what θ turns.
     """
 
-    def __init__(self, tips: np.ndarray) -> None:
+    def __init__(self, tips: np.ndarray, memory: Memory | None = None) -> None:
         self.start = tips["angle"].copy()
+        #: κ by the last step, nan where it is not known, …
+        self.kappa = np.full(len(tips), np.nan)
+        #: … and the chords to begin with.
+        self.first = self.start.copy()
+        for row, point in enumerate(tips["point"].tolist() if memory else ()):
+            last, start = memory.get(tuple(point)), float(self.start[row])
+            if last is not None and abs(start) <= KINK:
+                self.kappa[row] = last.kappa_at(start)
+                if abs(last.angle) <= KINK and abs(last.angle - start) <= NEAR:
+                    self.first[row] = last.angle
         self.share = np.where(np.abs(self.start) > KINK, KINK_SHARE, SMOOTH_SHARE)
         self.looks = 0
         self.onward = np.zeros(len(tips), bool)
@@ -76,11 +117,12 @@ class Chords:
         turns = _turns_ahead(tips, grown, ahead, cracks, cycle)
         angle = tips["angle"].copy()
         first = self.looks == 1
-        kappa = self._first_guess(turns) if first else self._secant(turns, angle)
+        known = np.isfinite(self.kappa)
+        kappa = np.where(known, self.kappa, self._first_guess(turns)) if first else self._secant(turns, angle)
         share = np.maximum(self.share, 1 - 1 / np.maximum(kappa, 1.0))
         rest = share * turns - (1 - share) * (angle - self.start)
         off = np.abs(rest) > TOLERANCE  # not where there is nothing ahead, nan
-        known = np.isfinite(rest)
+        seen = np.isfinite(rest)
         if first:
             # Faces that close make the condition jump; secants must not run away across the jump.
             ends = np.stack([angle - OUTSIDE * rest, angle + (1 + OUTSIDE) * rest])
@@ -88,12 +130,14 @@ class Chords:
                 np.nanmin(ends, axis=0, initial=np.inf),
                 np.nanmax(ends, axis=0, initial=-np.inf),
             )
-        tips["angle"][known] = np.clip(angle + rest / (1 + share * kappa), self.lowest, self.highest)[known]
+        tips["angle"][seen] = np.clip(angle + rest / (1 + share * kappa), self.lowest, self.highest)[seen]
         if first:
             # A first look that turns on a little, the way the trial did, needs no second one: the path is smooth.
-            self.onward = rest * self.start >= 0
+            self.onward = (rest * self.start >= 0) & ~known
             self.whole = angle + self.share * turns
-            unsettled = off & ~(self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF))
+            smooth = self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF)
+            left = np.abs(rest) * share * CHANGED * np.maximum(1 + kappa, 1.0) / (1 + share * kappa)
+            unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)
         elif self.looks == 2:
             # Nor is a large turn stiff for its size alone: then the first correction was right, the whole of it.
             gentle = self.onward & (kappa < GENTLE)
@@ -101,7 +145,17 @@ class Chords:
         else:
             unsettled = off
         self.last_angle, self.last_turns = angle, turns
+        self.kappa = np.where((self.looks > 1) | known, kappa, np.nan)
         return self.looks == LOOKS or not unsettled.any()
+
+    def remember(self, memory: Memory, tips: np.ndarray, growth: Growth, cycle: int) -> None:
+        """Keep in ``memory`` what the steps that were taken have told, at their ends."""
+        ends = _new_ends(tips, growth.grown, growth.cracks, cycle)
+        told = zip(self.kappa.tolist(), tips["angle"].tolist(), self.last_angle.tolist(), self.last_turns.tolist())
+        for point, end, step in zip(tips["point"].tolist(), ends, told):
+            if end >= 0:
+                memory.pop(tuple(point), None)
+                memory[tuple(growth.cracks.nodes[end].tolist())] = Remembered(*step)
 
     def _first_guess(self, turns: np.ndarray) -> np.ndarray:
         """κ by the turn ahead of a trial along the tangent: on a smooth path, from half a turn before the tip, it is 2 + κ
@@ -112,10 +166,12 @@ class Chords:
         return np.where((kappa >= STIFF) & (np.abs(self.start) <= KINK), kappa, 0.0)
 
     def _secant(self, turns: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """κ by the last two looks."""
+        """κ by the last two looks; as it was where they are too near to one another to tell."""
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = (turns - self.last_turns) / (angle - self.last_angle)
-        return np.where(np.isfinite(slope), -1 - np.clip(slope, *SLOPES), 0.0)
+        known = np.isfinite(self.kappa)
+        tells = np.isfinite(slope) & (~known | (np.abs(angle - self.last_angle) > TELLING))
+        return np.where(tells, -1 - np.clip(slope, *SLOPES), np.where(known, self.kappa, 0.0))
 
 
 def corrected(
@@ -124,15 +180,18 @@ def corrected(
     look_ahead: Callable[[Cracks], np.ndarray],
     cycle: int,
     correct: bool = True,
+    memory: Memory | None = None,
 ) -> Growth | None:
     """One growth step of all driven tips along chords; None when no tip moves. Sets the angles that were followed.
 
     ``tips``: TIP rows with the criterion's ``angle`` and ``k_eq``; ``grow()`` advances them as they then stand, in segments
     of birth ``cycle``; ``look_ahead(cracks)`` solves the tried network and returns its TIP rows with their angles. Without
-    ``correct`` the criterion's angles are followed as they are.
+    ``correct`` the criterion's angles are followed as they are. ``memory``: of the last steps, brought up to date.
     """
+    chords = Chords(tips, memory)
+    if correct:
+        tips["angle"] = chords.first
     growth = grow()
-    chords = Chords(tips)
     settled = not correct
     # A step that joins something may cut a piece off, on which there is nothing to solve.
     while not settled and not growth.joins and np.any(growth.grown > 0):
@@ -143,18 +202,25 @@ def corrected(
             # Bent, a step would not leave its tip; the criterion's own direction does.
             tips["angle"][stuck] = chords.start[stuck]
             growth = grow()
+    if memory is not None and correct:
+        chords.remember(memory, tips, growth, cycle)
     return growth if np.any(growth.grown > 0) or growth.joins else None
 
 
 def _turns_ahead(tips: np.ndarray, grown: np.ndarray, ahead: np.ndarray, cracks: Cracks, cycle: int) -> np.ndarray:
     """(n_tips,) the angle that the criterion gives at the end of each tip's new segment; nan where there is no tip."""
-    turns = np.full(len(tips), np.nan)
-    new = np.flatnonzero(cracks.birth_cycle == cycle)
     turn_at = {int(tip["node"]): float(tip["angle"]) for tip in ahead}
+    return np.array([turn_at.get(node, np.nan) for node in _new_ends(tips, grown, cracks, cycle)])
+
+
+def _new_ends(tips: np.ndarray, grown: np.ndarray, cracks: Cracks, cycle: int) -> list[int]:
+    """The nodes in which the tips' new segments end, of birth ``cycle``; −1 where there is none."""
+    ends = [-1] * len(tips)
+    new = np.flatnonzero(cracks.birth_cycle == cycle)
     at = cracks.nodes[cracks.segments[new]]  # (n, 2 ends, 2)
     for row in np.flatnonzero(grown > 0):
         starts = np.argwhere((at == tips["point"][row]).all(axis=2))
         if len(starts) == 1:
             segment, end = starts[0]
-            turns[row] = turn_at.get(int(cracks.segments[new[segment], 1 - end]), np.nan)
-    return turns
+            ends[row] = int(cracks.segments[new[segment], 1 - end])
+    return ends

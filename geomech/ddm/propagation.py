@@ -21,7 +21,7 @@ from .body import Body
 from .growth import Growth, advance
 from .initiation import Birth, bear, births
 from .loads import BodyLoad
-from .path import corrected
+from .path import Memory, corrected
 from .solution import Solution
 from .trial_kinks import check_criterion, judged
 
@@ -106,6 +106,7 @@ class _Run:
         self.body: Body | None = None
         self.solution: Solution | None = None
         self.number = 0
+        self.chords: Memory = {}
 
     def steps(self, cracks: Cracks, max_steps: int) -> Iterator[Step]:
         from . import NotConverged
@@ -212,7 +213,7 @@ class _Run:
             self.body = self._body(tried, self.body)
             return self._solve(self.body, self.factor)[1]
 
-        growth = corrected(tips, grow, look_ahead, cycle, self.growth.correct)
+        growth = corrected(tips, grow, look_ahead, cycle, self.growth.correct, self.chords)
         if growth is None:
             self.body = body
         else:

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from geomech.ddm.path import LOOKS, TOLERANCE, Chords
+from geomech.ddm.path import LOOKS, TOLERANCE, Chords, Remembered
 from geomech.model import TIP, Cracks
 
 
-def chosen(ask, start_deg: float) -> tuple[float, int]:
+def chosen(ask, start_deg: float, memory=None) -> tuple[float, int]:
     """The chord's angle, degrees, when the criterion asks ``start_deg`` at the start of the step and ``ask(θ)`` at the
-    end of one along θ, and how many looks ahead that took."""
+    end of one along θ, and how many looks ahead that took; ``memory`` is of the last step."""
     tips = np.zeros(1, TIP)
     tips["angle"] = np.radians(start_deg)
-    chords = Chords(tips)
+    chords = Chords(tips, None if memory is None else {(0.0, 0.0): memory})
+    tips["angle"] = chords.first
     for look in range(1, LOOKS + 1):
         angle = float(tips["angle"][0])
         ends = np.array([[-1.0, 0.0], [0.0, 0.0], [np.cos(angle), np.sin(angle)]])
@@ -64,3 +65,41 @@ def test_compression_along_the_crack_does_not_throw_the_path_about(start, stiffn
     assert abs(angle - solution) < np.degrees(TOLERANCE) / (1 + stiffness * share) + 1e-9 or looks == 1
     after = start - (1 + stiffness) * angle
     assert abs(after) < abs(start) * (1 if stiffness <= 2 else 1 / stiffness + 1e-9) or looks == 1
+
+
+def test_an_arc_goes_on_as_it_went():
+    """Of an arc that turned by 8 degrees from chord to chord the first trial is the next chord itself."""
+    angle, looks = chosen(lambda theta: 12.0 - theta, 4.0, Remembered(np.nan, *np.radians([8.0, 8.0, 4.0])))
+    assert angle == pytest.approx(8.0, abs=1e-12)
+    assert looks == 1
+
+
+@pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
+@pytest.mark.parametrize("curve", [0.0, 3.0])
+def test_a_remembered_slope_spares_looks(stiffness, curve):
+    """A step along θ ends with start + curve − (1 + κ) θ asked for, and κ is off by a tenth since the last step: by what the last
+    chord ended with, or by what was found then, one look leaves less than the tolerance."""
+    start, before = 2.0, 1.1 * stiffness
+
+    def ask(theta):
+        return start + curve - (1 + stiffness) * theta
+
+    share = max(1 / 2, 1 - 1 / before)
+    solution = (start + share * curve) / (1 + share * stiffness)
+    last = solution + 1.0 / (1 + stiffness)
+    trial = last - 1.0
+    told = Remembered(0.0, *np.radians([last, trial, start + (1 + before) * (last - trial)]))
+    found = Remembered(before, *np.radians([last, last, start]))
+    for memory in (told, found):
+        angle, looks = chosen(ask, start, memory)
+        assert looks == 1
+        assert stiffness < 5 or chosen(ask, start)[1] > 1
+        assert abs(angle - solution) < np.degrees(TOLERANCE) / (1 + share * stiffness)
+
+
+def test_what_has_changed_is_looked_at_again():
+    """Faces close: the last step's slope would leave several degrees."""
+    memory = Remembered(1.0, *np.radians([1.0, 1.0, 2.0]))
+    angle, looks = chosen(lambda theta: -40.0 - 6.0 * theta, 2.0, memory)
+    assert looks > 1
+    assert chosen(lambda theta: -40.0 - 6.0 * theta, 2.0)[0] == pytest.approx(angle, abs=0.3)
