@@ -21,11 +21,14 @@ from .. import dda
 from ..conventions import normal_of, traction
 from ..dda.overlap import REFUSED
 from ..model import OPEN, Blocks, Loads, State
+from ..model.blocks import STRAIGHT
 from .splitting import Split
 from .tractions import BoundaryLoad
 
 #: Points and nodes nearer to a segment than this part of its length lie on it.
 _ON = 1e-7
+#: … and load segments, on the line through the ends of a straight side.
+_ON_SIDE = 4 * STRAIGHT
 #: Contacts press along normals nearer to a face's than this (cosine, 4°): those of faces that bend no more are one.
 _ALIGNED = 0.9975
 #: Gauss points on a segment of whole rock.
@@ -259,8 +262,8 @@ def _tell_of_divided_edges(
     told: _Told, found, split: Split, before: Blocks, parent: int, load: BoundaryLoad, loaded: set[str]
 ) -> None:
     """The traction from outside on edges of ``parent`` that mouths have divided, or that end at a vertex that is two now, to the
-    contacts on their parts. Where contacts and an edge ``load`` share an edge the traction is not theirs alone, and nothing
-    is told."""
+    contacts on the sides that their parts are in. Where contacts and an edge ``load`` share a side the traction is not theirs
+    alone, and nothing is told."""
     blocks, owner = split.blocks, split.blocks.vertex_block
     old_vertices = np.bincount(split.vertex_origin[split.vertex_origin >= 0], minlength=before.n_vertices)
     twice = old_vertices > 1
@@ -269,37 +272,58 @@ def _tell_of_divided_edges(
     partial = np.any(split.edge_span != [0.0, 1.0], axis=1)
     divided = here & (partial | twice[origin] | twice[before.next_vertex[origin]])
     rotation = float(split.state.rotation[parent])
-    for edge in np.flatnonzero(divided).tolist():
-        if before.edge_names[before.edge_name[split.edge_origin[edge]]] in loaded:
+    # What touches an edge may stand on the next one of a straight side.
+    for side in sorted({blocks.side_start[edge] for edge in np.flatnonzero(divided).tolist()}):
+        edges = np.array(blocks.sides[side][:-1])
+        names = before.edge_name[split.edge_origin[edges]]
+        if any(before.edge_names[name] in loaded for name in names.tolist()):
             continue
-        rows = _contacts_on(found, split, edge)
+        rows = _contacts_on(found, split, blocks.sides[side])
         if not len(rows):
             continue
-        vertices, end = split.state.vertices, blocks.next_vertex[edge]
-        at = np.clip(_along(found.geometry[rows, 5:7], vertices[edge], vertices[end])[0], 0.0, 1.0)
-        place, force = _loads_on(load, blocks.vertices[edge], blocks.vertices[end])
-        stops, which = np.unique(np.round(at, 9), return_inverse=True)
-        # What two neighbours bear at one place they share.
-        share = 1.0 / np.bincount(which)[which]
-        weight = np.stack([np.interp(place, stops, unit) for unit in np.eye(len(stops))]) if len(place) else None
-        lumped = np.zeros((len(stops), 2)) if weight is None else _turned(weight @ force, rotation)
-        sign = np.where(found.block[rows] == owner[edge], 1.0, -1.0)
-        told.force[rows] += (sign * share)[:, None] * lumped[which]
+        ends = blocks.sides[side][0], blocks.sides[side][-1]
+        at = np.clip(_along(found.geometry[rows, 5:7], *split.state.vertices[list(ends)])[0], 0.0, 1.0)
+        neighbour = np.where(found.block[rows] == owner[side], found.other[rows], found.block[rows])
+        place, force = _loads_on(load, *blocks.vertices[list(ends)])
+        lumped = _turned(_shares(at, neighbour, place) @ force, rotation)
+        sign = np.where(found.block[rows] == owner[side], 1.0, -1.0)
+        told.force[rows] += sign[:, None] * lumped
         told.slip[rows] = found.slip[rows]
         told.known[rows] = True
 
 
-def _contacts_on(found, split: Split, edge: int) -> np.ndarray:
-    """The contacts on the ``edge`` of a part, with blocks that are no parts of the same parent."""
+def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(n, k) what part of a force at each ``place`` (k,) on an edge is that of each contact ``at`` (n,), with the block
+    ``neighbour`` (n,): by the linear shape functions, among the contacts of the neighbour that reaches there, of two that do of the
+    one that reaches further. (Two neighbours' corners meet on the edge within less than faces slide by.)"""
+    out = np.zeros((len(at), len(place)))
+    groups = [np.flatnonzero(neighbour == b) for b in np.unique(neighbour).tolist()]
+    reach = np.array([[at[rows].min(), at[rows].max()] for rows in groups])
+    beyond = np.maximum(np.maximum(reach[:, :1] - place, place - reach[:, 1:]), 0.0)
+    width = np.broadcast_to((reach[:, 0] - reach[:, 1])[:, None], beyond.shape)
+    nearest = np.lexsort((width, beyond), axis=0)[0]
+    for number, rows in enumerate(groups):
+        own = np.flatnonzero(nearest == number)
+        stops, which = np.unique(np.round(at[rows], 9), return_inverse=True)
+        # What two contacts bear at one place they share.
+        share = 1.0 / np.bincount(which)[which]
+        for k, row in enumerate(rows.tolist()):
+            hat = (np.arange(len(stops)) == which[k]).astype(float)
+            out[row, own] = share[k] * np.interp(place[own], stops, hat)
+    return out
+
+
+def _contacts_on(found, split: Split, side: list[int]) -> np.ndarray:
+    """The contacts on the straight ``side`` of a part (the vertices along it), with blocks that are no parts of the same parent."""
     blocks, vertices = split.blocks, split.state.vertices
-    block = int(blocks.vertex_block[edge])
+    block = int(blocks.vertex_block[side[0]])
     others = split.parent != split.parent[block]
-    end = blocks.next_vertex[edge]
-    outward = -normal_of(vertices[end] - vertices[edge]) / np.hypot(*(vertices[end] - vertices[edge]))
+    along = vertices[side[-1]] - vertices[side[0]]
+    outward = -normal_of(along) / np.hypot(*along)
     facing = found.geometry[:, 1:3] @ outward
-    touched = (found.edge == edge) & others[found.block] & (facing > _ALIGNED)
+    touched = np.isin(found.edge, side[:-1]) & others[found.block] & (facing > _ALIGNED)
     touching = (found.block == block) & others[found.other] & (facing < -_ALIGNED)
-    touching &= (found.vertex == edge) | (found.vertex == end)
+    touching &= np.isin(found.vertex, side)
     return np.flatnonzero(touched | touching)
 
 
@@ -311,7 +335,7 @@ def _loads_on(load: BoundaryLoad, a: np.ndarray, b: np.ndarray) -> tuple[np.ndar
     for segment, ends in zip(load.segments, load.tractions):
         (s0, s1), _ = _along(segment, a, b)
         off = np.abs((segment - a) @ normal_of(b - a)) / length**2
-        if off.max() > _ON or s1 == s0:
+        if off.max() > _ON_SIDE or s1 == s0:
             continue
         first, last = (np.clip((limit - s0) / (s1 - s0), 0.0, 1.0) for limit in (0.0, 1.0))
         t = first + (last - first) * 0.5 * (gauss + 1)

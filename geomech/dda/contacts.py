@@ -113,6 +113,7 @@ class ContactSet:
             geometry=points.geometry(),
             springs=points.springs(self.springs, self.by_length),
             normal=points.at_points(self.normal),
+            lift=points.between_corners(self.lift),
             faces=None if self.faces is None else points.on_bonded(self.faces),
             points=points,
             lumped=self,
@@ -144,9 +145,9 @@ class ContactSet:
             rows[name] = getattr(self, name)
         for name in ("state", "bonded", "gap", "normal_force", "shear_force"):
             rows[name] = getattr(settled, name)
-        geometry = self.geometry
+        geometry, lift = self.geometry, self.lift
         if (points := self.points) is not None:
-            geometry = points.corners
+            geometry, lift = points.corners, self.lumped.lift
             for name in ("normal_force", "shear_force"):
                 rows[name] = points.at_corners(rows[name])
             rows["gap"] = points.gap_at_corners(settled.gap)
@@ -154,7 +155,7 @@ class ContactSet:
         rows["length"] = geometry[:, 4]
         rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
         # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
-        rows["lift"] = np.maximum(self.lift + settled.lifted, np.minimum(self.lift, 0.0))
+        rows["lift"] = np.maximum(lift + settled.lifted, np.minimum(lift, 0.0))
         rows["stretch"] = settled.stretch
         return rows
 

@@ -181,6 +181,13 @@ class FacePoints:
         out[self.ends[:, 1]] = on_first * first + on_second * second
         return out
 
+    def between_corners(self, value: np.ndarray) -> np.ndarray:
+        """(n,) at the springs, of the straight line through ``value`` (n,) at the corners."""
+        out, place = value.copy(), self.place
+        at_first, at_second = value[self.ends].T
+        out[self.ends] = at_first[:, None] + place * (at_second - at_first)[:, None]
+        return out
+
     def gap_at_corners(self, gap: np.ndarray) -> np.ndarray:
         """(n,) m at the corners, of the straight line through the ``gap`` at the springs."""
         out, (first, second) = gap.copy(), self.place.T

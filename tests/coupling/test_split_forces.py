@@ -250,6 +250,17 @@ def test_platens_press_on_parts_as_on_the_whole():
     assert np.abs(result.state.vertices - now.state.vertices).max() < 1e-3 * 2.0 * 1e6 / ROCK.plane_modulus
 
 
+def test_neighbours_press_on_where_they_did():
+    """Two neighbours whose corners meet on a divided edge, one of them by 1e-5 beyond the other: forces go to the contacts of the one
+    that they are under, whatever their order; nothing is lost, nor a moment."""
+    at, neighbour = np.array([0.0, 0.5, 0.5 - 1e-5, 1.0]), np.array([7, 7, 8, 8])
+    place = np.array([0.1, 0.4, 0.499, 0.501, 0.9])
+    share = split_forces._shares(at, neighbour, place)
+    assert share.sum(axis=0) == pytest.approx(np.ones(5))
+    assert at @ share == pytest.approx(place)
+    assert not share[2:, :3].any() and not share[:2, 3:].any()
+
+
 def test_springs_are_charged_by_the_cut():
     """The energy that the springs of new contacts begin with (½ N²/kₙ, here 0.5 % of the whole) is told as that of the cut; nothing
     is left over."""

@@ -90,6 +90,34 @@ def test_parts_that_go_back_and_forth_with_their_neighbours_come_to_rest(gain):
     assert last.part[0] == pytest.approx([0.0, rest], abs=1e-2)
 
 
+@pytest.mark.parametrize("eccentricity", [-0.7, 0.1, 0.7])
+def test_faces_that_do_not_fit_each_other_press_where_they_meet(eccentricity):
+    """A block that stands askew on its bed, by as much as told contacts say that the two faces do not fit: it presses and turns as one
+    on a level bed does. (Had its springs the misfit of their corners where they stand, it would hang on one, open and in the rock.)"""
+    lower, upper = np.array([[-1.0, -1], [3, -1], [3, 0], [-1, 0]]), np.array([[0.0, 0], [FACE, 0], [FACE, 1], [0, 1]])
+    askew = 2e-3
+    upper = upper + np.array([[0.0, askew]]) * upper[:, :1]
+    blocks = Blocks.from_polygons([lower, upper], fixed=[True, False])
+    system = dda.BlockSystem(
+        blocks, [Material("rock", 1e15, 0.0)], [BED], settings=DdaSettings(max_displacement_ratio=0.5)
+    )
+    state = State.at_rest(blocks)
+    found = system.contacts_near(state)
+    some, none = np.flatnonzero(found.geometry[:, 4] > 0), np.zeros(2)
+    assert len(some) == 2
+    told = dda.ToldContacts(which=some, normal=np.full(2, 1.0), shear=none, gap=none, slip=none)
+    state = replace(state, contacts=system.told(found, told))
+    loads = Loads(
+        point_loads=(
+            PointLoad(1, (1.0 + eccentricity, askew * (1.0 + eccentricity)), History.constant([0.0, -THRUST])),
+        )
+    )
+    for _ in range(3):
+        state = system.step(state, loads, 10.0).state
+    # (On the slope forces are off by its square, arms by the thrust's on the way down.)
+    assert state.rotation[1] == pytest.approx(rotation_on_a_bed(eccentricity), rel=2e-3)
+
+
 def test_springs_at_the_corners_would_resist_three_times_as_much():
     _, rotation = pressed(on_a_bed(), 0.1)
     assert rotation == pytest.approx(-12 * THRUST * 0.1 / (STIFFNESS * FACE**3), rel=1e-6)
