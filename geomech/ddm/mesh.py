@@ -95,7 +95,7 @@ def mesh(
     start, end, kind, source = keep_apart(
         start, end, kind, source, pieces, touching, len(edges), settings.grading_ratio, extent,
         # Images have no unknowns.
-        (2 if half_plane is None else 1) * (settings.order + 1),
+        (2 if half_plane is None else 1) * (settings.order + 1), n_pieces,
     )  # fmt: skip
     if half_plane is not None:
         own = source < n_pieces
@@ -314,6 +314,7 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
         ends[j].append((s, 1))
     step = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
     heading = np.arctan2(step[:, 1], step[:, 0]).tolist()
+    closed = ((cracks.aperture == 0) & (cracks.birth_cycle == 0)).tolist()
     surface, crack, size = cracks.surface.tolist(), cracks.crack.tolist(), size.tolist()
     for node, here in enumerate(ends):
         if not here or (len(here) == 1 and not surface[node]):
@@ -328,7 +329,10 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
             (s, e), (r, f) = here
             # Straight on means that one arrives where the other leaves.
             turn = abs(math.remainder(heading[s] - heading[r] + (math.pi if e == f else 0.0), 2 * math.pi))
-            deep = grading.at_kink(turn, KINK < turn and _forgotten(cracks, ends, here))
+            if closed[s] and closed[r]:
+                deep = grading.at_closed_kink(turn)
+            else:
+                deep = grading.at_kink(turn, KINK < turn and _forgotten(cracks, ends, here))
             if deep:
                 layers[s, e] = layers[r, f] = deep
         least = min(size[s] for s, _ in here)

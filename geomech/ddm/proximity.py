@@ -25,8 +25,10 @@ ACROSS = 0.6
 BESIDE, ACUTE, GRADED, LOW, FINE = 3.5, np.radians(60), 1.05 * (1 / 0.3 - 1), 0.5, 0.299
 #: Elements of faces that meet are not halved below this part of the shorter face.
 AT_NODE = 0.01
-#: The same where one of them is a side: the thin rock between may then be as good as loose (a mouth at 5°: K 2 % → 0.03 %).
-AT_BOUNDARY = 0.0003
+#: The same at a surface, where one of them is a side, or its own image behind a free surface: the thin rock between may be as good
+#: as loose, and what its end lacks of equilibrium bends it. (By dislocations, short cracks at 3.5° to a side: K 1 % off; 64 % where
+#: only a ten-thousandth of the longer face was.)
+AT_BOUNDARY = 0.0001
 #: Elements are not halved below this part of the largest extent of the geometry.
 FLOOR = 1e-10
 #: What is longer than so many times its distance to another element, at the floor, is refused.
@@ -46,14 +48,18 @@ def _distance(px, py, ax, ay, bx, by):
     return np.hypot(px - ax - s * dx, py - ay - s * dy)
 
 
-def crowding(start, end, tip, source, meeting, n_edges, apart, across, chained, beside, shortest):
+def crowding(
+    start, end, tip, source, meeting, n_edges, apart, across, chained, beside, span, at_node, at_boundary, images
+):
     """(n,) the largest length / (allowed length) of each element over all others.
 
-    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``), ``chained`` times it
-    where the two lie on one source or on two that meet, whose grading already ties sizes to distances; there elements below the
-    ``shortest`` (n_sources,) of both sources are left alone. ``meeting`` (n_sources, n_sources) is 0 for sources that do not meet, 1 for those that
-    do, −sin of the angle between cracks where that is acute: there `BESIDE` and ``beside`` times `GRADED` count. Elements that share an end are not compared, but for the tip at
-    the other end (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
+    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``), ``chained``
+    times it where the two lie on one source or on two that meet, whose grading already ties sizes to distances; there
+    elements below the part ``at_node`` (``at_boundary`` at a surface: where one is an edge, or one alone is of the images,
+    sources from ``images`` on) of the shorter ``span`` (n_sources,) are left alone. ``meeting`` (n_sources, n_sources) is 0
+    for sources that do not meet, 1 for those that do, −sin of the angle between cracks where that is acute: there `BESIDE`
+    and ``beside`` times `GRADED` count. Elements that share an end are not compared, but for the tip at the other end
+    (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
     """
     middle = 0.5 * (start[:, 0] + end[:, 0])
     length = np.hypot(end[:, 0] - start[:, 0], end[:, 1] - start[:, 1])
@@ -72,7 +78,10 @@ def crowding(start, end, tip, source, meeting, n_edges, apart, across, chained, 
         across,
         chained,
         beside,
-        shortest,
+        span,
+        at_node,
+        at_boundary,
+        images,
         sweep,
         1.000001 * reach,
     )
@@ -80,8 +89,9 @@ def crowding(start, end, tip, source, meeting, n_edges, apart, across, chained, 
 
 @_jit
 def _crowding(
-    start, end, length, tip, source, meeting, n_edges, apart, across, chained, beside, shortest, sweep, reach
-):
+    start, end, length, tip, source, meeting, n_edges, apart, across, chained, beside, span, at_node, at_boundary, images,
+    sweep, reach,
+):  # fmt: skip
     n, least_apart = len(start), min(apart, across)
     out = np.zeros(n)
     for m in range(n):
@@ -122,19 +132,23 @@ def _crowding(
             d = min(d, _distance(start[j, 0], start[j, 1], start[i, 0], start[i, 1], end[i, 0], end[i, 1]))
             d = min(d, _distance(end[j, 0], end[j, 1], start[i, 0], start[i, 1], end[i, 0], end[i, 1]))
             d = max(d, 1e-300)
-            least = min(shortest[source[i]], shortest[source[j]]) if meet != 0 else 0.0
+            least = 0.0
+            if meet != 0:
+                at_side = source[i] < n_edges or source[j] < n_edges or (source[i] < images) != (source[j] < images)
+                least = (at_boundary if at_side else at_node) * min(span[source[i]], span[source[j]])
             graded = beside * GRADED / -meet if meet < 0 else np.inf
             for k in (i, j):
                 out[k] = max(out[k], length[k] / (d * (allowed if length[k] > least else graded)))
     return out
 
 
-def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns):
+def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None):
     """Elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) with those halved that stand too close to another.
 
     ``pieces`` (n_sources, 2, 2) are the edges, then the crack segments, ``touching`` (n_sources, n_sources) which of them
-    meet; ``ratio`` that of graded elements, ``unknowns`` those of an element. Raises ValueError, saying where, when rock is
-    too thin for that: it would take too many elements, or shorter ones than coordinates can tell apart.
+    meet; ``ratio`` that of graded elements, ``unknowns`` those of an element; sources from ``images`` on are behind a free
+    surface. Raises ValueError, saying where, when rock is too thin for that: it would take too many elements, or shorter
+    ones than coordinates can tell apart.
     """
     # A graded element is 1/ratio times its distance to the next but one.
     chained = max(2.5, 1.05 / ratio)
@@ -142,13 +156,15 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
         beside, meeting = np.inf, touching.astype(float)
     else:
         beside, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges)
-    shortest = AT_NODE * np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
-    shortest[:n_edges] *= AT_BOUNDARY / AT_NODE
+    span = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
+    images = len(pieces) if images is None else images
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
     while True:
         tip = np.where(kind == shapes.ORDINARY, 0, kind)
         start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
-        crowded = crowding(start, end, tip, source, meeting, n_edges, APART, ACROSS, chained, beside, shortest)
+        crowded = crowding(
+            start, end, tip, source, meeting, n_edges, APART, ACROSS, chained, beside, span, AT_NODE, AT_BOUNDARY, images
+        )  # fmt: skip
         length = np.hypot(*(end - start).T)
         cut = (crowded > 1 + 1e-9) & (length > 2 * FLOOR * extent)
         if not cut.any():
