@@ -10,7 +10,7 @@ import numpy as np
 from ..model import BOLT, GROUND, Blocks, Loads, State
 from .assembly import Links, Pattern
 from .bolts import ROUNDS, BoltSet, check_bolts, labels
-from .contacts import ContactSet
+from .contact_set import ContactSet
 from .force_rows import POINT_FORCE
 from .imposed_motion import ImposedMotion, Pairs
 from .loads import LoadMap

@@ -16,9 +16,9 @@ from ..model import OPEN, STICK, Loads, State
 from . import assembly
 from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
+from .contact_set import ContactSet
 from .contact_springs import Springs, end_of_step, over_a_step
 from .contact_states import reserves
-from .contacts import ContactSet
 from .energy import StepEnergy, sliding, step_energies
 from .held import balanced, hold, with_rigid_motion
 from .imbalance import imbalance
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 #: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
 _PLACED = 20
+#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the radius of corners.
+_BENDS, _KNOWN = 4, 0.1
 
 
 class Attempt:
@@ -129,7 +131,7 @@ class Attempt:
         actions, found, order = self.actions, self.found, self.order
         held = self._held()
         own = self.matrix, self.right
-        self.iterations = 0
+        self.iterations, bends = 0, _BENDS
         for tries in range(1, 2 * _PLACED + 1):
             if found.points is not None or tries > 1:
                 self.matrix, self.right = own[0].copy(), own[1].copy()
@@ -152,8 +154,11 @@ class Attempt:
             self.iterations += settled.iterations
             better = found.misplaced(settled)
             if better is None:
-                break
-            if tries % _PLACED == 0:
+                better = self._bent(found, settled, unknowns) if bends else None
+                if better is None:
+                    break
+                bends -= 1
+            elif tries % _PLACED == 0:
                 # Which part touches may follow contacts that jump at any step: these faces stand on their corners in this one.
                 better = found.cornered(better)
             found = better.trying(found.rows(settled))
@@ -161,6 +166,27 @@ class Attempt:
             raise Unsettled("faces do not settle on the part of them that touches")
         self.found, self.settled, self.unknowns = found, settled, unknowns
         self.vectors, self.weight = vectors, weight
+
+    def _bent(self, found: ContactSet, settled: Settled, unknowns: np.ndarray) -> ContactSet | None:
+        """The contacts ``found`` with the gaps that the motion of ``unknowns`` really leads to; None if those are known."""
+        system = self.system
+        if system.scheme.static or not len(found) or not self.n_free:
+            return None
+        known = _KNOWN * found.rounding
+        # What turns by r while it moves by d leaves its chord by r d at most.
+        increment = self._increment(unknowns)
+        if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
+            return None
+        vertices = self._advanced(increment)[0]
+        straight = settled.gap + settled.lifted + found.lift - found.arc
+        if found.points is not None:
+            straight = found.points.gap_at_corners(straight)
+        gap = system.finder.gaps(vertices, found.vertex, found.edge)
+        arc, before = gap - straight, found.arc if found.lumped is None else found.lumped.arc
+        some = (settled.state != OPEN) | (gap < 0.0)
+        if not (np.abs(arc - before) > known)[some].any():
+            return None
+        return found.along(arc)
 
     def _over_the_step(self, found: ContactSet):
         """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs,
@@ -175,8 +201,8 @@ class Attempt:
             weight[curved.rows] = 1.0
         mass = np.where(system.fixed, np.inf, system.mass)
         springs, gap = over_a_step(
-            found.springs, np.ascontiguousarray(found.gap), (found.state != OPEN) & (found.bonded > 0),
-            np.minimum(mass[found.block], mass[found.other]), weight, system.scheme.block_damping, self.dt,
+            found.springs, np.ascontiguousarray(found.gap_before), (found.state != OPEN) & (found.bonded > 0),
+            np.minimum(mass[found.block], mass[found.other]), weight, system.scheme.block_damping, self.dt, found.arc,
         )  # fmt: skip
         return springs, gap, weight, curved
 
@@ -193,20 +219,30 @@ class Attempt:
             return solve(found, springs, gap)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
 
+    def _increment(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n_blocks, 6) displacements of all blocks in the step."""
+        system, increment = self.system, np.zeros((self.system.blocks.n_blocks, 6))
+        increment[system.moving] = unknowns[self.order[system.moving]]
+        increment[:, 2:] /= np.sqrt(self.moments[:, :1])
+        if self.actions is not None and self.actions.imposed is not None:
+            increment += self.actions.imposed.increment
+        return increment
+
+    def _advanced(self, increment: np.ndarray):
+        """As `advance` returns it."""
+        system = self.system
+        return advance(
+            increment, self.carried, self.dt, system.scheme.static, self.vertices, system.vertex_start, self.moments,
+            self.tangent, self.stress0, self.crack_compliance, self.crack_offset, self.given, self.crack_strain, system.turns,
+        )  # fmt: skip
+
     def _move(self) -> None:
         """Blocks are moved; their velocities, stresses and accelerations at the end."""
-        system, scheme, found, dt = self.system, self.system.scheme, self.found, self.dt
+        scheme, found, dt = self.system.scheme, self.found, self.dt
         state, carried, actions, moments = self.state, self.carried, self.actions, self.moments
-        increment = np.zeros((system.blocks.n_blocks, 6))
-        increment[system.moving] = self.unknowns[self.order[system.moving]]
-        increment[:, 2:] /= np.sqrt(moments[:, :1])
+        increment = self._increment(self.unknowns)
         imposed = None if actions is None else actions.imposed
-        if imposed is not None:
-            increment += imposed.increment
-        self.new_vertices, velocity, self.new_stress, self.new_crack, self.largest = advance(
-            increment, carried, dt, scheme.static, self.vertices, system.vertex_start, moments, self.tangent, self.stress0,
-            self.crack_compliance, self.crack_offset, self.given, self.crack_strain, system.turns,
-        )  # fmt: skip
+        self.new_vertices, velocity, self.new_stress, self.new_crack, self.largest = self._advanced(increment)
         if self.quiet is not None:
             absorbed = self.quiet.rows(increment, moments, dt)
             self.edges = np.concatenate([self.edges, absorbed])
@@ -306,7 +342,7 @@ class Attempt:
             "kinetic_energy": energy.kinetic,
             "elastic_energy": energy.elastic,
             "contact_energy": energy.contact,
-            "worst_penetration": _deepest(settled.state != OPEN, found.gap, settled.gap),
+            "worst_penetration": _deepest(settled.state != OPEN, found.gap_before, settled.gap),
             "max_displacement_ratio": self.largest / system.half_height,
             "unbalanced": residual,
             "unbalanced_ratio": ratio,
@@ -326,7 +362,8 @@ class Attempt:
                 self.increment, self.state.velocity, self.carried, self.velocity, self.acceleration, self.dt, self.gravity,
                 load, scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.density,
                 self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance, system.stiffness,
-                found.state, settled.state, found.bonded, settled.bonded, found.gap, settled.gap, settled.lifted,
+                found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
+                found.arc + np.zeros(len(found)), settled.lifted,
                 settled.slip, self.slid, settled.normal_force, found.shear, settled.shear_force, end_shear,
                 *self._real_springs(), weight, found.law, system.finder.closure,
             ).tolist()

@@ -18,8 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import OPEN, STICK
+from .contact_set import ContactSet
 from .contact_springs import Springs
-from .contacts import ContactSet
 from .open_close import Settled, Unsettled
 
 #: Former differences that Anderson's mixing combines.

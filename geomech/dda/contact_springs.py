@@ -176,20 +176,22 @@ def over_a_step(
     weight: float | np.ndarray,
     damping: float,
     dt: float,
+    arc: np.ndarray | float = 0.0,
 ) -> tuple[Springs, np.ndarray]:
     """Springs and starting gap (n,) m whose forces are those that act over a step of ``dt``: ``weight`` θ times that of its
     end and 1 − θ times that of its start, N = −kₙ (θ g₁ + (1−θ) g₀) − c ġ and S = S₀ − θ kₛ Δs.
 
     c = ``damping`` · 2 √(kₙ m), ġ the mean over the step, ``mass`` (n,) kg of the lighter free block. What is open at the
     start has no force there, unless ``joined`` (n,) by a bond, and approach counts for the dashpot only from touching on:
-    neither acts across an open gap. A step much longer than the contact's period leaves the spring as it was.
+    neither acts across an open gap. A step much longer than the contact's period leaves the spring as it was. ``arc`` (n,) m as in
+    `ContactSet`: what is added to g₁ though no displacement of the step does.
     """
     if damping == 0.0 and np.all(weight == 1.0):
-        return springs, gap
+        return springs, gap + arc
     drag = 2.0 * damping * np.sqrt(springs.normal * mass) / dt
     normal = weight * springs.normal + drag
     start = np.where(joined, gap, np.minimum(gap, 0.0))
-    met = springs.normal * (weight * gap + (1.0 - weight) * start) + drag * np.maximum(gap, 0.0)
+    met = springs.normal * (weight * (gap + arc) + (1.0 - weight) * start) + drag * (np.maximum(gap, 0.0) + arc)
     return replace(springs, normal=normal, shear=weight * springs.shear), met / normal
 
 

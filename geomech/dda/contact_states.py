@@ -60,7 +60,8 @@ def contact_forces(
 def check_states(
     forces,
     partner,
-    rounding,
+    reach,
+    behind,
     state,
     direction,
     bonded,
@@ -79,7 +80,8 @@ def check_states(
     """The states that the ``forces`` (n, 4) of `contact_forces` call for.
 
     Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on a
-    corner holds until it has slid off by ``rounding`` (n,) m. ``slack`` (m) is the
+    corner holds until it has slid off by its ``reach`` (n,) m; lines that its vertex was ``behind`` (n,) as the step began are
+    not those by which it comes in. ``slack`` (m) is the
     round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a thousand
     times better.
     """
@@ -89,15 +91,16 @@ def check_states(
     for c in range(n):
         gap, slide = forces[c, 2], forces[c, 3]
         if state[c] == OPEN:
-            if gap >= -slack:
+            if gap >= -slack or behind[c]:
                 continue
             inside = True
             for k in range(2):
                 p = partner[c, k]
                 # Corners overlap only where both lines are crossed; the lesser penetration, or the first of equals, acts.
-                if p >= 0 and (
-                    forces[p, 2] >= -slack or state[p] != OPEN or forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
-                ):
+                if p < 0:
+                    continue
+                lesser = forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
+                if forces[p, 2] >= -slack or state[p] != OPEN or (lesser and not behind[p]):
                     inside = False
             if inside:
                 violation[c] = -normal[c] * gap
@@ -110,10 +113,10 @@ def check_states(
                     new_state[c] = STICK
             continue
         pull = tension[c] if bonded[c] == 1 else 0.0
-        out = False
+        out = behind[c]
         for k in range(2):
             p = partner[c, k]
-            out = out or (p >= 0 and forces[p, 2] > rounding[c] and gap < 0.0)
+            out = out or (p >= 0 and forces[p, 2] > reach[c] and gap < 0.0)
         if -forces[c, 0] > pull * (1.0 + 1e-9) + normal[c] * slack or out:
             new_state[c], new_bonded[c] = OPEN, 0
             violation[c] = normal[c] * abs(gap)

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
-from ..model import CONTACT, OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
+from .contact_set import ContactSet
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
-
-if TYPE_CHECKING:
-    from .open_close import Settled
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
@@ -32,132 +28,6 @@ _NEVER = -1
 _ROUNDING = 1e-5
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class ContactSet:
-    """Contacts (n,) as a step begins.
-
-    vertex, edge, block, other, law   as in CONTACT rows
-    partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
-    rounding    (n,)     m, radius of corners: lines that miss each other by less still hold
-    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the faces in
-                ``points``, where their springs stand
-    springs              stiffness and strengths
-    state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
-    normal, shear, slip        forces N and sliding m
-    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they have to
-                               come nearer than the geometry says to meet)
-    stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact does not
-                count yet: what multipliers have left of it, and what given motion makes of it in the step
-    inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
-    relies_on_glue             corners have been left out that hold as long as all bonds do
-    faces                      those that bonds hold at both ends; None without any
-    by_length   (n,)           contacts whose shear stiffness is that of a law
-    points, lumped             faces whose springs stand inside them, and the contacts with theirs at the corners; None without any
-    tried                      state and direction that open–close iterations begin with, where these are others
-    """
-
-    vertex: np.ndarray
-    edge: np.ndarray
-    block: np.ndarray
-    other: np.ndarray
-    law: np.ndarray
-    partner: np.ndarray
-    rounding: np.ndarray
-    geometry: np.ndarray
-    springs: Springs
-    state: np.ndarray
-    direction: np.ndarray
-    bonded: np.ndarray
-    normal: np.ndarray
-    shear: np.ndarray
-    slip: np.ndarray
-    wear: np.ndarray
-    lift: np.ndarray
-    stretch: np.ndarray
-    inset: np.ndarray
-    relies_on_glue: bool = False
-    faces: BondedFaces | None = None
-    by_length: np.ndarray | None = None
-    points: FacePoints | None = None
-    lumped: ContactSet | None = None
-    tried: tuple[np.ndarray, np.ndarray] | None = None
-
-    def trying(self, rows: np.ndarray) -> ContactSet:
-        """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are rows of the same contacts:
-        those with which another attempt at the step has ended."""
-        if len(rows) != len(self) or not all(
-            np.array_equal(rows[name], getattr(self, name)) for name in ("vertex", "edge")
-        ):
-            return self
-        way = np.where(rows["state"] == SLIP, np.sign(rows["shear_force"]), 0.0)
-        # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not known.
-        known = (self.bonded == 0) | (rows["bonded"] == self.bonded)
-        known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
-        return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
-
-    def like(self, rows: np.ndarray) -> ContactSet:
-        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press on."""
-        again = self.trying(rows)
-        if again is self or self.points is None:
-            return again
-        return replace(self.lumped.placed(self.points.pressed_by(rows["normal_force"])), tried=again.tried)
-
-    def placed(self, points: FacePoints | None) -> ContactSet:
-        """These contacts, found at the corners, with the springs of faces where ``points`` say."""
-        if points is None:
-            return self
-        return replace(
-            self,
-            geometry=points.geometry(),
-            springs=points.springs(self.springs, self.by_length),
-            normal=points.at_points(self.normal),
-            lift=points.between_corners(self.lift),
-            faces=None if self.faces is None else points.on_bonded(self.faces),
-            points=points,
-            lumped=self,
-        )
-
-    def misplaced(self, settled: Settled) -> ContactSet | None:
-        """The contacts with the springs of faces where the step, so ``settled``, has left them in contact; None if they stand so."""
-        if self.points is None:
-            return None
-        better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
-        return None if better is None else self.lumped.placed(better)
-
-    def cornered(self, better: ContactSet) -> ContactSet:
-        """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other parts."""
-        return self.lumped.placed(self.points.but(better.points))
-
-    @cached_property
-    def gap(self) -> np.ndarray:
-        """(n,) m from where the faces meet, negative where the vertex penetrates."""
-        return self.geometry[:, 3] - self.lift
-
-    def __len__(self) -> int:
-        return len(self.vertex)
-
-    def rows(self, settled: Settled) -> np.ndarray:
-        """CONTACT rows of the finished step, on the geometry on which it was assembled."""
-        rows = np.zeros(len(self), CONTACT)
-        for name in ("vertex", "edge", "block", "other", "law", "inset"):
-            rows[name] = getattr(self, name)
-        for name in ("state", "bonded", "gap", "normal_force", "shear_force"):
-            rows[name] = getattr(settled, name)
-        geometry, lift = self.geometry, self.lift
-        if (points := self.points) is not None:
-            geometry, lift = points.corners, self.lumped.lift
-            for name in ("normal_force", "shear_force"):
-                rows[name] = points.at_corners(rows[name])
-            rows["gap"] = points.gap_at_corners(settled.gap)
-        rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
-        rows["length"] = geometry[:, 4]
-        rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
-        # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
-        rows["lift"] = np.maximum(lift + settled.lifted, np.minimum(lift, 0.0))
-        rows["stretch"] = settled.stretch
-        return rows
 
 
 class ContactFinder:
@@ -404,6 +274,12 @@ class ContactFinder:
                 self._law_of[i, j] = _NEVER if index is None else index
             law = self._law_of[a, b]
         return law
+
+    def gaps(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""
+        start = vertices[edge]
+        along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
+        return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""

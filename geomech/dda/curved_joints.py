@@ -21,7 +21,7 @@ from ..model.joint import STEEPEST
 from .contact_springs import JointTable, Springs
 
 if TYPE_CHECKING:
-    from .contacts import ContactSet
+    from .contact_set import ContactSet
 
 #: JRC mobilised over its peak, at slips over that of the peak.
 _SLIP_OVER_PEAK = np.array([1.0, 2.0, 4.0, 10.0, 25.0, 100.0])

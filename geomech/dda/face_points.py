@@ -131,14 +131,14 @@ class FacePoints:
         near, far = self.ends, self.ends[:, ::-1]
         vertex, across = self.corners[near, 5:7], self.corners[near, 1:3]
         # The far end of the own face: the far vertex, or its foot on the own edge where that belongs to the other block.
-        gap, beyond = self.corners[near, 3], self.corners[far, 3]
+        beyond = self.corners[far, 3]
         along = vertex[:, 1] - vertex[:, 0]
         same = np.einsum("mi,mi->m", across[:, 0], across[:, 1]) > 0
         foot = np.where(same, 0.0, 1.0)[:, None, None] * beyond[..., None] * across[:, ::-1]
         share = np.abs(self.place - [0.0, 1.0])
         sense = np.array([1.0, -1.0])[None, :, None]
         out[near, 5:7] = vertex + share[..., None] * (sense * along[:, None] - foot)
-        out[near, 3] = (1 - share) * gap + share * beyond
+        out[:, 3] = self.between_corners(self.corners[:, 3])
         out[near, 4] = (0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length)[:, None]
         return out
 

@@ -20,9 +20,9 @@ from numba import njit
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
+from .contact_set import ContactSet
 from .contact_springs import Springs
 from .contact_states import moved
-from .contacts import ContactSet
 
 #: The part of the way to the new normal forces that a round takes.
 _WAY = 0.5
@@ -139,7 +139,7 @@ class LaggedFriction:
             yield state, np.where(state == SLIP, np.sign(trial), 0.0), change
 
     def _closed(self, gap: np.ndarray) -> np.ndarray:
-        return _all_pushing(gap, self._bonded, self._found.partner, self._found.rounding)
+        return _all_pushing(gap, self._bonded, self._found.partner, self._found.reach)
 
     def _forces(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self._gap + motion[:, 0], self._found.shear - self._springs.shear * motion[:, 1]
@@ -183,5 +183,5 @@ class LaggedFriction:
         springs, found = self._springs, self._found
         return _least_energy(
             start, curved, gap, trial, np.ascontiguousarray(along[:, 0]), np.ascontiguousarray(along[:, 1]), strength,
-            self._bonded, found.partner, found.rounding, springs.normal, springs.shear,
+            self._bonded, found.partner, found.reach, springs.normal, springs.shear,
         )  # fmt: skip

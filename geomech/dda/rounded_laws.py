@@ -22,9 +22,9 @@ import numpy as np
 from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .central_path import WITHIN, acting, add_forces, assemble, solution_of
+from .contact_set import ContactSet
 from .contact_springs import Springs
 from .contact_states import moved
-from .contacts import ContactSet
 
 #: Newton's steps in a stage at most; the least part of one that is worth while.
 _STEPS, _LEAST = 15, 1e-4

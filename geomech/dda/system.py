@@ -11,7 +11,8 @@ import numpy as np
 from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
 from .attempt import Attempt
-from .contacts import ContactFinder, ContactSet
+from .contact_set import ContactSet
+from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
 from .moments import block_moments
@@ -98,7 +99,7 @@ class BlockSystem:
         self.mass = self.density * areas
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
         self.slack = _SLACK * float(np.abs(vertices).max())
-        self._limit = min(
+        self.step_limit = min(
             self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
         )
         self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
@@ -117,7 +118,7 @@ class BlockSystem:
     @property
     def allowed_ratio(self) -> float:
         """The largest displacement that a step may bring, in units of half the height."""
-        return self._limit / self.half_height
+        return self.step_limit / self.half_height
 
     def in_statics(self) -> BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
@@ -174,7 +175,7 @@ class BlockSystem:
         if state.time == 0.0 and len(state.contacts) == 0:
             refuse_overlap(self.blocks, vertices, moments)
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
-        limit = self._limit
+        limit = self.step_limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
         found = self.finder.find(state, vertices, _WINDOW * limit)
         if like is not None:
@@ -221,7 +222,7 @@ class BlockSystem:
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
-        return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self._limit, lumped=True)
+        return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit, lumped=True)
 
     def told(self, found: ContactSet, forces: ToldContacts) -> np.ndarray:
         """CONTACT rows of ``found``, as ``forces`` say where they tell of one: for a `State` whose next step begins so."""

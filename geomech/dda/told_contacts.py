@@ -14,7 +14,7 @@ import numpy as np
 from ..model import CONTACT, OPEN, SLIP, STICK
 
 if TYPE_CHECKING:
-    from .contacts import ContactSet
+    from .contact_set import ContactSet
 
 #: A shear force nearer to its strength than this part of it is tried as sliding: edges have turned by strains since it was known.
 _AT_STRENGTH = 1e-3

@@ -1,0 +1,179 @@
+"""The contacts of a step as it begins: where they are, what they remember, what holds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..model import CONTACT, OPEN, SLIP
+from .bonded_faces import BondedFaces
+from .contact_springs import Springs
+from .face_points import FacePoints
+
+if TYPE_CHECKING:
+    from .open_close import Settled
+
+
+#: Corners that come in by the very end of an edge may end the step so many radii of corners beyond it.
+_PASSING = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSet:
+    """Contacts (n,) as a step begins.
+
+    vertex, edge, block, other, law   as in CONTACT rows
+    partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
+    rounding    (n,)     m, radius of corners: lines that miss each other by less still hold
+    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the faces in
+                ``points``, where their springs stand
+    springs              stiffness and strengths
+    state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
+    normal, shear, slip        forces N and sliding m
+    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they have to
+                               come nearer than the geometry says to meet)
+    stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact does not
+                count yet: what multipliers have left of it, and what given motion makes of it in the step
+    inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
+    relies_on_glue             corners have been left out that hold as long as all bonds do
+    faces                      those that bonds hold at both ends; None without any
+    by_length   (n,)           contacts whose shear stiffness is that of a law
+    points, lumped             faces whose springs stand inside them, and the contacts with theirs at the corners; None without any
+    arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the straight one
+    tried                      state and direction that open–close iterations begin with, where these are others
+    """
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    block: np.ndarray
+    other: np.ndarray
+    law: np.ndarray
+    partner: np.ndarray
+    rounding: np.ndarray
+    geometry: np.ndarray
+    springs: Springs
+    state: np.ndarray
+    direction: np.ndarray
+    bonded: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    slip: np.ndarray
+    wear: np.ndarray
+    lift: np.ndarray
+    stretch: np.ndarray
+    inset: np.ndarray
+    relies_on_glue: bool = False
+    faces: BondedFaces | None = None
+    by_length: np.ndarray | None = None
+    points: FacePoints | None = None
+    lumped: ContactSet | None = None
+    arc: np.ndarray | float = 0.0
+    tried: tuple[np.ndarray, np.ndarray] | None = None
+
+    def trying(self, rows: np.ndarray) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are rows of the same contacts:
+        those with which another attempt at the step has ended."""
+        if len(rows) != len(self) or not all(
+            np.array_equal(rows[name], getattr(self, name)) for name in ("vertex", "edge")
+        ):
+            return self
+        way = np.where(rows["state"] == SLIP, np.sign(rows["shear_force"]), 0.0)
+        # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not known.
+        known = (self.bonded == 0) | (rows["bonded"] == self.bonded)
+        known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
+        return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
+
+    def like(self, rows: np.ndarray) -> ContactSet:
+        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press on."""
+        again = self.trying(rows)
+        if again is self or self.points is None:
+            return again
+        return replace(self.lumped.placed(self.points.pressed_by(rows["normal_force"])), tried=again.tried)
+
+    def placed(self, points: FacePoints | None) -> ContactSet:
+        """These contacts, found at the corners, with the springs of faces where ``points`` say."""
+        if points is None:
+            return self
+        return replace(
+            self,
+            geometry=points.geometry(),
+            springs=points.springs(self.springs, self.by_length),
+            normal=points.at_points(self.normal),
+            lift=points.between_corners(self.lift),
+            faces=None if self.faces is None else points.on_bonded(self.faces),
+            points=points,
+            lumped=self,
+            arc=points.between_corners(self.arc) if isinstance(self.arc, np.ndarray) else self.arc,
+        )
+
+    def misplaced(self, settled: Settled) -> ContactSet | None:
+        """The contacts with the springs of faces where the step, so ``settled``, has left them in contact; None if they stand so."""
+        if self.points is None:
+            return None
+        better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
+        return None if better is None else self.lumped.placed(better)
+
+    def along(self, arc: np.ndarray) -> ContactSet:
+        """The contacts with gaps that follow an ``arc`` (n,) m at their corners."""
+        if self.points is None:
+            return replace(self, arc=arc)
+        return replace(self.lumped, arc=arc).placed(self.points)
+
+    def cornered(self, better: ContactSet) -> ContactSet:
+        """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other parts."""
+        return self.lumped.placed(self.points.but(better.points))
+
+    @cached_property
+    def gap_before(self) -> np.ndarray:
+        """(n,) m from where the faces meet, negative where the vertex penetrates."""
+        return self.geometry[:, 3] - self.lift
+
+    @cached_property
+    def gap(self) -> np.ndarray:
+        """(n,) m: the gap from which the step's straight motion leads to the one at its end."""
+        return self.gap_before + self.arc
+
+    @cached_property
+    def behind(self) -> np.ndarray:
+        """(n,) True for lines of a pair of corners that the vertex has behind it while another keeps the corners apart: by that
+        one they come to overlap in this step, if they do."""
+        gap, out = self.gap_before, np.zeros(len(self), bool)
+        for column in self.partner.T:
+            out |= (column >= 0) & (gap[column] > gap)
+        return out & (gap < -self.rounding) & (self.state == OPEN)
+
+    @cached_property
+    def reach(self) -> np.ndarray:
+        """(n,) m by which a closed contact may have left its edge when the step ends: one that meets the very end of an edge is
+        not pushed clear of it by what it presses."""
+        passes = np.zeros(len(self), bool)
+        for column in self.partner.T:
+            passes |= (column >= 0) & self.behind[column]
+        return np.where(passes, _PASSING * self.rounding, self.rounding)
+
+    def __len__(self) -> int:
+        return len(self.vertex)
+
+    def rows(self, settled: Settled) -> np.ndarray:
+        """CONTACT rows of the finished step, on the geometry on which it was assembled."""
+        rows = np.zeros(len(self), CONTACT)
+        for name in ("vertex", "edge", "block", "other", "law", "inset"):
+            rows[name] = getattr(self, name)
+        for name in ("state", "bonded", "gap", "normal_force", "shear_force"):
+            rows[name] = getattr(settled, name)
+        geometry, lift = self.geometry, self.lift
+        if (points := self.points) is not None:
+            geometry, lift = points.corners, self.lumped.lift
+            for name in ("normal_force", "shear_force"):
+                rows[name] = points.at_corners(rows[name])
+            rows["gap"] = points.gap_at_corners(settled.gap)
+        rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
+        rows["length"] = geometry[:, 4]
+        rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
+        # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
+        rows["lift"] = np.maximum(lift + settled.lifted, np.minimum(lift, 0.0))
+        rows["stretch"] = settled.stretch
+        return rows
