@@ -1,10 +1,10 @@
 """What a step of many blocks costs and how right it is: walls and jointed slopes of 100 to 10 000 blocks, more if asked for.
 
 Steps of 10 ms from rest under sudden weight, as many as some seconds have room for (one at least); the cost of an open–close
-iteration, one set of contact states or one step of the central path, is that of the step over its iterations. The last of
-these steps says what a step costs once the blocks have come to rest, if there was time for that. Beside it the share of the
-contact search, the memory of the process, the exponent of the cost, iterative solutions of the last equations, which are told
-by time against residual, and errors against closed forms.
+iteration, one set of contact states or one step of the central path, is that of the step over its iterations. Settled steps go on
+from where static ones have brought the blocks to rest. Beside them the share of the contact search, the memory of the process,
+the exponents of the cost, iterative solutions of the last equations, which are told by time against residual, and errors against
+closed forms.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import statistics
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,9 @@ ITERATED = 100, 1000
 #: when asked for: the first step of 100 000 bricks takes 31 iterations, 190 s of CPU and 3.2 GB, of so many blocks of a slope it is
 #: not known to end.
 LONGEST, WALLS = (0.5, 6.0), 10_000
+#: Static steps of so many seconds, so many of them, bring blocks to rest; of so many settled steps the first, which factors, is not
+#: counted. Up to so many blocks, in a quick run and else: the static steps take as long as those from rest.
+STATIC, REST, SETTLED, SETTLES = 1.0, 3, 6, (150, 15_000)
 SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
 
 #: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours → seconds
@@ -48,21 +51,22 @@ GOALS, EXPONENT, SEARCH = {1000: 6e-3, 10_000: 0.1}, 1.1, 0.25
 
 @dataclass(frozen=True)
 class Cost:
-    """Medians over ``steps``: seconds of a step, of an iteration, of its solution, and of a step's contact search; seconds and
-    iterations of the ``last`` step; memory of
-    the process at its peak, MB; ``factored`` of every factorisation; ``imbalance``: error of weight − inertia = reaction."""
+    """Seconds of the ``first`` step; medians over ``steps``: seconds of a step, of an iteration, of its solution, and of a step's
+    contact search; seconds and mean iterations of a ``settled`` step (nan: not measured); memory of the process at its peak, MB;
+    ``factored`` of every factorisation; ``imbalance``: error of weight − inertia = reaction."""
 
     scene: str
     blocks: int
     contacts: int
     steps: int
     iterations: float
+    first: float
     step: float
     iteration: float
     solution: float
     search: float
-    last: float
-    last_iterations: int
+    settled: float
+    settled_iterations: float
     memory: float
     factored: float
     imbalance: float
@@ -132,12 +136,17 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
         for name, make in SCENES.items():
             if n > WALLS and name != "wall":
                 continue
-            cost, others = _measured(name, make(n), LONGEST[not quick], n <= ITERATED[not quick])
+            rests = n <= SETTLES[not quick]
+            cost, others = _measured(name, make(n), LONGEST[not quick], n <= ITERATED[not quick], rests)
             costs.append(cost)
             for other in others:
                 told = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
                 iterated.append({"scene": name, "blocks": cost.blocks, **told})
-    exponents = {name: _exponent([c for c in costs if c.scene == name]) for name in SCENES}
+    exponents = {
+        f"{name}, {label}": _exponent([c for c in costs if c.scene == name], what)
+        for name in SCENES
+        for label, what in (("an iteration", "iteration"), ("the first step", "first"), ("a settled step", "settled"))
+    }
     found = errors()
     FOLDER.mkdir(parents=True, exist_ok=True)
     written = {
@@ -147,7 +156,11 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
     write_json(FOLDER / "cost_of_size.json", written)
     draw(costs, SHI, FOLDER / "cost_of_size.png")
     draw_solvers(iterated, FOLDER / "solvers.png")
-    times = {f"{c.scene}, {c.blocks} blocks: {what}": getattr(c, what) for c in costs for what in ("iteration", "step")}
+    times = {
+        f"{c.scene}, {c.blocks} blocks: {what}": getattr(c, what)
+        for c in costs
+        for what in ("iteration", "first", "step", "settled")
+    }
     return Measured.of(_table(costs, exponents, iterated, found), errors=found, times=times)
 
 
@@ -180,7 +193,29 @@ def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, obje
     return rows, watch, result, system
 
 
-def _measured(name: str, blocks: Blocks, longest: float, also_iterated: bool) -> tuple[Cost, list[Iterated]]:
+def settled(blocks: Blocks) -> tuple[float, float]:
+    """Median seconds of a step of blocks at rest under their weight, and its mean iterations."""
+    from .. import dda
+
+    still = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(STATIC, dynamic=False))
+    state = State.at_rest(blocks)
+    for _ in range(REST):
+        state = still.step(state, WEIGHT).state
+    state = replace(state, velocity=np.zeros_like(state.velocity))
+    system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(TIME_STEP))
+    seconds, iterations = [], []
+    for _ in range(SETTLED):
+        spent = stopwatch()
+        result = system.step(state, WEIGHT)
+        seconds.append(spent())
+        state = result.state
+        iterations.append(result.statistics["open_close_iterations"])
+    return statistics.median(seconds[1:]), statistics.mean(iterations[1:])
+
+
+def _measured(
+    name: str, blocks: Blocks, longest: float, also_iterated: bool, rests: bool
+) -> tuple[Cost, list[Iterated]]:
     rows, watch, result, system = run(blocks, longest)
     # What a scene pays once, patterns and orderings, is in the first step.
     regular = rows[1:] or rows
@@ -188,27 +223,29 @@ def _measured(name: str, blocks: Blocks, longest: float, also_iterated: bool) ->
     def median(key: str) -> float:
         return statistics.median(row[key] for row in regular)
 
+    free = ~np.asarray(blocks.fixed, bool)
     solver, data, right = watch.last
     counts = solver.counts
+    n_free = int(free.sum())
+    at_rest = settled(blocks) if rests else (math.nan, math.nan)
     cost = Cost(
         name,
-        int((~np.asarray(blocks.fixed, bool)).sum()),
+        n_free,
         len(result.contacts),
         len(rows),
         statistics.mean(row["iterations"] for row in rows),
+        rows[0]["seconds"],
         median("seconds"),
         median("iteration"),
         median("solution"),
         median("search"),
-        rows[-1]["seconds"],
-        rows[-1]["iterations"],
+        *at_rest,
         peak_memory(),
         counts["shares"] / max(1, counts["factorisations"]),
         _imbalance(blocks, system, result),
     )
     if not also_iterated:
         return cost, []
-    free = ~np.asarray(blocks.fixed, bool)
     centroid, area = result.forces.centroid[free], result.forces.area[free]
     x = solver.solve(data, right)
     residual = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
@@ -239,10 +276,13 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def _exponent(costs: list[Cost]) -> float:
-    """Of the seconds of an iteration in the number of blocks, by regression from the second size on (or all of two)."""
-    used = costs[1:] if len(costs) > 2 else costs
-    n, seconds = np.log([c.blocks for c in used]), np.log([c.iteration for c in used])
+def _exponent(costs: list[Cost], what: str) -> float:
+    """Of ``what`` in the number of blocks, by regression from the second size on (or all of two)."""
+    used = [c for c in costs if math.isfinite(getattr(c, what))]
+    used = used[1:] if len(used) > 2 else used
+    if len(used) < 2:
+        return math.nan
+    n, seconds = np.log([c.blocks for c in used]), np.log([getattr(c, what) for c in used])
     return float(np.polyfit(n, seconds, 1)[0])
 
 
@@ -282,19 +322,21 @@ def errors() -> dict[str, float]:
 
 
 def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict], errors: dict[str, float]) -> str:
-    head = "  scene          blocks  contacts  steps  iterations   s/step  ms/iteration  of it solving  search/step  last step (iterations)"
     busy = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     lines = [
         f"steps of {1e3 * TIME_STEP:g} ms from rest under sudden weight; medians, the first step left out; iterations are",
         f"factorisations of the step's equations; {len(os.sched_getaffinity(0))} cores, load average of the machine {busy}",
-        f"{head}   memory  imbalance",
+        f"settled: {SETTLED - 1} steps of blocks at rest under their weight",
+        f"  {'scene':<13}  blocks  contacts  steps  iterations  first s   s/step  ms/iteration  of it solving  search/step"
+        + "  s/settled step (iterations)  memory  imbalance",
     ]
     lines += [
-        f"  {c.scene:<13}{c.blocks:8d}{c.contacts:10d}{c.steps:7d}{c.iterations:12.1f}{c.step:9.3g}{1e3 * c.iteration:14.2f}"
-        f"{c.solution / c.iteration:15.0%}{c.search / c.step:13.1%}{c.last:12.3g} s ({c.last_iterations:3d})    {c.memory:7.0f} MB{c.imbalance:11.1e}"
+        f"  {c.scene:<13}{c.blocks:8d}{c.contacts:10d}{c.steps:7d}{c.iterations:12.1f}{c.first:9.3g}{c.step:9.3g}{1e3 * c.iteration:14.2f}"
+        f"{c.solution / c.iteration:15.0%}{c.search / c.step:13.1%}{c.settled:15.3g} ({c.settled_iterations:10.1f})"
+        f"{c.memory:6.0f} MB{c.imbalance:11.1e}"
         for c in costs
     ]
-    lines += [f"  exponent of an iteration's cost, {name}: {e:.2f} (goal {EXPONENT})" for name, e in exponents.items()]
+    lines += [f"  exponent of {name}: {e:.2f} (goal {EXPONENT})" for name, e in exponents.items() if math.isfinite(e)]
     lines.append(
         f"  largest share of the contact search: {max(c.search / c.step for c in costs):.0%} (goal {SEARCH:.0%})"
     )

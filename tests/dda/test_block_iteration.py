@@ -24,3 +24,9 @@ def test_scenes_have_about_the_blocks_asked_for():
             blocks = make(n)
             assert abs((~np.asarray(blocks.fixed, bool)).sum() / n - 1) < 0.3
             assert (blocks.areas() > 0).all()
+
+
+def test_settled_steps_are_of_blocks_at_rest():
+    # From rest the same wall takes 20 iterations.
+    seconds, iterations = block_cost.settled(block_scenes.wall(100))
+    assert seconds > 0 and iterations <= 4
