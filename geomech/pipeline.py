@@ -153,8 +153,8 @@ def factor_of_safety(scene, load_time: float | None = None, **wishes):
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
     (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: reduce, tolerance, watch …
 
-    Blocks are whole: cracks inside them are left out. Raises SceneError on bad input, ValueError where there is no strength
-    to reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
+    Blocks are whole: cracks inside them are left out. Raises SceneError on bad input, `geomech.dda.NothingToReduce` where there is no
+    strength to reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
     """
     from . import dda
 

@@ -408,6 +408,19 @@ def test_safety_prints_trials_and_mechanism(tmp_path, capsys):
     assert main(["safety", str(scene), "--set", "joints.default.friction_angle_deg=0.0"]) == BAD_INPUT
 
 
+def test_a_fault_of_ours_is_no_bad_input_of_safety(tmp_path, capsys, monkeypatch):
+    from geomech import dda
+
+    def fails(*_, **__):
+        raise ValueError("operands could not be broadcast together")
+
+    monkeypatch.setattr(dda, "factor_of_safety", fails)
+    scene = tmp_path / "slope.toml"
+    scene.write_text(SLOPE)
+    assert main(["safety", str(scene)]) == FAILED
+    assert "--debug" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "asked", [["dda", "--seeds", "0-3"], ["slopes", "--seeds", "3-0"], ["slopes", "--seeds", "some"]]
 )

@@ -34,6 +34,7 @@ def declare(verbs: Verbs) -> None:
 
 
 def _safety(options: argparse.Namespace) -> int:
+    from ..dda import NothingToReduce
     from ..output.summary import write_json
     from ..pipeline import factor_of_safety
     from ..scene import load_scene
@@ -54,7 +55,7 @@ def _safety(options: argparse.Namespace) -> int:
                 scene, options.at, reduce=options.reduce, tolerance=options.tolerance,
                 watch=None if options.quiet else tell,
             )  # fmt: skip
-        except ValueError as error:
+        except NothingToReduce as error:
             raise BadInput(str(error)) from error
         print(f"{problem.title or options.scene}" + (f", {name}" if name else "") + f"\n{found.table()}", flush=True)
         told[name or "scene"] = found.as_dict(problem.blocks)

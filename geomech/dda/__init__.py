@@ -17,7 +17,7 @@ from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
 from .step_length import StepLength
-from .strength_reduction import FactorOfSafety, factor_of_safety
+from .strength_reduction import FactorOfSafety, NothingToReduce, factor_of_safety
 from .system import BlockSystem, run
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts
@@ -35,6 +35,7 @@ __all__ = [
     "InSituState",
     "NoInSituEquilibrium",
     "NotConverged",
+    "NothingToReduce",
     "StepEnergy",
     "StepLength",
     "StepResult",

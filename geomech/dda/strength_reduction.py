@@ -37,6 +37,10 @@ _RELAXING = 100
 _FARTHEST = 64.0
 
 
+class NothingToReduce(ValueError):
+    """What was asked for has no factor of safety: no such strength, nothing that could fail, a load that statics do not know."""
+
+
 @dataclass(frozen=True, eq=False)
 class Trial:
     """One reduced strength. ``factor`` F; ``stable``; static ``steps`` made; ``unbalanced`` the part of the forces on a block that is
@@ -126,22 +130,24 @@ def factor_of_safety(
     Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what stands,
     and another way there may find a factor that differs by some thousandths where contacts slide and stick again.
 
-    Raises ValueError when there is no strength to reduce, nothing that moves, or a ground that does, `NotConverged` when the blocks do not stand
+    Raises `NothingToReduce` when there is no strength to reduce, nothing that moves, or a ground that does, `NotConverged` when the blocks do not stand
     even with joints 64 times as strong.
     """
     names = [law.name for law in joints]
     unknown = [name for name in reduce or () if name not in names]
     if unknown:
-        raise ValueError(f"no joint {', '.join(map(repr, unknown))} to reduce; there are {', '.join(map(repr, names))}")
+        raise NothingToReduce(
+            f"no joint {', '.join(map(repr, unknown))} to reduce; there are {', '.join(map(repr, names))}"
+        )
     chosen = set(names if reduce is None else reduce)
     if not any(_has_strength(law) for law in joints if law.name in chosen):
-        raise ValueError("the joints have no friction, cohesion or tensile strength that could be reduced")
+        raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
     if not 0 < tolerance < 1:
-        raise ValueError(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
+        raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
     if blocks.fixed.all():
-        raise ValueError("all blocks are fixed: none could fail")
+        raise NothingToReduce("all blocks are fixed: none could fail")
     if loads.base is not None and loads.base.frame == "ground":
-        raise ValueError(
+        raise NothingToReduce(
             'statics know no ground that moves: leave the base\'s motion out, or give it the frame "base", in which it is the'
             " weight's own kind of force, the one of the time that is asked for"
         )

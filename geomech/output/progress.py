@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import sys
+import textwrap
 import time
 from pathlib import Path
 from typing import Any, TextIO
@@ -14,6 +16,36 @@ from geomech.model import STOPS, Cycle, Problem, counted
 
 from . import checkpoint
 from .condition import closing, told
+
+#: So many warnings of a run are shown at its end, each this long at most.
+SHOWN_WARNINGS, WIDTH = 3, 240
+
+
+class Warned(logging.Handler):
+    """Counts what geomech warns of while a run lasts, from its making to its `end`; and keeps the first of each kind."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.count = 0
+        self.first: dict[str, str] = {}
+        logging.getLogger("geomech").addHandler(self)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        # Warnings about the scene were said before the run; how it was ended is said after it.
+        if record.name in ("geomech.pipeline", "geomech.output.record"):
+            return
+        self.count += 1
+        self.first.setdefault(str(record.msg), record.getMessage())
+
+    def end(self) -> None:
+        logging.getLogger("geomech").removeHandler(self)
+
+    def lines(self) -> list[str]:
+        if not self.count:
+            return []
+        shown = [textwrap.shorten(text, WIDTH, placeholder=" …") for text in list(self.first.values())[:SHOWN_WARNINGS]]
+        return [f"  {counted(self.count, 'warning')} in run.log" + (", such as" if self.count > len(shown) else ""),
+                *(f"    {text}" for text in shown)]  # fmt: skip
 
 
 class Progress:
@@ -29,6 +61,7 @@ class Progress:
         self.quiet, self.stream, self.interval = quiet, stream, interval
 
     def on_start(self, problem: Problem, folder: Path) -> None:
+        self._warnings = Warned()
         self._out = self.stream or sys.stderr
         self._folder, self._end = Path(folder), problem.run.end_time
         self._said = time.perf_counter()
@@ -82,6 +115,7 @@ class Progress:
             self._say(f"  {percent:3d} %  {_told(cycle)}{self._left(cycle, now)}")
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        self._warnings.end()
         if self._bar is not None:
             self._bar.close()
         if error is not None:
@@ -92,7 +126,7 @@ class Progress:
             if isinstance(error, (KeyboardInterrupt, OSError)) and checkpoint.found(self._folder / checkpoint.FOLDER):
                 self._say(f"  to go on: geomech resume {self._folder}")
         elif not self.quiet:
-            self._say("\n".join(closing_lines(summary, self._folder)))
+            self._say("\n".join([*closing_lines(summary, self._folder), *self._warnings.lines()]))
 
     def _share(self, cycle: Cycle) -> int:
         return round(100 * min(cycle.state.time, self._end) / self._end)

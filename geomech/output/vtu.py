@@ -220,7 +220,7 @@ class Collection:
 
     Times are written with ``repr`` so that they read back as the same numbers. An entry and the end of the file are
     written over the end that was there, at once: after every cycle, also the last before a crash, whoever reads the file
-    finds a complete series.
+    finds a complete series. There is no file before there is an entry: ParaView opens no empty one.
 
     ``entries`` (time, file) are listed already: the file is made anew with them, in place of what it was.
     """
@@ -228,18 +228,27 @@ class Collection:
     def __init__(self, path: Path, entries: Iterable[tuple[float, str]] = ()) -> None:
         self.path = Path(path)
         self.entries = list(entries)
+        self._handle: int | None = None
+        if self.entries:
+            self._begin()
+        else:
+            self.path.unlink(missing_ok=True)
+
+    def _begin(self) -> None:
         beside = self.path.with_name(self.path.name + ".part")
         content = "".join([_PVD_HEAD, *(_entry(*each) for each in self.entries), _PVD_END]).encode()
         _put(beside, content)
         os.replace(beside, self.path)
         self._end = len(content) - len(_PVD_END)
-        self._handle: int | None = os.open(self.path, os.O_WRONLY)
+        self._handle = os.open(self.path, os.O_WRONLY)
 
     def add(self, at: float, file: str) -> None:
         """List ``file`` (relative to the PVD's folder) at time ``at``, which must be later than all before it."""
         last = self.entries[-1][0] if self.entries else -math.inf
         if not at > last:
             raise ValueError(f"{self.path.name}: time {at!r} does not follow {last!r}")
+        if self._handle is None:
+            self._begin()
         entry = _entry(at, file).encode()
         content = entry + _PVD_END.encode()
         written = os.pwrite(self._handle, content, self._end)

@@ -29,6 +29,9 @@ from .tables.geometry import Geometry, JointSetShape
 
 #: So many places of each kind of defect are told in full.
 _TOLD = 4
+#: More pieces of joints between one crossing and the next are not cut: 100 000 blocks have 250 000, and take seconds; ten times as
+#: many take a minute and 10 GB, and no solver here moves them. Nor are joints of which so many pairs lie beside each other.
+MOST_PIECES, MOST_PAIRS = 2_000_000, 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +94,8 @@ def make_joints(geometry: Geometry, zones: Sequence[Zone], drawn: Sequence[Joint
     joints = [Joint(name, tuple(own)) for name, own in lines.items()]
     low, high = np.min([o.min(axis=0) for o in outlines], axis=0), np.max([o.max(axis=0) for o in outlines], axis=0)
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
-    flaws = []
-    for k, shape in enumerate(geometry.joint_sets):
+    flaws = _too_fine(geometry, box)
+    for k, shape in enumerate(geometry.joint_sets if not flaws else ()):
         # A set of its own stream: adding one does not change the others.
         rng = np.random.default_rng([geometry.seed, k])
         unknown = [name for name in shape.ends_on if JOINT + name not in {joint.name for joint in joints}]
@@ -130,6 +133,46 @@ def within(joint: Joint, zones: Sequence[Zone]) -> Joint:
         shapely.intersection(np.array([shapely.LineString(line) for line in joint.lines], object), rock)
     )
     return Joint(joint.name, tuple(shapely.get_coordinates(line) for line in inside if shapely.length(line) > 0))
+
+
+def _too_fine(geometry: Geometry, box: np.ndarray) -> list[Flaw]:
+    """A flaw where the sets, as they are asked for, would have too many pieces, or joints so near to each other that too many have
+    to be compared; it names the finest of them."""
+    finest, pieces, pairs, lengths = (0.0, 0, 0.0), 0.0, 0.0, 0.0
+    for k, shape in enumerate(geometry.joint_sets):
+        try:
+            wanted = asked(shape, geometry)
+        except ValueError:
+            continue  # told of when it is drawn
+        region = box if shape.region is None else np.array(shape.region, dtype=float).reshape(-1, 2)
+        x, y = (region - region[0]).T
+        area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+        if not area:
+            continue
+        length = wanted["p21_per_m"] * area
+        # What has no length goes right through.
+        each = min(wanted.get("mean_length_m", math.inf), math.sqrt(area))
+        number = length / each
+        # Boxes around slanting joints overlap, however near to parallel they are.
+        beside = min(
+            number, number / area * 2 * each**2 * abs(math.sin(2 * math.radians(wanted.get("mean_angle_deg", 45.0))))
+        )
+        pairs += number * beside
+        # Two sets that share a region cross about as often as lines of all directions (Miles 1964).
+        pieces += number + 4 / math.pi * length * lengths / area
+        lengths += length
+        finest = max(finest, (wanted["p21_per_m"], k, number))
+    if pieces <= MOST_PIECES and pairs <= MOST_PAIRS:
+        return []
+    density, k, number = finest
+    return [
+        Flaw(
+            "joint_sets", k,
+            f"this set would have about {number:.1g} joints, {density:.3g} m on every m², and all sets {pieces:.1g} pieces between "
+            "crossings: more than can be cut",
+            "are its spacing and lengths in metres? Make it coarser, or its `region` smaller",
+        )
+    ]  # fmt: skip
 
 
 def _set(shape: JointSetShape, geometry: Geometry, box: np.ndarray, rng: np.random.Generator) -> Joint:

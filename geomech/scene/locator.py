@@ -8,6 +8,7 @@ import tomllib
 Path = tuple[str | int, ...]
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
+_ITEM = re.compile(r"\[\s*(\d+)\s*\]")
 _SCALAR = re.compile(r"[^,\]}#\r\n]*")
 
 
@@ -22,7 +23,10 @@ def locate(text: str) -> dict[Path, int]:
 
 def path_of(key: str) -> Path:
     """The path of a dotted key as TOML writes it ('joints."a.b".cohesion_pa', 'geometry.cracks.1.angle_deg'); parts
-    that are not bare keys may stand unquoted. Whole numbers stay texts: what they index decides."""
+    that are not bare keys may stand unquoted, and items of arrays as they are told, "geometry.cracks[1]". Whole numbers stay
+    texts: what they index decides."""
+    if '"' not in key and "'" not in key:
+        key = _ITEM.sub(r".\1", key)
     try:
         node = tomllib.loads(f"{key} = 0")
     except tomllib.TOMLDecodeError:

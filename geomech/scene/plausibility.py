@@ -38,6 +38,7 @@ def check_plausible(c: Check) -> None:
     _strain(c)
     _gravity(c)
     _weightless(c)
+    _sudden_weight(c)
     _shallow(c)
     _increment(c)
 
@@ -110,6 +111,24 @@ def _weightless(c: Check) -> None:
             ("loads", "gravity_ramp_s"),
             "blocks take their in-situ stress at time 0, when gravity is still 0: nothing bears it, and weight comes on afterwards",
             "leave `gravity_ramp_s` out",
+        )
+
+
+def _sudden_weight(c: Check) -> None:
+    """Rock bridges that feel all their weight, and in dynamics up to twice of it, in the first steps."""
+    t = c.tables
+    loads, bridges = t.loads, len(c.drawing.cracks.names) - len(t.geometry.cracks)
+    tough = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
+    eased = loads.gravity_ramp_s > 0 or loads.in_situ is not None or t.dda.equilibrium
+    if t.geometry.dead_ends != "cracks" or not t.geometry.joint_sets or bridges <= 0 or tough or eased:
+        return
+    if any(loads.gravity_m_s2) and t.dda.dynamic_factor > 0:
+        c.warn(
+            ("geometry", "dead_ends") if "dead_ends" in c.data["geometry"] else ("loads", "gravity_m_s2"),
+            f"all weight comes on at once, and {bridges} cracks before rock bridges feel up to twice of it: blocks may split in the "
+            "first steps that would stand",
+            'let it come by and by (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the stress of the '
+            "ground (loads.in_situ)",
         )
 
 

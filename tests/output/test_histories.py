@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import math
 import tomllib
 from dataclasses import replace
@@ -156,6 +157,24 @@ def test_progress_is_quiet_off_a_terminal(tmp_path):
     out = io.StringIO()
     made.write(tmp_path, [Progress(stream=out, interval=0.0)], steps=10, passes=0)
     assert sum("load" in line and "%" in line for line in out.getvalue().splitlines()) == 10
+
+
+def test_warnings_of_a_run_are_shown_at_its_end(tmp_path):
+    """How many, and the first of each kind; not those of the scene, which were said before; and no other run's."""
+    log, out = logging.getLogger("geomech.coupling.cycle"), io.StringIO()
+    log.warning("before")
+    watch = Progress(stream=out, interval=1e9)
+    watch.on_start(made.problem(), tmp_path)
+    logging.getLogger("geomech.pipeline").warning("of the scene")
+    for cycle in range(5):
+        log.warning("cycle %d: tips still grow", cycle)
+    log.warning("another")
+    log.info("no warning")
+    watch.on_end({"title": "made up", "end": "end of the scene"})
+    log.warning("after")
+    assert out.getvalue().splitlines()[-3:] == [
+        "  6 warnings in run.log, such as", "    cycle 0: tips still grow", "    another"
+    ]  # fmt: skip
 
 
 def test_progress_tells_the_time_left_at_the_pace_of_load_steps(tmp_path, monkeypatch):

@@ -235,7 +235,7 @@ def test_nothing_to_show_still_makes_valid_files(tmp_path):
         assert (mesh.n_points, mesh.n_cells) == (0, 0)
         assert {*mesh.point_data.keys(), *mesh.cell_data.keys()} == {field.name for field in SERIES[name]}
     assert pv.read(last_file(tmp_path, "blocks")).n_cells > 0
-    assert read_collection(tmp_path / "interior.pvd") == []
+    assert not (tmp_path / "interior.pvd").exists()
 
 
 def test_a_scene_without_a_load_is_written(tmp_path):

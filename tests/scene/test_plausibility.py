@@ -40,6 +40,32 @@ def test_each_slip_is_told_once(scene_file, change, place, message, way_out):
     assert len(found) == 1 and found[0].place.endswith(f": {place}") and way_out in found[0].way_out
 
 
+BRIDGES = """
+[[geometry.joint_sets]]
+name = "bedding"
+angle_deg = 0
+spacing_m = 0.3
+length_m = 0.4
+gap_m = 0.3
+"""
+
+
+@pytest.mark.parametrize(
+    ("overrides", "told"),
+    [
+        ((), 1),
+        (("geometry.dead_ends=trim",), 0),
+        (("loads.gravity_ramp_s=1",), 0),
+        (("dda.equilibrium=start",), 0),
+        (("growth.enabled=false",), 0),
+    ],
+)
+def test_sudden_weight_on_rock_bridges_is_told(scene_file, overrides, told):
+    asked = ("loads.gravity_m_s2=[0, -9.81]", "dda.dynamic_factor=1", "geometry.cracks=[]", *overrides)
+    found = warnings_of(scene_file, ("[materials.rock]", BRIDGES + "[materials.rock]"), overrides=asked)
+    assert sum("all weight comes on at once" in str(w) for w in found) == told
+
+
 @pytest.mark.parametrize(("factor", "told"), [(2e-4, 1), (1e-3, 0), (10.0, 0), (1000.0, 1)])
 def test_sizes_that_are_hardly_in_metres(scene_file, factor, told):
     """The plate of 1 × 2 m, scaled: only below 1 mm and above 100 m."""

@@ -250,7 +250,7 @@ def test_overrides(scene_file):
         "title = soft rock",
         "growth.criterion=g",
         'run.stop_at=["split"]',
-        "geometry.cracks.0.angle_deg=90",
+        "geometry.cracks[0].angle_deg=90",
         "loads.tractions.1.rate_pa_per_s=[0.0, 2e5]",
         "loads.tractions.0.rate_pa_per_s=[0.0, -2e5]",
         "ddm.order=2",

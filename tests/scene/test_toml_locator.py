@@ -101,4 +101,6 @@ def test_dotted_paths_there_and_back():
     assert dotted(("joints", "load:top", "x")) == 'joints."load:top".x'
     assert path_of('joints."a.b".cohesion_pa') == ("joints", "a.b", "cohesion_pa")
     assert path_of("geometry.cracks.1.angle_deg") == ("geometry", "cracks", "1", "angle_deg")
+    assert path_of("geometry.cracks[1].angle_deg") == ("geometry", "cracks", "1", "angle_deg")
+    assert path_of('joints."a[1].b".x') == ("joints", "a[1].b", "x")
     assert path_of("joints.load:top.x") == ("joints", "load:top", "x")
