@@ -4,20 +4,22 @@ The crack solver alone has the exact tractions, a uniform stress on the specimen
 contacts: spread over faces ("contacts"), left at the corners where the springs are ("springs"), or given to Kelvin's solution
 there ("kelvin-springs": Khanizadeh Bahabadi et al. 2023, eqs. 2-4). Beside them the crack solver alone with the four corner
 forces' field in the infinite plane, which is what those equations give where they are taken at their word: without a block.
-Errors are the largest of the four tips', relative to the largest |K| of that mode among them.
+Errors are the largest of the four tips', relative to the largest |K| of that mode among them. By time against error: the same
+runs with elements of several orders, which only the tractions of whole faces let come down.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..model import Cycle, Problem
+from ..model import Cycle, DdmSettings, Problem
 from ..output.summary import write_json
 from ..reference.two_cracks import PHI_DEG
-from .figures import Measured
+from .figures import Measured, stopwatch
 
 #: Where the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_boundary")
@@ -90,6 +92,45 @@ def errors(phi_deg: int, stress: float) -> dict[str, list[float]]:
     return out
 
 
+@dataclass(frozen=True)
+class Point:
+    """``size`` is the order of the elements, ``error`` the larger of both modes'."""
+
+    problem: str
+    method: str
+    size: int
+    error: float
+    seconds: float
+
+
+def by_order(phi_deg: int, orders: Sequence[int] = (2, 3, 4, 6)) -> list[Point]:
+    """Time and error of the first load by every route, against order 10, in elements of these ``orders``; the block's boundary has
+    three times the elements of the study's own, so that it is the order that counts."""
+    from ..coupling import cycles
+
+    problem = specimen(phi_deg)
+    fine = replace(problem, ddm=_finer(problem.ddm, order=10))
+    reference = exact(fine, STRESSES[0])
+    size = np.abs(reference).max(axis=1)
+    out = []
+    for route in ROUTES:
+        for order in orders:
+            given = specimen(phi_deg, route)
+            given = replace(given, ddm=_finer(given.ddm, order=order))
+            times = []
+            for _ in range(2):
+                spent_on = stopwatch()
+                *_, last = cycles(given)
+                times.append(spent_on())
+            error = float((np.abs(factors(last.tips) - reference).max(axis=1) / size).max())
+            out.append(Point(f"specimen between platens, φ = {phi_deg}°", route, order, error, min(times)))
+    return out
+
+
+def _finer(settings: DdmSettings, order: int) -> DdmSettings:
+    return replace(settings, order=order, elements_per_side=3 * settings.elements_per_side)
+
+
 def paper_elements(phi_deg: int) -> list[float]:
     """Largest error of K_I and of K_II that quadratic elements with equal nodes bring, exact tractions, four to a crack."""
     problem = specimen(phi_deg)
@@ -100,7 +141,9 @@ def paper_elements(phi_deg: int) -> list[float]:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``boundary.json`` in `FOLDER`. ``quick``: φ = 0 at the small stress only."""
+    """The table; leaves ``boundary.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: φ = 0 at the small stress only."""
+    from ..render.work_precision import draw
+
     angles, stresses = (PHI_DEG[:1], STRESSES[:1]) if quick else (PHI_DEG, STRESSES)
     rows = [
         {"phi_deg": phi, "stress_pa": stress, "route": route, "error_k_i": k_i, "error_k_ii": k_ii}
@@ -109,8 +152,15 @@ def measure(quick: bool = False) -> Measured:
         for route, (k_i, k_ii) in errors(phi, stress).items()
     ]
     elements = [dict(zip(("phi_deg", "error_k_i", "error_k_ii"), (phi, *paper_elements(phi)))) for phi in angles]
+    points = by_order(PHI_DEG[0], (2, 4, 6) if quick else (2, 3, 4, 6, 8))
     FOLDER.mkdir(parents=True, exist_ok=True)
-    told = {"routes": rows, "quadratic_elements": elements, "quick": quick}
+    told = {
+        "routes": rows, "quadratic_elements": elements, "time and error by order": [asdict(p) for p in points], "quick": quick,
+    }  # fmt: skip
+    draw(
+        points, ROUTES, FOLDER / "work_precision.png", (1, 2), lambda p: f"p = {p.size}",
+        ("largest error of a stress intensity factor, better to the right", "a load step, bodies made anew, ms"), None,
+    )  # fmt: skip
     write_json(FOLDER / "boundary.json", told)
     lines = [
         "How contact forces reach the cracks: errors of K against the crack solver alone under the exact tractions",
@@ -124,9 +174,13 @@ def measure(quick: bool = False) -> Measured:
     lines += [
         f"{'':>10}{row['phi_deg']:5d}  {'':<22}{row['error_k_i']:10.1e}{row['error_k_ii']:10.1e}" for row in elements
     ]
-    named = {
+    lines.append("Time of a load step and error of K by the elements' order")
+    lines += [f"  {p.method:<18}p = {p.size}   {p.error:8.1e}   {1e3 * p.seconds:8.1f} ms" for p in points]
+    named = {f"{p.method}, order {p.size}": p.error for p in points}
+    named |= {
         f"{row['route']}, φ = {row['phi_deg']}, {row['stress_pa'] / 1e6:g} MPa: {mode}": row[f"error_{mode}"]
         for row in rows
         for mode in ("k_i", "k_ii")
     }
-    return Measured.of("\n".join(lines), errors=named)
+    times = {f"{p.method}, order {p.size}": p.seconds for p in points}
+    return Measured.of("\n".join(lines), errors=named, times=times)

@@ -2,20 +2,21 @@
 
 The wall comes under its weight at once, in steps of 10 ms, and its rock is too tough for a crack to grow. Every step takes as
 many passes as the strain of the cracks needs to settle; a pass is a step of the blocks and a solution of every cracked brick.
+What a pass more or less is worth is told by time against error (`pass_tolerance`).
 """
 
 from __future__ import annotations
 
 import os
 import statistics
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..model import Cracks, DdmSettings, GrowthSettings, Problem, RunSettings
 from ..output.summary import write_json
-from . import block_scenes
+from . import block_scenes, pass_tolerance
 from .figures import Measured, stopwatch
 
 #: Where the numbers go, below the working folder.
@@ -96,12 +97,24 @@ def of_specimen(repeats: int) -> dict:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``coupling.json`` in `FOLDER`. ``quick``: 200 bricks with 20 cracked, few steps, no specimen."""
+    """The table; leaves ``coupling.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: 200 bricks with 20 cracked, few steps, no
+    specimen."""
+    from ..coupling.balance import DYNAMIC_TOLERANCE
+    from ..render.work_precision import draw
+
     walls = [of_wall(200, 20, 3)] if quick else [of_wall(200, 20, 10), of_wall(1000, 100, 10), of_wall(1000, 10, 10)]
     specimen = None if quick or not SPECIMEN.exists() else of_specimen(2)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    written = {"walls": walls, "specimen": specimen, "quick": quick, "processors": os.cpu_count()}
+    points = pass_tolerance.points()
+    written = {
+        "walls": walls, "specimen": specimen, "tolerances": [asdict(p) for p in points], "quick": quick,
+        "processors": os.cpu_count(),
+    }  # fmt: skip
     write_json(FOLDER / "coupling.json", written)
+    draw(
+        points, pass_tolerance.METHODS, FOLDER / "work_precision.png", (1, 2), lambda p: f"{p.size:g}",
+        ("error of a stress intensity factor, better to the right", "steps, ms"), None,
+    )  # fmt: skip
     lines = [
         "Coupling beside the blocks' own cost, a pass, when nothing grows (medians)",
         f"{'blocks':>8}{'cracked':>9}{'passes':>8}{'blocks ms':>11}{'coupling ms':>13}{'ratio':>8}   goal < {RATIO:g}",
@@ -116,9 +129,13 @@ def measure(quick: bool = False) -> Measured:
             f"Two-crack specimen to its end, warm: {specimen['seconds']:.2f} s in {specimen['cycles']} cycles "
             f"(goal {SECONDS:g} s)"
         )
+    lines += ["", f"{pass_tolerance.PROBLEM} (default {DYNAMIC_TOLERANCE:g}): error of K against {pass_tolerance.EXACT:g}, and time"]
+    lines += [f"  {p.size:>8g}{p.passes:6d} passes   {p.error:8.1e}   {1e3 * p.seconds:8.1f} ms" for p in points]
     times = {
         f"{w['blocks']} blocks, {w['cracked']} cracked: {part} a pass": w[f"{part}_s"]
         for w in walls
         for part in ("blocks", "coupling")
     }
-    return Measured.of("\n".join(lines), times=times | ({"specimen": specimen["seconds"]} if specimen else {}))
+    errors = {f"K by a tolerance of {p.size:g}": p.error for p in points}
+    times |= {"specimen": specimen["seconds"]} if specimen else {}
+    return Measured.of("\n".join(lines), errors=errors, times=times)

@@ -6,6 +6,8 @@ find the load itself, whatever the longest step.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..output.summary import write_json
@@ -15,8 +17,21 @@ from .figures import Measured, stopwatch
 FOLDER = Path("outputs/bench_steps")
 SCENE = Path("pipelines/two_cracks/scene.toml")
 VARIANT = "phi_0"
+#: Methods of the picture; an event's load is found to `LEAST`, relative (a tip then has its toughness to 1e-6).
+FIXED_STEPS, EVENTS, LEAST = "fixed steps", "from event to event", 1e-6
 #: Fixed steps, s (0.2 MPa each); longest steps from event to event, s (None: as long as blocks may move in one).
 FIXED, LONGEST = (16.0, 8.0, 4.0, 2.0, 1.0), (None, 20.0, 5.0)
+
+
+@dataclass(frozen=True)
+class Point:
+    """``size`` is the step, s; nan: as long as it may be."""
+
+    problem: str
+    method: str
+    size: float
+    error: float
+    seconds: float
 
 
 def of_run(overrides: list[str], repeats: int) -> dict:
@@ -38,7 +53,9 @@ def of_run(overrides: list[str], repeats: int) -> dict:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``steps.json`` in `FOLDER`. ``quick``: two fixed steps, once each."""
+    """The table; leaves ``steps.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: two fixed steps, once each."""
+    from ..render.work_precision import draw
+
     if not SCENE.exists():
         return Measured.of(f"Load steps: {SCENE} is not below this folder")
     repeats = 1 if quick else 3
@@ -49,10 +66,11 @@ def measure(quick: bool = False) -> Measured:
         "events" if longest is None else f"events, at most {longest:g} s": of_run(
             [events] + ([] if longest is None else [f"run.longest_step_s={longest}"]), repeats
         )
+        | {"step": longest or math.nan}
         for longest in (LONGEST[:1] if quick else LONGEST)
     }
     rows |= {
-        f"fixed, {dt:g} s": of_run(['run.stepping="fixed"', f"dda.time_step_s={dt}"], repeats)
+        f"fixed, {dt:g} s": of_run(['run.stepping="fixed"', f"dda.time_step_s={dt}"], repeats) | {"step": dt}
         for dt in (FIXED[:2] if quick else FIXED)
     }
     FOLDER.mkdir(parents=True, exist_ok=True)
@@ -63,13 +81,19 @@ def measure(quick: bool = False) -> Measured:
         f"{'steps':<22}{'cycles':>8}{'solutions':>11}{'s':>8}"
         + "".join(f"{kind + ' MPa':>18}{'off':>10}" for kind in ("initiation", "coalescence")),
     ]
-    errors = {}
+    errors, points = {}, []
     for name, row in rows.items():
         text = f"{name:<22}{row['cycles']:8d}{row['solutions']:11d}{row['seconds']:8.2f}"
         for kind in ("initiation", "coalescence"):
             off = row["loads"][kind] / exact[kind] - 1
             text += f"{row['loads'][kind] / 1e6:18.4f}" + (f"{off:10.1e}" if name != "events" else " " * 10)
-            if name.startswith("fixed"):
+            method = FIXED_STEPS if name.startswith("fixed") else EVENTS
+            points.append(Point(f"load of {kind}", method, row["step"], max(abs(off), LEAST), row["seconds"]))
+            if method == FIXED_STEPS:
                 errors[f"{kind}, {name}"] = abs(off)
         lines.append(text.rstrip())
+    draw(
+        points, (FIXED_STEPS, EVENTS), FOLDER / "work_precision.png", (1, 3), lambda p: f"{p.size:g} s",
+        ("error of the load against that of the longest steps to events, better to the right", "the whole run, ms"), None,
+    )  # fmt: skip
     return Measured.of("\n".join(lines), errors=errors, times={name: row["seconds"] for name, row in rows.items()})

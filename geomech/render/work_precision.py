@@ -1,4 +1,4 @@
-"""Run time against error, a panel a problem: the pictures of `geomech bench ddm` and `schemes`."""
+"""Run time against error, a panel a problem: the pictures of `geomech bench ddm`, `schemes`, `coupling`, `boundary` and `steps`."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def draw(
 
     problems = list(dict.fromkeys(p.problem for p in points))
     rows, columns = panels
-    figure = Figure(figsize=(0.4 + 4 * columns, 7.6), dpi=130, layout="constrained")
-    axes = figure.subplots(rows, columns, sharex=True, sharey=True)
+    figure = Figure(figsize=(0.4 + 4 * columns, 3.8 * rows), dpi=130, layout="constrained")
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     handles = {}
     for panel, problem in zip(axes.flat, problems):
         for method, (colour, marker, line) in zip(methods, _STYLES):
@@ -59,6 +59,7 @@ def draw(
                         ha="center", fontsize=8, color=colour,
                     )  # fmt: skip
         panel.set_title(problem, fontsize=11, loc="left")
+        panel.margins(0.08, 0.12)
         panel.grid(which="major", color="#e4e4e4", lw=0.7)
         panel.set_axisbelow(True)
         panel.tick_params(which="minor", length=0)
