@@ -58,7 +58,7 @@ def measure(quick: bool = False) -> Measured:
 
     if not SCENE.exists():
         return Measured.of(f"Load steps: {SCENE} is not below this folder")
-    repeats = 1 if quick else 3
+    repeats = 1 if quick else 2
     events = 'run.stepping="events"'
     # What is compiled, or loaded, is not counted: a run until some increments after the first growth.
     of_run([events, "run.end_time_s=260"], 1)

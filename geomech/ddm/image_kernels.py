@@ -20,8 +20,6 @@ and W = η A_k + s A_{k+1},
 
 along the element, and (iκE²A − 2EW') f/2, (iκE³A' − 2E²W'') f/2c, −i A f/2 across it; f = 1/4π(1−ν). No term is larger than
 the whole by more than the point is nearer to the image than to the source, so digits are those of the infinite plane.
-
-numba's cache asks for the date of this file: after a change of `kernels`, touch it.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ of its lane, whatever stands beside it, so it does not depend on what else is as
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from .compiled import kept
 from .lanes import (
     WIDTH,
     angle,
@@ -72,7 +72,7 @@ _ROW = _TILE + WIDTH
 #: Where A', A'' and the next order stand behind A.
 _B, _D, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH
 
-_jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+_jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
 
 @_jit

@@ -22,7 +22,7 @@ processor can.
     angle(y, x)                 atan2 within 2 ulp, with signed zeros, not of two zeros
     term(b, u, v, c), value(b, q)           a polynomial with real coefficients c at a complex point q
 
-numba's cache asks for the date of the file a kernel stands in: after a change here, touch those of its users.
+Kernels that use them are declared by `compiled.kept`, so that a change here compiles them anew.
 """
 
 from __future__ import annotations
