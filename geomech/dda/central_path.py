@@ -125,10 +125,39 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
     return lambda right, within=WITHIN, start=None: dgetrs(factors, pivots, right)[0]
 
 
-def _reach(number: np.ndarray, change: np.ndarray) -> float:
-    """How far along ``change`` (…) positive ``number`` (…) stay so; at most 1."""
-    falling = change < 0.0
-    return min(1.0, _SHORT_OF * float((-number[falling] / change[falling]).min(initial=np.inf)))
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _pulls(goals, numbers, missed, soft, stiff_along, slope):
+    """(3, n) N of a Newton step where blocks stand still: normal forces, shear forces without what answers these, and with it.
+    ``goals`` (3, n) J for the products, ``numbers`` (6, n) N, w, α, β and the strengths left above and below S, ``missed`` (2, n) m of
+    gap and slip."""
+    out = np.empty((3, len(soft)))
+    for c in range(len(soft)):
+        normal, width, back, ahead, above, below = numbers[:, c]
+        given = (goals[0, c] - normal * (width + missed[0, c])) / soft[c]
+        along = stiff_along[c] * (goals[2, c] / below - ahead - goals[1, c] / above + back - missed[1, c])
+        out[0, c], out[1, c], out[2, c] = given, along, along + slope[c] * given
+    return out
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _changes(goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, kn, mu, rough):
+    """Changes (6, n) of the ``numbers``, (n,) of S, and how far along them positive numbers stay so, at most 1: ``motion`` (n, 2) m of
+    the blocks, the rest as for `_pulls`."""
+    n = len(stiff)
+    out, shear, far = np.empty((6, n)), np.empty(n), 1.0
+    for c in range(n):
+        _, _, back, ahead, above, below = numbers[:, c]
+        pushed = pulls[0, c] - stiff[c] * motion[c, 0]
+        sheared = pulls[1, c] - stiff_along[c] * motion[c, 1] + slope[c] * pushed
+        more, less = mu[c] * pushed - sheared, mu[c] * pushed + sheared
+        out[0, c], out[1, c] = pushed, motion[c, 0] + pushed / kn[c] + missed[0, c]
+        out[2, c] = goals[1, c] / above - back - back / above * more
+        out[3, c] = goals[2, c] / below - ahead - ahead / below * less
+        out[4, c], out[5, c], shear[c] = more, less, sheared
+        for k in range(6 if rough[c] else 2):
+            if out[k, c] < 0.0:
+                far = min(far, -_SHORT_OF * numbers[k, c] / out[k, c])
+    return out, shear, far
 
 
 def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
@@ -268,53 +297,37 @@ class CentralPath:
         )  # fmt: skip
         solve = solution_of(pattern, self._data)
 
-        def newton(to_normal, to_back, to_ahead, within=WITHIN, start=None):
-            """Changes of the unknowns, of gap and motion along, of N and S, and of the six positive numbers."""
-            given = (to_normal - normal * (width + gap_missed)) / soft
-            given_along = stiff_along * (to_ahead / below - ahead - to_back / above + back - slip_missed)
+        numbers, missed = np.stack([normal, width, back, ahead, above, below]), np.stack([gap_missed, slip_missed])
+
+        def newton(goals, within=WITHIN, start=None):
+            """Changes of the unknowns, of gap and motion along, of the six positive numbers and of S, and how far they may go."""
+            pulls = _pulls(goals, numbers, missed, soft, stiff_along, slope)
             side = residual.copy()
-            add_forces(side, *self._at, given, given_along + slope * given)
+            add_forces(side, *self._at, pulls[0], pulls[2])
             step = solve(side, within, start)
             motion = contact_states.moved(step, *self._at)
             motion[:, 0] -= self._lift * motion[:, 1]
-            d_normal = given - stiff * motion[:, 0]
-            d_shear = given_along - stiff_along * motion[:, 1] + slope * d_normal
-            d_width = motion[:, 0] + d_normal / kn + gap_missed
-            d_above, d_below = mu * d_normal - d_shear, mu * d_normal + d_shear
-            d_back = to_back / above - back - back / above * d_above
-            d_ahead = to_ahead / below - ahead - ahead / below * d_below
-            return step, motion, d_shear, (d_normal, d_width, d_back, d_ahead, d_above, d_below)
+            changed = _changes(goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, kn, mu, rough)
+            return step, motion, *changed
 
-        numbers = (normal, width, back, ahead, above, below)
-
-        def reach(changes):
-            longest = min(_reach(number, change) for number, change in zip(numbers[:2], changes[:2], strict=True))
-            sliding = zip(numbers[2:], changes[2:], strict=True)
-            return min(longest, *(_reach(number[rough], change[rough]) for number, change in sliding))
-
-        guess, *_, changes = newton(0.0, 0.0, 0.0, _GUESSED)
-        far = reach(changes)
-        ahead_of = [number + far * change for number, change in zip(numbers, changes, strict=True)]
-        left = float(self._products(*ahead_of).sum()) / float(self._products(*numbers).sum())
+        guess, _, changes, _, far = newton(np.zeros((3, len(kn))), _GUESSED)
+        left = float(self._products(*(numbers + far * changes)).sum()) / float(self._products(*numbers).sum())
         target = epsilon * left**3 * unit
-        dn, dw, db, da, d_above, d_below = changes
-        goals = [target - dn * dw, target - db * d_above, target - da * d_below]
-        step, moved, d_shear, changes = newton(*goals, start=guess)
-        far = reach(changes)
+        goals = target - changes[[0, 2, 3]] * changes[[1, 4, 5]]
+        step, moved, changes, d_shear, far = newton(goals, start=guess)
         for _ in range(_CORRECTORS):
             if far > _FAR:
                 break
             wanted = min(1.0, _FARTHER * far + _FURTHER)
-            n, w, b, a, up, low = (number + wanted * change for number, change in zip(numbers, changes, strict=True))
-            nearer = [
-                goal + np.maximum(np.clip(product, target / _SPREAD, target * _SPREAD) - product, -target * _SPREAD)
-                for goal, product in zip(goals, (n * w, b * up, a * low), strict=True)
-            ]
-            tried = newton(*nearer, start=step)
-            reached = reach(tried[-1])
-            if reached < far + _GAIN * (wanted - far):
+            there = numbers + wanted * changes
+            product = there[[0, 2, 3]] * there[[1, 4, 5]]
+            nearer = goals + np.maximum(
+                np.clip(product, target / _SPREAD, target * _SPREAD) - product, -target * _SPREAD
+            )
+            tried = newton(nearer, start=step)
+            if tried[-1] < far + _GAIN * (wanted - far):
                 break
-            far, goals, (step, moved, d_shear, changes) = reached, nearer, tried
+            goals, (step, moved, changes, d_shear, far) = nearer, tried
         self._unknowns += far * step
         self._g, self._s = self._g + far * moved[:, 0], self._s + far * moved[:, 1]
         self._normal, self._width = normal + far * changes[0], width + far * changes[1]
