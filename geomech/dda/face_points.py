@@ -16,7 +16,9 @@ under the moment on its face has to be given at the face. Half of a block of the
     θ = M (d/2) / (E' ℓ³/12)        (its share of a beam; Kawai 1978 has rigid blocks give so throughout),
 
 and so far inside their corners stand the two springs that give it. Otherwise rectangles glued together lock: between
-displacements that agree at four corners and are linear, none bends. A triangle's three do not lock.
+displacements that agree at four corners and are linear, none bends. A triangle's three do not lock. Bricks laid in bond
+hold each other's ends besides, which this does not mend: in two and four courses they sag 0.78 and 0.91 of what a beam of their rock
+does, twice as long as high 0.40 and 0.60.
 
 Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and moment, and bring
 the same stress. (What a state carries over of shear is that of the springs.)

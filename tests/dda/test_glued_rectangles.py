@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,41 @@ def test_a_cantilever_of_bricks_sags_as_timoshenkos():
     assert one == pytest.approx([0.060, 0.0134, 0.0019], abs=1e-3)
     # Courses hold each other's stretch along their beds as well: second order, from the stiff side.
     assert more == pytest.approx([-0.100, -0.057, -0.032], abs=2e-3)
+
+
+def bricks_in_bond(columns: int, rows: int) -> dda.BlockSystem:
+    """The cantilever of bricks of which every other course begins and ends with half a one."""
+    length, depth = LENGTH / columns, DEPTH / rows
+    polygons = [np.array([[-1.0, -1], [0, -1], [0, 2], [-1, 2]])]
+    for row in range(rows):
+        ends = np.linspace(0, LENGTH, columns + 1)
+        if row % 2:
+            ends = np.concatenate([[0.0], ends[:-1] + 0.5 * length, [LENGTH]])
+        low, high = row * depth, (row + 1) * depth
+        polygons += [np.array([[a, low], [b, low], [b, high], [a, high]]) for a, b in pairwise(ends.tolist())]
+    blocks = Blocks.from_polygons(polygons, fixed=[True] + [False] * (len(polygons) - 1))
+    return dda.BlockSystem(
+        blocks, [Material("rock", MODULUS, 0.0, density=DENSITY)], [JointLaw("glue", 0.6, 1e12, 1e12)],
+        settings=DdaSettings(max_displacement_ratio=0.1),
+    )  # fmt: skip
+
+
+def test_bricks_in_bond_are_too_stiff_by_a_part_that_falls_with_their_size():
+    """Each holds two others' ends together and cannot bend between them; what is known of it is how much they miss."""
+    load = DENSITY * SMALL * DEPTH
+    beam = load * LENGTH**4 / (8 * MODULUS * DEPTH**3 / 12) + load * LENGTH**2 / (2 * 5 / 6 * 0.5 * MODULUS * DEPTH)
+    weight = Loads(gravity=History.constant([0.0, -SMALL]))
+    square = [sag(bricks_in_bond(8 * n, n), weight) / beam for n in (2, 4)]
+    long = [sag(bricks_in_bond(4 * n, n), weight) / beam for n in (2, 4)]
+    print(
+        "sag over a beam's, in 2 and 4 courses: square bricks",
+        np.round(square, 3),
+        "; twice as long",
+        np.round(long, 3),
+    )
+    assert square == pytest.approx([0.783, 0.907], abs=5e-3) and long == pytest.approx([0.399, 0.598], abs=5e-3)
+    # Between first and second order.
+    assert 1 - square[1] < 0.5 * (1 - square[0])
 
 
 def test_pure_bending_turns_as_curvature_says():
