@@ -360,6 +360,10 @@ def test_a_scene_runs_from_the_command_line_to_its_folder(tmp_path, capsys):
     assert run.summary["cycles"] == len(run.history)
     work = run.summary["crack_solver"]
     assert work["boundary_factorisations"] == work["crack_factorisations"] == 1 <= work["solutions"]
+    trust = run.summary["crack_trust"]
+    assert trust["residual"] < 1e-5 and 1 < trust["condition"] < 1e4
+    off = max(np.abs(last["K_I"][order] / 0.4e6 - OPEN_SLOT_K_I[0]) / abs(OPEN_SLOT_K_I[0][0]))
+    assert 0.5 * off < trust["k_error"] < 1e-4 and trust["k_error_block"]
     # Away from the flaws the rock carries the load, in the files too.
     grid = run.grid("interior", int(run.history["cycle"][-1]))
     corner = np.hypot(*(grid.points[:, :2] - (0.02, 0.05)).T).argmin()

@@ -151,7 +151,7 @@ class Cycle:
     tips        TIP rows of all blocks
     faces       the crack faces, or None when no block holds a crack
     bodies      block index → solved elastic body with ``fields(points)``: stress (n, 3) and displacement (n, 2)
-                in reference coordinates, for interior fields
+                in reference coordinates, for interior fields; ``residual``, ``condition``, ``tips`` and ``tip_errors``
     monitors    name → displacement (2,) of the monitor point, m
     statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
     work        what the crack solver has done so far: assemblies, factorisations, back-substitutions, contact solves

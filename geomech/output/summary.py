@@ -18,6 +18,7 @@ import numpy as np
 from geomech.model import Cycle, Event, Problem
 
 from .condition import energy_summary, key_block_summary, motion_summary
+from .crack_trust import crack_trust
 
 #: What a `Summary` has counted.
 _COUNTED = ("_last", "_events", "_peak", "_load_steps", "_growth_passes", "_grown")
@@ -74,6 +75,8 @@ class Summary:
         if last is not None and last.work:
             summary["crack_solver"] = last.work
             summary["skipped"] = skipped(last.work, last.seconds)
+        if last is not None and last.bodies and error is None:
+            summary["crack_trust"] = crack_trust(last)
         first: dict[str, dict[str, Any]] = {}
         counts: dict[str, int] = {}
         for event in self._events:

@@ -90,6 +90,9 @@ def strain_of(load: float) -> np.ndarray:
 class UniformBody:
     """The elastic body of the specimen: σyy = −load, displacement ε·x plus a rigid motion that nobody asked for."""
 
+    residual, condition = 1e-7, 20.0
+    tips, tip_errors = np.zeros(0, TIP), np.zeros((0, 2))
+
     def __init__(self, load: float, spin: float = 3e-4) -> None:
         self.load, self.spin = load, spin
 

@@ -1,0 +1,37 @@
+"""How far the crack solver's last results are to be trusted: what is left of their equations, and the error of K."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+
+from geomech.model import Cycle
+
+#: Bodies whose K are solved for on a finer mesh, those with the hardest driven tips: as much work again as they took.
+ESTIMATED = 10
+_log = logging.getLogger(__name__)
+
+
+def crack_trust(cycle: Cycle) -> dict[str, Any]:
+    """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction, ``condition``
+    of the equations, and the estimated error of K relative to the largest K of its block, with the block it is of."""
+    told: dict[str, Any] = {
+        "residual": max(float(body.residual) for body in cycle.bodies.values()),
+        "condition": max(float(body.condition) for body in cycle.bodies.values()),
+    }
+    drive = {b: float(cycle.tips["k_eq"][cycle.tips["block"] == b].max(initial=0.0)) for b in cycle.bodies}
+    for block in sorted(drive, key=lambda b: (-drive[b], b))[:ESTIMATED]:
+        body = cycle.bodies[block]
+        largest = float(np.hypot(body.tips["k_i"], body.tips["k_ii"]).max(initial=0.0))
+        if largest == 0.0:
+            continue
+        try:
+            error = float(body.tip_errors.max()) / largest
+        except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as failure:
+            _log.info("no error estimate for K in %s: %s", cycle.blocks.names[block], failure)
+            continue
+        if error > told.get("k_error", -1.0):
+            told["k_error"], told["k_error_block"] = error, cycle.blocks.names[block]
+    return told
