@@ -100,7 +100,9 @@ def put_out_of_memory(names: Sequence[str] = ("geomech", *HEAVY, "numpy", "llvml
         folder = Path(found.origin).parent
         # Shared libraries of wheels lie beside the package.
         for place in (folder, folder.with_name(f"{name}.libs")):
-            for path in place.rglob("*") if place.is_dir() and found.submodule_search_locations else [Path(found.origin)]:
+            for path in (
+                place.rglob("*") if place.is_dir() and found.submodule_search_locations else [Path(found.origin)]
+            ):
                 if path.is_file():
                     with path.open("rb") as file:
                         os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)

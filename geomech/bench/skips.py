@@ -50,7 +50,9 @@ def _rows(quick: bool) -> Iterator[tuple[str, float, float, float]]:
     times, cracks, steps = (1, 10, 3) if quick else (2, 20, 5)
     cracked = coupling_cost.wall(40 if quick else 200, cracks)
     cracked = replace(cracked, run=replace(cracked.run, end_time=(steps - 0.5) * coupling_cost.TIME_STEP))
-    label = f"bodies, factors and compliances of what has not changed: a wall with {cracks} cracked bricks, {steps} steps"
+    label = (
+        f"bodies, factors and compliances of what has not changed: a wall with {cracks} cracked bricks, {steps} steps"
+    )
     yield label, *_twice(times, lambda skip: _coupled(replace(cracked, run=replace(cracked.run, skip=skip))))
     if SPECIMEN.exists():
         specimen = _specimen(0.2 if quick else 1.0)

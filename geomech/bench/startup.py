@@ -77,7 +77,9 @@ def measure(quick: bool = False) -> Measured:
             times = [loading.seconds(run(phi, f"phi_{phi}_{k}")) for k in range(count)]
             rows.append((f"specimen φ = {phi}° to coalescence, everything written", statistics.median(times)))
     width = max(len(label) for label, _ in rows)
-    lines = [f"whole processes, medians of {repeats} (some of fewer): by the clock or of the processor, whichever is less"]
+    lines = [
+        f"whole processes, medians of {repeats} (some of fewer): by the clock or of the processor, whichever is less"
+    ]
     lines += [f"  {label:<{width}}  {seconds:7.2f} s" for label, seconds in rows if math.isfinite(seconds)]
     lines += ["", *loading.table({label: COMMANDS[label] for label in (QUICK if quick else COMMANDS)})]
     if not quick:

@@ -110,7 +110,9 @@ def timed(work: Callable[[], Found]) -> tuple[Found, float]:
 def _curves(name: str, quick: bool) -> Iterator[Point]:
     """The sizes of a quick run, or `LONGEST` s a method, but constant elements `RATIO` times this solver's time to `ERROR` where
     that is longer."""
-    orders, digits = (QUICK_ORDERS.get(name, (2, 3, 4, 6, 8)), QUICK_DIGITS.get(name, (2, 4, 6))) if quick else (ORDERS, DIGITS)
+    orders, digits = (
+        (QUICK_ORDERS.get(name, (2, 3, 4, 6, 8)), QUICK_DIGITS.get(name, (2, 4, 6))) if quick else (ORDERS, DIGITS)
+    )
     counts = QUICK_COUNTS.get(name, (4, 8, 16)) if quick else COUNTS
     make, low, ours = PROBLEMS[name]
     given = make()

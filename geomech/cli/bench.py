@@ -31,7 +31,6 @@ def declare(verbs: Verbs) -> None:
         "run before, by the same program, are not run again",
     )  # fmt: skip
 
-
     bench.add_argument(
         "--blocks", type=int, metavar="N", help="of dda: a wall of so many blocks too (100000: some minutes and 3 GB)"
     )

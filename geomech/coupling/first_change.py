@@ -10,15 +10,19 @@ together, so that it costs no more than some dozen steps more than without.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
 
+from ..dda import NotConverged
 from ..model import Event
 from .balance import Balance
 from .cracked_blocks import CrackedBlocks
 from .record import event
 from .watched import Change, Watched
+
+log = logging.getLogger(__name__)
 
 #: A change is found when it is known to this part of the time (and so, where loads are proportional to it, of the load); among
 #: more than `MANY` contacts to that one.
@@ -65,8 +69,10 @@ class FirstChange:
             self._seen, self._older = high, None
             return found
         low = self._before(now, high, solve)
-        changes = high.changes(now, low[-1])
+        changes = high.changes(now, low[-1]) if low else []
         if not changes:
+            if not low:
+                return solve(high.time)
             return found if low[-1] in (self._seen, self._older) else solve(high.time)
         base, last = low[-1], found
         way = 1 if high.time > start else -1
@@ -91,7 +97,13 @@ class FirstChange:
                 part = approach(at)
                 if part != at:
                     aim = part
-            last = solve(aim)
+            try:
+                last = solve(aim)
+            except NotConverged as failure:
+                # Blocks have found their states farther on: the change is told there.
+                log.debug("no look at t = %g s: %s", aim, failure)
+                last = None
+                break
             seen = Watched.of(now, last, self.kinds)
             changed = seen.changes(now, base)
             if changed:
@@ -108,11 +120,15 @@ class FirstChange:
         return found
 
     def _before(self, now: CrackedBlocks, high: Watched, solve: Callable[[float], Balance]) -> list[Watched]:
-        """Passes before ``high`` in which nothing has changed yet, the last one that with which its states are compared."""
+        """Passes before ``high`` in which nothing has changed yet, the last one that with which its states are compared; none where
+        blocks find no states so near to the start."""
         if self._seen is not None and self._seen.same_faces(high) and self._seen.numbering == high.numbering:
             return [self._seen] if self._older is None else [self._older, self._seen]
         start = now.state.time
-        first = Watched.of(now, solve(start + FIRST_LOOK * (high.time - start)), self.kinds)
+        try:
+            first = Watched.of(now, solve(start + FIRST_LOOK * (high.time - start)), self.kinds)
+        except NotConverged:
+            return []
         if self._told is None:
             self._told = first
         return [first]

@@ -85,7 +85,10 @@ class NearPairs:
         self.searches = 0
 
     def of(self, vertices: np.ndarray, window: float) -> np.ndarray:
-        """All pairs that may be nearer than ``window`` m on ``vertices`` (n_vertices, 2), and some that are not."""
+        """All pairs that may be nearer than ``window`` m on ``vertices`` (n_vertices, 2), and some that are not; of one block
+        none is looked for."""
+        if len(self._first) < 2:
+            return np.zeros((0, 2), np.int64)
         if self._vertices is None or not window + 2.0 * np.abs(vertices - self._vertices).max() <= self._reach:
             self._reach = _REACH * window
             self._vertices = vertices.copy()

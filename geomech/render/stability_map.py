@@ -83,7 +83,14 @@ def _panels(number: int):
     height = 3.1 * down
     figure = Figure(figsize=(14, height), dpi=120)
     # Margins in inches, the same for all: a layout that measures every text takes longer than all else.
-    room = {"left": 0.06, "right": 0.99, "bottom": 0.55 / height, "top": 1 - 0.35 / height, "wspace": 0.2, "hspace": 0.36}
+    room = {
+        "left": 0.06,
+        "right": 0.99,
+        "bottom": 0.55 / height,
+        "top": 1 - 0.35 / height,
+        "wspace": 0.2,
+        "hspace": 0.36,
+    }
     axes = figure.subplots(down, across, gridspec_kw=room).ravel()
     for panel in axes[number:]:
         panel.set_axis_off()

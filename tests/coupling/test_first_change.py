@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from geomech.coupling import cycles
+from geomech.coupling.event_steps import EventSteps
+from geomech.dda import NotConverged, near_pairs
 from geomech.model import (
     Blocks,
     Cracks,
@@ -128,6 +130,33 @@ def test_a_crack_slips_at_the_load_of_mohr_and_coulomb(longest):
         ("slip", "crack begins to slip"), ("sliding", "crack slides")
     ]  # fmt: skip
     assert events[0].load == pytest.approx(load, rel=1e-5)
+
+
+@pytest.mark.parametrize("failing", [1, 3])
+def test_a_look_without_an_answer_ends_no_run(monkeypatch, failing):
+    """Blocks that find no states at a load on the way: the slip is told where they do, at the end of the step or at its load."""
+    solves, solve = [], EventSteps._solve
+
+    def sometimes(self, now, time, free=False):
+        if not free:
+            solves.append(time)
+        if not free and len(solves) == failing:
+            raise NotConverged("made up")
+        return solve(self, now, time, free)
+
+    monkeypatch.setattr(EventSteps, "_solve", sometimes)
+    exact = 5.624871e6
+    events = [event for cycle in cycles(cracked_plate(longest_step=7.0)) for event in cycle.events]
+    assert [event.kind for event in events] == ["slip", "sliding"]
+    assert exact * (1 - 1e-6) < events[0].load < exact + 7.0 * 0.1e6 and len(solves) > failing
+
+
+def test_one_body_needs_no_search_for_contacts(monkeypatch):
+    def fails(*_):
+        raise AssertionError("contacts are searched for")
+
+    monkeypatch.setattr(near_pairs, "near_pairs", fails)
+    assert len(list(cycles(cracked_plate()))) > 2
 
 
 def test_a_rush_of_changes_is_taken_together():
