@@ -4,7 +4,9 @@ at their tips as they grow, and set free where blocks part.
 The block solver knows the work of its mean stress on the strain of its cracks, A σ : dε_c. By Clapeyron's theorem a body with
 jumps [u] whose faces bear t where the same loads would bring t₀ without them stores ½ ∫ (t₀ − t)·[u] more; what a tip
 releases over an increment is ∫ G da, G = (K_I² + K_II²)/E' (Irwin 1957), by the trapezoidal rule of G before, of K_eq, for the
-way it turns, and after, of the load between that of the step's begin and its end. So four quantities found apart from each other have to add up; what is left over is told.
+way it turns, and after, each K once at the load of the step's end and once at that of its begin. So four quantities found apart
+from each other have to add up; what is left over is told. Over the steps of a run that leaves what uneven forces do: they open
+cracks, and blocks of one strain do not feel it.
 """
 
 from __future__ import annotations

@@ -17,9 +17,10 @@ back by its rotation. What the forces then leave out of balance is the block's i
 a body force, linear in x, so that the elastic problem is in equilibrium to round-off.
 
 What the forces leave out of the block's mean stress, its strain's inertia and viscosity take: in the block solver an even
-stress, and an even stress it is here. The mean stress of the load is then the block's own, whose work on the strain of the cracks is all
-that the block spends on them. (As a body force, the strain's inertia would load a crack in the middle by half as much again, with
-nobody to do that work: cracks that run under waves gained 2 % of the load's work, and viscous stress that opened them took as much.)
+stress, and an even stress it is here. The mean stress of the load is then the block's own, whose work on the strain of the cracks
+is all that the block spends on them. (As a body force, the strain's inertia would load a crack in the middle by half as much
+again, with nobody to do that work: cracks that run under waves gained 2 % of the load's work, and viscous stress that opened
+them took as much.)
 """
 
 from __future__ import annotations
