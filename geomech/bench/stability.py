@@ -60,7 +60,7 @@ def _maps(quick: bool) -> Iterator[Map]:
 
     penalties, steps = some(1, 10, 40, 100, 1e3, 1e4), some(1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1, 10)
     ratios = some(1e-6, 1e-4, 1e-2, 1, 1e2, 1e4, 1e6)
-    most = 100 if quick else 1000
+    most = 100 if quick else 500
     off = "travel off the rigid block's, over the travel and three elastic shortenings"
     yield Map(
         "sliding, 15° on 30°", off, "penalty / E'", penalties, "dt, s", steps, 5e-2, partial(scenes.incline, 15.0, most)
