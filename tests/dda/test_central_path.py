@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from geomech import dda
+from geomech.dda import attempt
 from geomech.dda.central_path import CentralPath
+from geomech.dda.open_close import settle
+from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 STIFFNESS, FRICTION = 4e11, 0.7
 
@@ -30,3 +34,27 @@ def test_the_start_is_central_however_far_off_a_contact_is(epsilon):
     assert path._normal * path._width == pytest.approx(epsilon, rel=1e-12)
     assert path._width - path._normal / STIFFNESS == pytest.approx(gap, rel=1e-9, abs=1e-16)
     assert (np.abs(path._shear) <= FRICTION * path._normal).all()
+
+
+@pytest.mark.parametrize("gravity", [(0.0, -9.81), (9.81, -2.0)])
+def test_pebbles_below_a_large_block_bear_it(monkeypatch, gravity):
+    """A weight a million times their own comes onto three layers of pebbles at once, beside a wall: the path carries it through
+    them. (Where contacts had units of their own blocks' load it stopped after five steps, with nothing balanced.)"""
+    size, layers = 0.01, 3
+    square = size * np.array([[0.0, 0.0], [1, 0], [1, 1], [0, 1]])
+    pebbles = [square + (x, size * k) for k in range(layers) for x in np.linspace(0.0, 10 - size, 12)]
+    ground = np.array([[-1.0, -1], [11, -1], [11, 12], [10, 12], [10, 0], [-1, 0]])
+    load = np.array([[0.0, layers * size], [10, layers * size], [10, 10], [0, 10]])
+    blocks = Blocks.from_polygons([ground, *pebbles, load], fixed=[True] + (len(pebbles) + 1) * [False])
+    rock, joint = Material("rock", 20e9, 0.25, density=2600.0), JointLaw("joint", friction_angle=0.6)
+    system = dda.BlockSystem(blocks, [rock], [joint], settings=DdaSettings(time_step=0.01, dynamic_factor=1.0))
+    asked = []
+    monkeypatch.setattr(attempt, "settle", lambda *given: asked.append(given) or settle(*given))
+    system.step(State.at_rest(blocks), Loads(gravity=History.constant(gravity)))
+    pattern, matrix, right, found, vectors, springs, gap, *_ = asked[0]
+    path = CentralPath(pattern, matrix, right, found, vectors, springs, gap, found.bonded, found.normal)
+    taken = 0
+    while not path.ended:
+        path.advance()
+        taken += 1
+    assert path.arrived and path.missed < 1e-6 and taken < 40
