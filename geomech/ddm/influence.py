@@ -131,7 +131,9 @@ class ElementSet:
         return self.at(t), table[self.kind]
 
     def take(self, which: np.ndarray) -> ElementSet:
-        return ElementSet(
+        if len(which) == self.n and (which == np.arange(self.n)).all():
+            return self
+        out = ElementSet(
             self.start[which],
             self.end[which],
             self.kind[which],
@@ -140,6 +142,10 @@ class ElementSet:
             self.family,
             self.half_plane,
         )
+        # What is known of them is not worked out again.
+        known = vars(self)
+        vars(out).update({name: known[name][which] for name in ("length", "tangent", "nodes") if name in known})
+        return out
 
     def unknowns(self, elements: np.ndarray) -> np.ndarray:
         """Indices of the unknowns (and rows) of ``elements``."""

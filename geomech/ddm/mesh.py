@@ -308,15 +308,18 @@ def _cut(cracks: Cracks, pieces: np.ndarray, inner: np.ndarray) -> tuple[np.ndar
 def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
     """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
     layers = np.zeros((cracks.n_segments, 2), int)
+    step = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
+    headings = np.arctan2(step[:, 1], step[:, 0])
+    plain = _straight_through(cracks, headings, size) if grading.target is None else np.zeros(len(cracks.nodes), bool)
     ends: list[list[tuple[int, int]]] = [[] for _ in range(len(cracks.nodes))]
     for s, (i, j) in enumerate(cracks.segments.tolist()):
         ends[i].append((s, 0))
         ends[j].append((s, 1))
-    step = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
-    heading = np.arctan2(step[:, 1], step[:, 0]).tolist()
-    closed = ((cracks.aperture == 0) & (cracks.birth_cycle == 0)).tolist()
+    heading = headings.tolist()
+    closed = _closed(cracks).tolist()
     surface, crack, size = cracks.surface.tolist(), cracks.crack.tolist(), size.tolist()
-    for node, here in enumerate(ends):
+    for node in np.flatnonzero(~plain).tolist():
+        here = ends[node]
         if not here or (len(here) == 1 and not surface[node]):
             continue
         if len(here) != 2 or surface[node] or crack[here[0][0]] != crack[here[1][0]]:
@@ -341,6 +344,28 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
                 needed = round(math.log(least / size[at[0]]) / math.log(grading.ratio))
                 layers[at] = max(layers[at], needed) if grading.target is None else layers[at] + needed
     return layers
+
+
+def _straight_through(cracks: Cracks, heading: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """(n_nodes,) bool: nodes at which a crack of elements of like ``size`` (n_segments,) goes on without a kink, or nearly so."""
+    out = np.zeros(len(cracks.nodes), bool)
+    flat = cracks.segments.ravel()
+    order = np.argsort(flat, kind="stable")
+    first = np.flatnonzero((cracks.valence[flat[order]] == 2) & ~cracks.surface[flat[order]])[::2]
+    one, two = order[first], order[first + 1]
+    s, r = one // 2, two // 2
+    turn = heading[s] - heading[r] + np.where(one % 2 == two % 2, np.pi, 0.0)
+    turn = np.abs(turn - 2 * np.pi * np.rint(turn / (2 * np.pi)))
+    # Well below what counts, which round-off does not decide here.
+    alike = np.maximum(size[s], size[r]) < 0.9 * JUMP * np.minimum(size[s], size[r])
+    closed = _closed(cracks)
+    out[flat[one]] = (turn < 0.9 * KINK) & alike & (cracks.crack[s] == cracks.crack[r]) & ~(closed[s] & closed[r])
+    return out
+
+
+def _closed(cracks: Cracks) -> np.ndarray:
+    """(n_segments,) bool: drawn segments without an aperture, kinks between which are graded however slight."""
+    return (cracks.aperture == 0) & (cracks.birth_cycle == 0)
 
 
 def _layers_at(cracks: Cracks, node: int, edges: np.ndarray, grading: Grading) -> int:
@@ -409,7 +434,7 @@ def _touching(side: np.ndarray | None, edges: np.ndarray, cracks: Cracks, extent
     ends = np.concatenate([edges, cracks.nodes[cracks.segments]]) if n else np.empty((0, 2, 2))
     # Nodes by coordinates, so that corners, junctions and drawn end points that coincide count alike.
     flat = np.ascontiguousarray(ends.reshape(-1, 2)) + 0.0
-    _, number = np.unique(flat.view([("x", float), ("y", float)]).ravel(), return_inverse=True)
+    _, number = np.unique(flat.view(complex).ravel(), return_inverse=True)
     at_node = np.argsort(number, kind="stable")
     for step in range(1, int(np.bincount(number).max()) if n else 0):
         one, other = at_node[:-step], at_node[step:]
