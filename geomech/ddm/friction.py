@@ -299,7 +299,8 @@ def settle_rough(
     # The limit between the loads is the mean of those before and after (0 before faces have met), as where both rise together:
     # of second order in the load step, and exact while the limit stays what it is.
     pressure = np.where(states.closed, reaction[laws.across], 0.0)
-    before = laws.limit(memory.pressure, contact.broken)
-    lost = np.where(states.way != 0, 0.5 * (states.way * before - reaction[laws.along]) * (rest - memory.rest), 0.0)
+    slides = states.way != 0  # what cannot has an infinite limit
+    before = np.where(slides, laws.limit(memory.pressure, contact.broken), 0.0)
+    lost = np.where(slides, 0.5 * (states.way * before - reaction[laws.along]) * (rest - memory.rest), 0.0)
     work = memory.work + float(laws.elements.quadrature.ravel() @ lost) / laws.twice_mu
     return w, reaction, FaceMemory(laws.elements, rest, contact.broken, work, states, pressure), contact.solves

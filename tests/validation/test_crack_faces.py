@@ -93,6 +93,7 @@ def bridged(stress, stiffness, terms=500):
     return modulus * math.sqrt(math.pi) / 4 * (n @ c)
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("stiffness", [1e9, 1e10, 1e11, 1e12])
 def test_filled_joint_embedded_in_rock(stiffness):
     """Springs of k = 0.02 … 20 E'/a against sine series, and for the stiffest K = σ √(E'/2k), what a long joint tends to
