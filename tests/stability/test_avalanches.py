@@ -73,8 +73,8 @@ def test_an_avalanche_makes_no_energy_and_lets_no_block_into_another(n, seconds,
         f"{budget.overlap / budget.turnover:.1e}, moving {budget.last.kinetic / budget.turnover:.1e} of all energy"
     )
     assert not caplog.records
-    # Springs of 40 E' give by 1e-4 of a block under an impact at 10 m/s; corners are known to 1e-5 of it.
-    assert deepest < 1e-4 * size and overlap < 1e-4
+    # Springs of 40 E' give by v √(m/k), 1e-3 of a block, under an impact at 20 m/s.
+    assert deepest < 1e-3 * size and overlap < 1e-3
     assert budget.residual + budget.overlap < 1e-4 * budget.turnover and budget.scheme > 0.0
     middle = blocks.mean_vertices(state.vertices)[free]
     surface = np.where(middle[:, 0] < LENGTH * np.cos(DIP), -np.tan(DIP) * middle[:, 0], -LENGTH * np.sin(DIP))
