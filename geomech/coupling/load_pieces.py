@@ -34,7 +34,8 @@ class Pieces:
     """Loaded pieces of the outline as they are found: pairs of x and y at their two ends.
 
     ``left_out``: directions of faces, and by what moment (N m) shears along each of them stretch the block beyond what the
-    tractions on it do: those of two contacts that oppose each other have neither resultant nor moment.
+    tractions on it do: those of two contacts that oppose each other have neither resultant nor moment. ``couple``: the moment
+    (N m) that forces lose which act beyond the end of the edge that bears them, see `add_couple`.
     """
 
     def __init__(self) -> None:
@@ -42,6 +43,7 @@ class Pieces:
         self.tractions: list[tuple] = []
         self.points: list[tuple[np.ndarray, np.ndarray]] = []
         self.left_out: list[tuple[tuple[float, float], float]] = []
+        self.couple = 0.0
 
     def add(self, a, b, t_a, t_b) -> None:
         if any(t_a) or any(t_b):
@@ -124,11 +126,14 @@ def add_corner_force(pieces: Pieces, blocks: Blocks, vertex: int, force: Sequenc
 
 
 def add_edge_force(pieces: Pieces, blocks: Blocks, edge: int, point: Sequence[float], force: Sequence[float]) -> None:
-    """A force at a ``point`` of an edge, spread over a short piece of it with the same moment."""
+    """A force at a ``point`` of an edge, spread over a short piece of it with the same moment. One beyond its end acts at that
+    end, and with the couple that is then left."""
     (x, y), (ex, ey) = blocks.vertices[edge].tolist(), blocks.vertices[blocks.next_vertex[edge]].tolist()
     length = math.hypot(ex - x, ey - y)
     ax, ay = (ex - x) / length, (ey - y) / length
-    place = min(max(place_along(point, (x, y), (ax, ay)), 0.0), length)
+    acts_at = place_along(point, (x, y), (ax, ay))
+    place = min(max(acts_at, 0.0), length)
+    pieces.couple += (acts_at - place) * float(ax * force[1] - ay * force[0])
     # About the point, hence narrower near an end of the edge; at the very end it is a corner force.
     if min(place, length - place) < SAME * length:
         add_corner_force(pieces, blocks, edge if place < length / 2 else int(blocks.next_vertex[edge]), force)
@@ -146,6 +151,19 @@ def add_edge_force(pieces: Pieces, blocks: Blocks, edge: int, point: Sequence[fl
         (tx + tilt * ay, ty - tilt * ax),
         (tx - tilt * ay, ty + tilt * ax),
     )
+
+
+def add_couple(pieces: Pieces, blocks: Blocks, block: int) -> None:
+    """The ``couple`` as an even shear flow q along all edges of the ``block``: Bredt's M = 2 A q. It has no resultant, stretches
+    nothing in the mean, and stays small however short the edge is that the forces have slid beyond."""
+    if not pieces.couple:
+        return
+    area, _, _ = blocks.area_moments(block)
+    for edge in range(blocks.vertex_start[block], blocks.vertex_start[block + 1]):
+        a, b = blocks.vertices[edge].tolist(), blocks.vertices[blocks.next_vertex[edge]].tolist()
+        flow = pieces.couple / (2 * area * math.dist(a, b))
+        t = (flow * (b[0] - a[0]), flow * (b[1] - a[1]))
+        pieces.add(a, b, t, t)
 
 
 def add_edge_piece(pieces: Pieces, blocks: Blocks, vertices: np.ndarray, row: np.void, turn_back: np.ndarray) -> None:

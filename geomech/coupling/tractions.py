@@ -6,7 +6,8 @@ pushes (`face_pressure`). It ends where
 the faces do: a contact that opens takes the pressure back from its place the further the wider it gapes. Shear follows the
 pressure, so that it breaks Coulomb's law nowhere unless it breaks it as a whole. A lone vertex pressed into an edge spreads
 over a short piece of that edge; a lone force on a block's own corner is resolved along the corner's two edges and enters there
-as shear, which keeps both force and moment exactly. Tractions change without a jump as contacts come and go.
+as shear, which keeps both force and moment exactly. What presses beyond the end of an edge acts at that end, and its moment
+about it on the whole outline. Tractions change without a jump as contacts come and go.
 
 Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force
 on the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al.
@@ -35,7 +36,7 @@ from ..ddm.loads import first_moments, resultants
 from ..model import Blocks, Motion
 from .compliance import stress_rotation
 from .face_load import add_face, add_lone
-from .load_pieces import Pieces, add_edge_piece, add_point_load
+from .load_pieces import Pieces, add_couple, add_edge_piece, add_point_load
 from .touches import faces_and_lone, on_outline, touches_of
 
 
@@ -106,6 +107,7 @@ def boundary_load(
         add_edge_piece(pieces, blocks, vertices, row, turn_back)
     for row in point_forces:
         add_point_load(pieces, blocks, block, row["at"].copy(), turn_back @ row["force"])
+    add_couple(pieces, blocks, block)
     segments, tractions = pieces.arrays()
     inside = pieces.inside()
     return _balanced(

@@ -7,7 +7,7 @@ from geomech.coupling.compliance import stress_rotation
 from geomech.coupling.face_pressure import no_pull
 from geomech.coupling.tractions import boundary_load
 from geomech.dda import EDGE_FORCE, POINT_FORCE
-from geomech.ddm.loads import resultants
+from geomech.ddm.loads import first_moments, resultants
 from geomech.model import CONTACT, SLIP, Blocks, Motion
 from geomech.model.polygon import area_moments
 
@@ -250,6 +250,29 @@ def test_a_force_at_the_end_of_a_face_that_is_off_the_grid_keeps_its_moment(shar
     assert force == pytest.approx([0.2, -1.0], abs=1e-13)
     # Of the pushes at both ends, and of the shear along y = 1.
     assert moment == pytest.approx(-(0.3333 * (1 - share) + share) - 0.2, abs=1e-12)
+
+
+@pytest.mark.parametrize("beyond", [1e-9, 0.5, 3.0])
+def test_contacts_beyond_the_end_of_a_short_side_keep_force_and_moment(beyond):
+    """Two corners press on a side of 1 cm from beyond its end, by so many lengths of it: they have the moment of where they act, and
+    next to nothing of it is on the short side; what is added has no mean stress but the force's at the end."""
+    cut = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.99], [0.99, 1.0], [0.0, 1.0]])
+    above = np.array([[0.995, 1.0], [2.0, 0.5], [2.0, 2.0]])
+    hole = np.array([[0.4, 0.4], [0.4, 0.6], [0.6, 0.6], [0.6, 0.4]])
+    blocks = Blocks.from_polygons([[cut, hole], above])
+    side = edge_between(blocks, 0, [1.0, 0.99], [0.99, 1.0])
+    start, end = blocks.vertices[side], blocks.vertices[blocks.next_vertex[side]]
+    point, normal = end + beyond * (end - start), np.array([1.0, 1.0]) / np.sqrt(2)
+    row = contact(vertex_at(blocks, 1, [0.995, 1.0]), side, 1, 0, point, normal, 2.0, 0.7)
+    push = -(2.0 * normal + 0.7 * (end - start) / np.hypot(*(end - start)))
+    load = load_of(0, blocks, [row])
+    force, moment, _ = resultants(load.segments, load.tractions, np.zeros(2))
+    assert force == pytest.approx(push, abs=1e-12)
+    assert moment == pytest.approx(point[0] * push[1] - point[1] * push[0], abs=1e-12)
+    at_end = contact(vertex_at(blocks, 1, [0.995, 1.0]), side, 1, 0, end, normal, 2.0, 0.7)
+    missing = first_moments(load.segments, load.tractions, np.zeros(2))
+    missing -= first_moments(*(getattr(load_of(0, blocks, [at_end]), name) for name in ("segments", "tractions")), np.zeros(2))
+    assert missing + missing.T == pytest.approx(np.zeros((2, 2)), abs=1e-12)
 
 
 def test_bonds_that_pull_have_linear_pressure_and_no_jump():
