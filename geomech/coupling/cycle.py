@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from .. import dda
+from ..dda.blas_threads import alike, asked_for, blas_threads
 from ..dda.excavation import until_next_event
 from ..model import TIP, Cycle, Event, Problem
 from .balance import Balance, balanced
@@ -64,7 +65,8 @@ class Coupling:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.now = CrackedBlocks(problem)
+        with blas_threads(asked_for()):
+            self.now = CrackedBlocks(problem)
         self.length = dda.StepLength(problem.dda)
         self.static = problem.dda.dynamic_factor == 0.0
         self.events: EventSteps | None = None
@@ -104,14 +106,21 @@ class Coupling:
         return self._stops(told + self._brought)
 
     def cycles(self) -> Iterator[Cycle]:
+        """From the initial state to the end; the same to the bit in whatever process and beside whatever else."""
+        return alike(self._from_the_start())
+
+    def load_steps(self) -> Iterator[Cycle]:
+        """The cycles from between two passes to the end."""
+        return alike(self._load_steps())
+
+    def _from_the_start(self) -> Iterator[Cycle]:
         now = self.now
         collapse = relax(now, now.state.time) if self.problem.dda.equilibrium else ()
         yield self._still(collapse)
         if not collapse:
-            yield from self.load_steps()
+            yield from self._load_steps()
 
-    def load_steps(self) -> Iterator[Cycle]:
-        """The cycles from between two passes to the end."""
+    def _load_steps(self) -> Iterator[Cycle]:
         # Rounding of the summed steps must not add a last, empty one.
         end = self.problem.run.end_time - 1e-9 * self.problem.dda.time_step
         while self.under_way is not None or self.now.state.time < end:

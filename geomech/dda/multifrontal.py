@@ -12,17 +12,15 @@ refinement.
 
 from __future__ import annotations
 
-import ctypes
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from numba import njit, types
 
+from .blas_threads import blas_threads
 from .dissection import Tree, plan
 
 #: Sums may be reordered and fused: the products of whole fronts are summed as BLAS likes, too.
@@ -255,31 +253,6 @@ def _backward(fronts, out, pivots, reach, boundary, at, factors):
 
 
 @cache
-def _blas_threads() -> Callable[[int], int] | None:
-    """Sets the calling thread's number of BLAS threads and returns what it was; None where SciPy's BLAS cannot."""
-    import scipy
-
-    for library in Path(scipy.__file__).resolve().parent.parent.glob("scipy.libs/*openblas*"):
-        try:
-            return ctypes.CDLL(str(library)).openblas_set_num_threads_local
-        except (OSError, AttributeError):
-            continue
-    return None
-
-
-@contextmanager
-def one_blas_thread() -> Iterator[None]:
-    """Products of fronts on the calling core alone: handed out in pieces they take forty times as long on a busy machine."""
-    limit = _blas_threads()
-    before = limit(1) if limit else 0
-    try:
-        yield
-    finally:
-        if limit:
-            limit(before)
-
-
-@cache
 def _cores() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(len(os.sched_getaffinity(0)), thread_name_prefix="geomech-dda")
 
@@ -368,7 +341,7 @@ class Factors:
         """What ``work`` gives for all fronts in pieces, children before parents or the other way; from ``least`` blocks on,
         pieces that are independent share the cores, for ``work`` lets go of the interpreter's lock."""
         t = self.tree
-        with one_blas_thread():
+        with blas_threads(1):
             if len(t.rank) < least:
                 return [work(self._all)]
             groups = [[np.arange(a, b) for a, b in t.pieces], *(wave[:, None] for wave in t.waves)]

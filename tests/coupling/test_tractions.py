@@ -271,7 +271,9 @@ def test_contacts_beyond_the_end_of_a_short_side_keep_force_and_moment(beyond):
     assert moment == pytest.approx(point[0] * push[1] - point[1] * push[0], abs=1e-12)
     at_end = contact(vertex_at(blocks, 1, [0.995, 1.0]), side, 1, 0, end, normal, 2.0, 0.7)
     missing = first_moments(load.segments, load.tractions, np.zeros(2))
-    missing -= first_moments(*(getattr(load_of(0, blocks, [at_end]), name) for name in ("segments", "tractions")), np.zeros(2))
+    missing -= first_moments(
+        *(getattr(load_of(0, blocks, [at_end]), name) for name in ("segments", "tractions")), np.zeros(2)
+    )
     assert missing + missing.T == pytest.approx(np.zeros((2, 2)), abs=1e-12)
 
 
