@@ -368,7 +368,12 @@ class Attempt:
                 *self._real_springs(), weight, found.law, system.finder.closure,
             ).tolist()
         )  # fmt: skip
-        return energy._replace(friction=energy.friction + self.rubbed, scheme=energy.scheme - self.rubbed)
+        return energy._replace(
+            before=energy.before + found.unbent,
+            bond=energy.bond + found.unbent,
+            friction=energy.friction + self.rubbed,
+            scheme=energy.scheme - self.rubbed,
+        )
 
     def _real_springs(self) -> tuple[np.ndarray, np.ndarray]:
         """Contact springs that store energy, normal and shear: what multipliers hold does not."""

@@ -38,6 +38,7 @@ class ContactSet:
     stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact does not
                 count yet: what multipliers have left of it, and what given motion makes of it in the step
     inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
+    unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than at the corners
     relies_on_glue             corners have been left out that hold as long as all bonds do
     faces                      those that bonds hold at both ends; None without any
     by_length   (n,)           contacts whose shear stiffness is that of a law
@@ -65,6 +66,7 @@ class ContactSet:
     lift: np.ndarray
     stretch: np.ndarray
     inset: np.ndarray
+    unbent: float = 0.0
     relies_on_glue: bool = False
     faces: BondedFaces | None = None
     by_length: np.ndarray | None = None

@@ -163,15 +163,19 @@ class ContactFinder:
             own = 2.0 / (springs.normal[ends[:, 0]] * length**2)
             return np.sqrt(own / np.maximum(own, give))
 
-        points = FacePoints.of(
-            block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal,
-            (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), bend,
-        )  # fmt: skip
+        def placed(inside):
+            return FacePoints.of(
+                block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal,
+                (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), bend,
+            )  # fmt: skip
+
+        points = placed(inside)
         if inside.any() or found.inset.any():
             kept = np.zeros(len(found), bool)
             if points is not None:
                 kept[points.ends] = True
-            found = _at_their_corners(found, found.inset & ~kept, inside & kept)
+            out = found.inset & ~kept
+            found = _at_their_corners(found, placed(found.inset) if out.any() else None, out, inside & kept)
         return replace(found, by_length=self._stiff_along[law]).placed(points)
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
@@ -307,10 +311,18 @@ def _among(keep: np.ndarray, partner: np.ndarray) -> np.ndarray:
     return number[partner[keep]]
 
 
-def _at_their_corners(found: ContactSet, out: np.ndarray, inset: np.ndarray) -> ContactSet:
-    """The contacts ``found``, the springs of those that come ``out`` (n,) of their faces at the corners with the forces that they
-    had: these are then where the faces, that do not fit any more, begin to press and to pull."""
-    gap, force = found.geometry[:, 3], found.normal / found.springs.normal
+def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:
+    """The contacts ``found``, the springs of those that come ``out`` (n,) of their faces, inside which they ``stood``, at the
+    corners with the forces that they had: these are then where the faces, that do not fit any more, begin to press and to
+    pull. Forces of springs alone: what dashpots bore over the last step would stay in them as energy from nowhere."""
+    if stood is None:
+        return replace(found, inset=inset)
+    gap = found.geometry[:, 3]
+    spring = stood.at_corners(-stood.between_corners(found.gap_before))
     closed = (found.state != OPEN) | (found.bonded > 0)
-    told = np.where(closed, gap + force, np.minimum(gap, 0.0))
-    return replace(found, lift=np.where(out, told, found.lift), inset=inset)
+    told = np.where(closed, gap + spring, np.minimum(gap, 0.0))
+    # Blocks that were bent by the moment on their faces, as springs inside these are, are bent no more.
+    bent = 0.5 * found.springs.normal * (stood.between_corners(found.gap_before) ** 2 - spring**2)
+    return replace(
+        found, lift=np.where(out, told, found.lift), inset=inset, unbent=float(bent[out & closed].sum())
+    )  # fmt: skip

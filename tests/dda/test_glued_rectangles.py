@@ -120,4 +120,22 @@ def test_a_cantilever_that_breaks_falls_and_is_not_thrown():
         # Bonds that break give back no more than the weight has put in.
         assert result.energy.kinetic < budget.gravity_work + 1e-9
     print("bonds lost", lost[-1], "; residual", budget.residual / budget.turnover, "; bond energy", budget.bond)
-    assert lost[-1] > 0 and abs(budget.residual) < 0.02 * budget.turnover
+    assert lost[-1] > 0 and abs(budget.residual) < 1e-3 * budget.turnover
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.4])
+def test_bonds_that_break_release_what_bending_had_stored_and_keep_no_force_of_dashpots(damping):
+    system = glued_cantilever(4, 1, 1e6, dynamic_factor=1.0, damping=damping)
+    weight = Loads(gravity=History.constant([0.0, -9.81]))
+    state, budget, jumps, bonds = State.at_rest(system.blocks), dda.EnergyBudget(), [], []
+    for _ in range(30):
+        before = budget.last
+        result = system.step(state, weight, 5e-4)
+        budget, state = budget.after(result.energy, result.state.time), result.state
+        jumps.append(0.0 if before is None else result.energy.before - before.stored)
+        bonds.append(result.energy.bond)
+        assert abs(result.energy.residual) < 1e-9 * budget.turnover
+    print("largest jump", np.abs(jumps).max(), "of", budget.turnover, "; of bonds", max(bonds), "J/m")
+    # Unbooked, what bent blocks release would be a jump of a tenth of all energy.
+    assert max(bonds) > 0.05 * budget.turnover
+    assert np.abs(jumps).max() < 1e-4 * budget.turnover
