@@ -2,7 +2,8 @@
 
 Blocks slide and rotate along joints (discontinuous deformation analysis, `geomech.dda`), cracks grow through the rock
 bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` lets each drive the
-other. `load_scene`, `cycles`, `run`, `resume` and `factor_of_safety` are the whole pipeline; each solver also stands alone.
+other. `load_scene`, `cycles`, `run`, `resume` and `factor_of_safety` are the whole pipeline; each solver also stands
+alone.
 """
 
 import os

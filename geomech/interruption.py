@@ -12,10 +12,11 @@ _TOLD = b"\nstopping when this cycle is done; once more to stop at once\n"
 
 
 class Interruption:
-    """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do outside.
+    """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do
+    outside.
 
-    SIGTERM is taken the same way where it raises KeyboardInterrupt already, as on the command line. In other threads than
-    the main one, where signals do not arrive, nothing changes.
+    SIGTERM is taken the same way where it raises KeyboardInterrupt already, as on the command line. In other threads
+    than the main one, where signals do not arrive, nothing changes.
     """
 
     def __init__(self) -> None:

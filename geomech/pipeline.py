@@ -31,10 +31,11 @@ def run(
     """Run ``scene`` to its end and return the summary that ``summary.json`` holds.
 
     ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are told of every cycle, by default
-    the writers that the scene's ``[output]`` table asks for. ``again``: the scene is the copy that an earlier run has left in
-    ``out``. Whatever ends the run, what was written stays readable
+    the writers that the scene's ``[output]`` table asks for. ``again``: the scene is the copy that an earlier run has
+    left in ``out``. Whatever ends the run, what was written stays readable
     and every observer is ended; the exception is raised again. Raises SceneError on bad input
-    or when ``out`` is where the scene itself is kept, `geomech.dda.NotConverged` when the blocks find no consistent contact state.
+    or when ``out`` is where the scene itself is kept, `geomech.dda.NotConverged` when the blocks find no consistent
+    contact state.
     """
     scene = _loaded(scene)
     folder = Path(out) if out is not None else Path("outputs") / scene.name
@@ -58,8 +59,9 @@ def run_problem(
 class CoupledRun:
     """A coupled problem on its way to the end, watched by observers and stored by the first `Checkpoints` among them.
 
-    It begins at the start of ``problem``, or where ``stored``, the content of a checkpoint, was written (it is used up), with
-    the title and the settings of the run that ``problem`` has now. A first interrupt ends it between two cycles.
+    It begins at the start of ``problem``, or where ``stored``, the content of a checkpoint, was written (it is used
+    up), with the title and the settings of the run that ``problem`` has now. A first interrupt ends it between two
+    cycles.
     """
 
     def __init__(
@@ -153,8 +155,9 @@ def factor_of_safety(scene, load_time: float | None = None, **wishes):
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
     (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: reduce, tolerance, watch …
 
-    Blocks are whole: cracks inside them are left out. Raises SceneError on bad input, `geomech.dda.NothingToReduce` where there is no
-    strength to reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
+    Blocks are whole: cracks inside them are left out. Raises SceneError on bad input, `geomech.dda.NothingToReduce`
+    where there is no strength to reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints
+    hold.
     """
     from . import dda
 

@@ -37,12 +37,13 @@ def resume(
     quiet: bool = False,
     tell: Callable[[str], None] = log.warning,
 ) -> dict[str, Any]:
-    """Go on with the run in ``folder`` and return its summary: bit for bit the files it would have left uninterrupted, on the
-    same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint are dropped.
+    """Go on with the run in ``folder`` and return its summary: bit for bit the files it would have left uninterrupted,
+    on the same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint
+    are dropped.
 
-    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on). A run without a checkpoint so
-    far begins again. ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told when the run begins
-    again. Raises `Finished` when there is
+    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on). A run without a
+    checkpoint so far begins again. ``observers`` are those of the run, by default the standard ones (``quiet``: they
+    say nothing); ``tell`` is told when the run begins again. Raises `Finished` when there is
     nothing left to do, `NotResumable` when the run cannot be gone on with, SceneError on bad input.
     """
     folder = Path(folder)
@@ -104,8 +105,8 @@ def _scene(folder: Path, overrides: list[str]) -> Any:
 
 
 def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """Key → (value then, value now) of all that the scene has otherwise than at the checkpoint. Raises NotResumable for what
-    would change what has happened."""
+    """Key → (value then, value now) of all that the scene has otherwise than at the checkpoint. Raises NotResumable for
+    what would change what has happened."""
     then, now = _flat(header["scene"]), _flat(json.loads(json.dumps(resolved)))
     changes = {
         key: (then.get(key), now.get(key)) for key in dict.fromkeys([*then, *now]) if then.get(key) != now.get(key)

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 
 class Watched(NamedTuple):
-    """One run that has ended: its variant's ``name`` (None: the scene as it stands), the ``folder`` that it has left, the
-    observer that was its ``watcher``, and its ``summary``."""
+    """One run that has ended: its variant's ``name`` (None: the scene as it stands), the ``folder`` that it has left,
+    the observer that was its ``watcher``, and its ``summary``."""
 
     name: str | None
     folder: Path
@@ -25,11 +25,12 @@ def watched_runs(
     overrides: Sequence[str] = (),
     quiet: bool = False,
 ) -> Iterator[Watched]:
-    """Run the scene of ``study`` (a folder, or the path of a scene) in each of its ``variants`` (none named: all that it has), one by one.
+    """Run the scene of ``study`` (a folder, or the path of a scene) in each of its ``variants`` (none named: all that
+    it has), one by one.
 
-    A variant runs into ``out`` / its name, None into ``out``, with all that the scene's ``[output]`` asks for and an observer
-    of its own, ``watcher()``. All scenes are read before the first one runs: an error in the last does not cost the time of
-    the others. Raises SceneError on bad input, and what `geomech.run` raises.
+    A variant runs into ``out`` / its name, None into ``out``, with all that the scene's ``[output]`` asks for and an
+    observer of its own, ``watcher()``. All scenes are read before the first one runs: an error in the last does not
+    cost the time of the others. Raises SceneError on bad input, and what `geomech.run` raises.
     """
     from .output import standard_observers
     from .pipeline import run

@@ -1,4 +1,5 @@
-"""The house's order, read from the source: who may import whom, what stays out of the solvers, what stands at the top."""
+"""The house's order, read from the source: who may import whom, what stays out of the solvers, what stands at the
+top."""
 
 import ast
 import subprocess

@@ -86,8 +86,8 @@ def test_rotation_carries_the_material_counter_clockwise():
 
 @pytest.mark.parametrize("name", CRITERIA)
 def test_positive_mode_two_turns_a_crack_clockwise(name):
-    """τ_xy > 0 ahead of a tip that looks along x: the largest principal tension points to +45°, so that the crack, which
-    runs across it, turns to the other side."""
+    """τ_xy > 0 ahead of a tip that looks along x: the largest principal tension points to +45°, so that the crack,
+    which runs across it, turns to the other side."""
     angle, _ = CRITERIA[name](np.array([1.0]), np.array([0.5]), _rock())
     principal = np.linalg.eigh(tensor([0.0, 0.0, 1.0]))[1][:, 1]
     across = math.atan2(*normal_of(principal * np.sign(principal[0]))[::-1]) - math.pi  # the half that looks ahead

@@ -46,7 +46,8 @@ def test_a_place_that_cannot_be_written_is_no_fault(tmp_path):
 
 
 def test_an_upgrade_of_what_a_kernel_calls_compiles_it_anew(tmp_path):
-    """Numba's own stamp is of the kernel's file only: the old code of what it calls, in another file, would be taken."""
+    """Numba's own stamp is of the kernel's file only: the old code of what it calls, in another file, would be
+    taken."""
     (tmp_path / "pkg").mkdir()
     (tmp_path / "pkg" / "__init__.py").touch()
     (tmp_path / "pkg" / "above.py").write_text(

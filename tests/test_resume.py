@@ -303,7 +303,8 @@ def test_two_cracks_broken_off_at_every_tenth(how, tmp_path):
 
 @pytest.mark.slow
 def test_a_problem_made_in_python_is_resumed_as_well(tmp_path):
-    """A wall of 300 bricks, five of them cracked, without a scene: the blocks' kept factors, and no file to read it from."""
+    """A wall of 300 bricks, five of them cracked, without a scene: the blocks' kept factors, and no file to read it
+    from."""
     problem = replace(wall(300, 5), run=RunSettings(end_time=0.2))
 
     def observers(*more) -> list:
@@ -573,7 +574,8 @@ def test_time_spent_goes_on(write, tmp_path):
 
 
 def test_a_run_broken_off_between_changes_of_faces_is_gone_on_with(tmp_path):
-    """What contacts and faces did before is known again: between the first slip of two joints and their sliding all along."""
+    """What contacts and faces did before is known again: between the first slip of two joints and their sliding all
+    along."""
     scene = load_scene(ROOT / "pipelines" / "joint_shear", ["run.end_time_s=31", "output.interior=false"])
     last = run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))["cycles"] - 1
     kinds = Run(tmp_path / "whole").events["kind"].tolist()

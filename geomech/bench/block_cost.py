@@ -1,10 +1,11 @@
-"""What a step of many blocks costs and how right it is: walls and jointed slopes of 100 to 10 000 blocks, more if asked for.
+"""What a step of many blocks costs and how right it is: walls and jointed slopes of 100 to 10 000 blocks, more if asked
+for.
 
-Steps of 10 ms from rest under sudden weight, as many as some seconds have room for (one at least); the cost of an open–close
-iteration, one set of contact states or one step of the central path, is that of the step over its iterations. Settled steps go on
-from where static ones have brought the blocks to rest. Beside them the share of the contact search, the memory of the process,
-the exponents of the cost, iterative solutions of the last equations, which are told by time against residual, and errors against
-closed forms.
+Steps of 10 ms from rest under sudden weight, as many as some seconds have room for (one at least); the cost of an
+open–close iteration, one set of contact states or one step of the central path, is that of the step over its
+iterations. Settled steps go on from where static ones have brought the blocks to rest. Beside them the share of the
+contact search, the memory of the process, the exponents of the cost, iterative solutions of the last equations, which
+are told by time against residual, and errors against closed forms.
 """
 
 from __future__ import annotations
@@ -31,29 +32,33 @@ from .figures import Measured, stopwatch
 FOLDER = Path("outputs/bench_dda")
 TIME_STEP = 0.01
 SIZES = (100, 1000, 10_000)
-#: Blocks up to which the last equations are solved iteratively too (block Jacobi takes minutes beyond), in a quick run and else.
+#: Blocks up to which the last equations are solved iteratively too (block Jacobi takes minutes beyond), in a quick run
+#: and else.
 ITERATED = 100, 1000
-#: CPU seconds from which on no further step is begun, in a quick run and else; blocks beyond which walls only are stepped, and only
-#: when asked for: the first step of 100 000 bricks takes 31 iterations, 190 s of CPU and 3.2 GB, of so many blocks of a slope it is
-#: not known to end.
+#: CPU seconds from which on no further step is begun, in a quick run and else; blocks beyond which walls only are
+#: stepped, and only when asked for: the first step of 100 000 bricks takes 31 iterations, 190 s of CPU and 3.2 GB, of
+#: so many blocks of a slope it is not known to end.
 LONGEST, WALLS = (0.5, 6.0), 10_000
-#: Static steps of so many seconds, so many of them, bring blocks to rest; of so many settled steps the first, which factors, is not
-#: counted. Up to so many blocks, in a quick run and else: the static steps take as long as those from rest.
+#: Static steps of so many seconds, so many of them, bring blocks to rest; of so many settled steps the first, which
+#: factors, is not counted. Up to so many blocks, in a quick run and else: the static steps take as long as those from
+#: rest.
 STATIC, REST, SETTLED, SETTLES = 1.0, 3, 6, (150, 15_000)
 SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
 
-#: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours → seconds
-#: an open–close iteration.
+#: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours →
+#: seconds an open–close iteration.
 SHI = {106: 0.0015, 411: 0.014, 1009: 0.084, 2003: 0.29, 4001: 0.99}
-#: Goals on two cores: blocks of a wall → seconds an iteration; exponent of the cost from 1 000 blocks on; share of the search.
+#: Goals on two cores: blocks of a wall → seconds an iteration; exponent of the cost from 1 000 blocks on; share of the
+#: search.
 GOALS, EXPONENT, SEARCH = {1000: 6e-3, 10_000: 0.1}, 1.1, 0.25
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds of the ``first`` step; medians over ``steps``: seconds of a step, of an iteration, of its solution, and of a step's
-    contact search; seconds and mean iterations of a ``settled`` step (nan: not measured); memory of the process at its peak, MB;
-    ``factored`` of every factorisation; ``imbalance``: error of weight − inertia = reaction."""
+    """Seconds of the ``first`` step; medians over ``steps``: seconds of a step, of an iteration, of its solution, and
+    of a step's contact search; seconds and mean iterations of a ``settled`` step (nan: not measured); memory of the
+    process at its peak, MB; ``factored`` of every factorisation; ``imbalance``: error of weight − inertia =
+    reaction."""
 
     scene: str
     blocks: int
@@ -124,8 +129,8 @@ def _watched() -> Iterator[Watch]:
 
 
 def measure(quick: bool = False, blocks: int | None = None) -> Measured:
-    """The table; leaves ``cost_of_size.png``, ``solvers.png`` and ``cost_of_size.json`` in `FOLDER`. ``quick`` stops at 1 000 blocks;
-    ``blocks``: one more size, larger than the others."""
+    """The table; leaves ``cost_of_size.png``, ``solvers.png`` and ``cost_of_size.json`` in `FOLDER`. ``quick`` stops at
+    1 000 blocks; ``blocks``: one more size, larger than the others."""
     from ..render.cost_of_size import draw, draw_solvers
 
     run(block_scenes.wall(100), 0.0)  # compiles
@@ -287,8 +292,8 @@ def _exponent(costs: list[Cost], what: str) -> float:
 
 
 def errors() -> dict[str, float]:
-    """Relative errors against closed forms: the way of a block that slides, the creep of one that sticks, the shortening of
-    a column of twenty blocks under its own weight, a wall's reaction at rest."""
+    """Relative errors against closed forms: the way of a block that slides, the creep of one that sticks, the
+    shortening of a column of twenty blocks under its own weight, a wall's reaction at rest."""
     from .. import dda
 
     def states(blocks: Blocks, dt: float, end: float, dynamic: bool = True):

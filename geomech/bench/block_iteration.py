@@ -1,9 +1,9 @@
 """Iterative solutions of a step's equations, to be measured beside the direct one of `geomech.dda`.
 
 Friction that slides makes the equations unsymmetric, so both iterate on the unsymmetric matrix: stabilised biconjugate
-gradients (van der Vorst 1992) behind the blocks' own 6×6 inverses, and GMRES behind two levels of domains: overlapping ones
-solved directly in single precision (restricted additive Schwarz; Cai & Sarkis 1999) after one coarse field of six unknowns,
-the motion of a first-order block, for every few blocks.
+gradients (van der Vorst 1992) behind the blocks' own 6×6 inverses, and GMRES behind two levels of domains: overlapping
+ones solved directly in single precision (restricted additive Schwarz; Cai & Sarkis 1999) after one coarse field of six
+unknowns, the motion of a first-order block, for every few blocks.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from .figures import stopwatch
 
 #: Residuals at which iterations stop, relative to the right side (norms).
 TOLERANCES = 1e-2, 1e-4, 1e-7, 1e-10
-#: Blocks of a domain, rows of neighbours it is widened by, blocks of a coarse field (least time on walls of 10 000 bricks).
+#: Blocks of a domain, rows of neighbours it is widened by, blocks of a coarse field (least time on walls of 10 000
+#: bricks).
 DOMAIN, OVERLAP, AGGREGATE = 1000, 2, 30
 
 
@@ -63,7 +64,8 @@ def two_levels(
     right: np.ndarray,
     tolerance: float = TOLERANCES[-1],
 ) -> Iterated:
-    """GMRES behind domains and coarse fields; ``points`` (n, 2) and ``sizes`` (n,) m are the blocks' centroids and √area."""
+    """GMRES behind domains and coarse fields; ``points`` (n, 2) and ``sizes`` (n,) m are the blocks' centroids and
+    √area."""
     spent_on = stopwatch()
     n, columns = solver.n, solver.columns
     rows = np.repeat(np.arange(n), np.diff(solver.pointer))
@@ -100,7 +102,8 @@ def two_levels(
 def _flexible_gmres(
     matrix: Callable, behind: Callable, right: np.ndarray, tolerance: float, most: int = 100
 ) -> tuple[np.ndarray, int]:
-    """Solution and iterations; what stands ``behind`` need not be linear to round-off (Saad 1993): single precision is not."""
+    """Solution and iterations; what stands ``behind`` need not be linear to round-off (Saad 1993): single precision is
+    not."""
     size = float(np.linalg.norm(right))
     basis, directions = [right / size], []
     hessenberg, first = np.zeros((most + 1, most)), np.zeros(most + 1)
@@ -139,7 +142,8 @@ def _divided(points: np.ndarray, most: int) -> list[np.ndarray]:
 
 
 def _coarse(points, sizes, rows, columns, blocks) -> tuple[np.ndarray, np.ndarray, Factors]:
-    """(n, 6, 6) the blocks' unknowns in each field's, the field of each block, and the factored equations of the fields."""
+    """(n, 6, 6) the blocks' unknowns in each field's, the field of each block, and the factored equations of the
+    fields."""
     of = np.empty(len(points), np.int64)
     groups = _divided(points, AGGREGATE)
     for k, group in enumerate(groups):

@@ -1,4 +1,5 @@
-"""Block systems of any size for timing: a running-bond wall, a slope cut by two joint sets, a column, a block on an incline."""
+"""Block systems of any size for timing: a running-bond wall, a slope cut by two joint sets, a column, a block on an
+incline."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ WEIGHT = Loads(gravity=History.constant((0.0, -GRAVITY)))
 
 
 def wall(n: int) -> Blocks:
-    """About ``n`` bricks of 1 × 0.5 m in running bond, as wide as twice its height in bricks' sides, on a fixed base."""
+    """About ``n`` bricks of 1 × 0.5 m in running bond, as wide as twice its height in bricks' sides, on a fixed
+    base."""
     columns = max(4, round(math.sqrt(n / 2)))
     polygons = [_rectangle(-1, -1, columns + 1, 0)]
     for course in range(max(1, round(n / (columns + 0.5)))):
@@ -29,8 +31,8 @@ def wall(n: int) -> Blocks:
 
 
 def slope(n: int) -> Blocks:
-    """About ``n`` blocks of a 60° slope between two joint sets: bedding that dips 20° into the rock and cross joints at right
-    angles from bed to bed, blocks of 1 × 1 m; those at its foot and back are fixed."""
+    """About ``n`` blocks of a 60° slope between two joint sets: bedding that dips 20° into the rock and cross joints at
+    right angles from bed to bed, blocks of 1 × 1 m; those at its foot and back are fixed."""
     dip, steep = math.radians(20), math.radians(70)
     a, b = np.array([math.cos(dip), -math.sin(dip)]), np.array([math.cos(steep), math.sin(steep)])
     size = math.sqrt(n / 0.95)

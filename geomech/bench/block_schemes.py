@@ -79,8 +79,8 @@ def errors() -> dict[str, float]:
 
 
 def _points(sizes_of_each: int | None) -> Iterator[Point]:
-    """The shortest of as many times as a tenth of a second has room for; of a method's coarsest size the first is not counted, which
-    may compile."""
+    """The shortest of as many times as a tenth of a second has room for; of a method's coarsest size the first is not
+    counted, which may compile."""
     for problem, (sizes, methods, scene) in PROBLEMS.items():
         for method in methods:
             for size in sizes[:sizes_of_each]:
@@ -94,8 +94,8 @@ def _points(sizes_of_each: int | None) -> Iterator[Point]:
 
 
 def _wave(dt: float, scheme: dict) -> Callable[[], float]:
-    """A pulse of some ten blocks' length runs eight blocks far along a row of forty, bonded: error of all displacements over the
-    largest."""
+    """A pulse of some ten blocks' length runs eight blocks far along a row of forty, bonded: error of all displacements
+    over the largest."""
     n, youngs_modulus, density, joint, end = 40, 10e9, 2600.0, 20e9, 4.8e-3
     rock = Material("rock", youngs_modulus, 0.0, density=density)
     law = JointLaw("bonded", 0.5, 1e9, 1e9, normal_stiffness=joint, shear_stiffness=joint)
@@ -118,8 +118,8 @@ def _wave(dt: float, scheme: dict) -> Callable[[], float]:
 
 
 def _shaken(dt: float, scheme: dict) -> Callable[[], float]:
-    """A block on an incline of 20°, friction 30°, is shaken along the horizontal and slips at every swing: error of its way,
-    at all times, over the whole way."""
+    """A block on an incline of 20°, friction 30°, is shaken along the horizontal and slips at every swing: error of its
+    way, at all times, over the whole way."""
     slope, friction, end = math.radians(20), math.radians(30), 1.2
     blocks, times = block_scenes.incline(slope), np.linspace(0.0, end, 2401)
     # Towards the upper side of the incline, which is on the left.

@@ -1,11 +1,13 @@
-"""How contact forces reach the cracks: K of the two-crack specimen between platens by each route, beside the crack solver alone.
+"""How contact forces reach the cracks: K of the two-crack specimen between platens by each route, beside the crack
+solver alone.
 
 The crack solver alone has the exact tractions, a uniform stress on the specimen's ends. Coupled runs get there through
-contacts: spread over faces ("contacts"), left at the corners where the springs are ("springs"), or given to Kelvin's solution
-there ("kelvin-springs": Khanizadeh Bahabadi et al. 2023, eqs. 2-4). Beside them the crack solver alone with the four corner
-forces' field in the infinite plane, which is what those equations give where they are taken at their word: without a block.
-Errors are the largest of the four tips', relative to the largest |K| of that mode among them. By time against error: the same
-runs with elements of several orders, which only the tractions of whole faces let come down.
+contacts: spread over faces ("contacts"), left at the corners where the springs are ("springs"), or given to Kelvin's
+solution there ("kelvin-springs": Khanizadeh Bahabadi et al. 2023, eqs. 2-4). Beside them the crack solver alone with
+the four corner forces' field in the infinite plane, which is what those equations give where they are taken at their
+word: without a block. Errors are the largest of the four tips', relative to the largest |K| of that mode among them. By
+time against error: the same runs with elements of several orders, which only the tractions of whole faces let come
+down.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ FOLDER = Path("outputs/bench_boundary")
 SPECIMEN = Path("pipelines/two_cracks/scene.toml")
 #: The routes of a coupled run, and the field of its forces without a block.
 ROUTES, NO_BLOCK = ("contacts", "springs", "kelvin-springs"), "Kelvin's field alone"
-#: Axial stresses, Pa: where strain is nothing, and near what makes the cracks grow. The second is reached in such steps.
+#: Axial stresses, Pa: where strain is nothing, and near what makes the cracks grow. The second is reached in such
+#: steps.
 STRESSES, STEP = (0.2e6, 40e6), 2e6
 
 
@@ -104,8 +107,8 @@ class Point:
 
 
 def by_order(phi_deg: int, orders: Sequence[int] = (2, 3, 4, 6)) -> list[Point]:
-    """Time and error of the first load by every route, against order 10, in elements of these ``orders``; the block's boundary has
-    three times the elements of the study's own, so that it is the order that counts."""
+    """Time and error of the first load by every route, against order 10, in elements of these ``orders``; the block's
+    boundary has three times the elements of the study's own, so that it is the order that counts."""
     from ..coupling import cycles
 
     problem = specimen(phi_deg)
@@ -132,7 +135,8 @@ def _finer(settings: DdmSettings, order: int) -> DdmSettings:
 
 
 def paper_elements(phi_deg: int) -> list[float]:
-    """Largest error of K_I and of K_II that quadratic elements with equal nodes bring, exact tractions, four to a crack."""
+    """Largest error of K_I and of K_II that quadratic elements with equal nodes bring, exact tractions, four to a
+    crack."""
     problem = specimen(phi_deg)
     fine = replace(problem, ddm=replace(problem.ddm, order=8, nodes="chebyshev", elements_per_side=12))
     coarse = replace(problem, ddm=replace(problem.ddm, order=2, nodes="equal", elements_per_crack=4))
@@ -141,7 +145,8 @@ def paper_elements(phi_deg: int) -> list[float]:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``boundary.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: φ = 0 at the small stress only."""
+    """The table; leaves ``boundary.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: φ = 0 at the small stress
+    only."""
     from ..render.work_precision import draw
 
     angles, stresses = (PHI_DEG[:1], STRESSES[:1]) if quick else (PHI_DEG, STRESSES)

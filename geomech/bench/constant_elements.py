@@ -5,7 +5,8 @@ elements and the dense system is solved by LU. There is no tip element. Two ways
 
     fit          D = d√r + e r√r fitted to the elements within two fifths of the half crack
     calibrated   from the tip element alone, D_1 times √(2/π): on equal elements behind a straight tip the discrete
-                 solution is D_j ∝ Γ(j+½)/Γ(j), so D_1 is √(π/2) times what √r has there (0.806 is often used, after Olson 1991)
+                 solution is D_j ∝ Γ(j+½)/Γ(j), so D_1 is √(π/2) times what √r has there (0.806 is often used, after
+                 Olson 1991)
 """
 
 from __future__ import annotations

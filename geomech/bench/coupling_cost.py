@@ -1,8 +1,9 @@
-"""What coupling costs beside the blocks: a wall of 1 000 bricks of which 100 hold a crack, and a specimen to coalescence.
+"""What coupling costs beside the blocks: a wall of 1 000 bricks of which 100 hold a crack, and a specimen to
+coalescence.
 
-The wall comes under its weight at once, in steps of 10 ms, and its rock is too tough for a crack to grow. Every step takes as
-many passes as the strain of the cracks needs to settle; a pass is a step of the blocks and a solution of every cracked brick.
-What a pass more or less is worth is told by time against error (`pass_tolerance`).
+The wall comes under its weight at once, in steps of 10 ms, and its rock is too tough for a crack to grow. Every step
+takes as many passes as the strain of the cracks needs to settle; a pass is a step of the blocks and a solution of every
+cracked brick. What a pass more or less is worth is told by time against error (`pass_tolerance`).
 """
 
 from __future__ import annotations
@@ -52,7 +53,8 @@ def wall(n: int, n_cracked: int) -> Problem:
 
 
 def of_wall(n: int, n_cracked: int, steps: int) -> dict:
-    """Medians over the passes of ``steps`` load steps after the first: seconds of the blocks' own and of the coupling."""
+    """Medians over the passes of ``steps`` load steps after the first: seconds of the blocks' own and of the
+    coupling."""
     from ..coupling import cycles
 
     problem = wall(n, n_cracked)
@@ -97,8 +99,8 @@ def of_specimen(repeats: int) -> dict:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``coupling.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: 200 bricks with 20 cracked, few steps, no
-    specimen."""
+    """The table; leaves ``coupling.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: 200 bricks with 20
+    cracked, few steps, no specimen."""
     from ..coupling.balance import DYNAMIC_TOLERANCE
     from ..render.work_precision import draw
 

@@ -19,7 +19,8 @@ PULL = np.array([0.0, 1.0, 0.0])
 
 
 def pulled(half_width: float, half_height: float, stress: float = 1.0, bending: float = 0.0):
-    """Uniform tension on both ends of a plate and a linear one, ``bending`` on the left and −``bending`` on the right."""
+    """Uniform tension on both ends of a plate and a linear one, ``bending`` on the left and −``bending`` on the
+    right."""
     from ..ddm import BodyLoad
 
     a, b, c, d = rectangle(half_width, half_height)

@@ -1,8 +1,9 @@
-"""Where the crack solver, and cracked blocks, stay right: maps over gap, kink, sliver, ligament, offset, order, increment,
-friction, stiffness contrast, penalty and time step.
+"""Where the crack solver, and cracked blocks, stay right: maps over gap, kink, sliver, ligament, offset, order,
+increment, friction, stiffness contrast, penalty and time step.
 
-References are closed forms, or were computed by distributed dislocations or boundary collocation. A cell asks for the error
-that the solver says it has (`ddm.Solution.tip_errors`), as who doubts a result would: a warning there makes it reported.
+References are closed forms, or were computed by distributed dislocations or boundary collocation. A cell asks for the
+error that the solver says it has (`ddm.Solution.tip_errors`), as who doubts a result would: a warning there makes it
+reported.
 """
 
 from __future__ import annotations

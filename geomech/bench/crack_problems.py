@@ -99,8 +99,8 @@ def arc_of_chords(segments: int) -> CrackProblem:
 
 
 def arc_of_tangents(segments: int) -> CrackProblem:
-    """The same as the polygon of tangents in Chebyshev points, tips among them: a chord has the wrong direction at a tip,
-    and the arc is followed best where it counts."""
+    """The same as the polygon of tangents in Chebyshev points, tips among them: a chord has the wrong direction at a
+    tip, and the arc is followed best where it counts."""
     touching = math.pi / 2 - math.pi / 4 * np.cos(np.linspace(0, math.pi, segments))
     between, half = 0.5 * (touching[1:] + touching[:-1]), 0.5 * np.diff(touching)
     corners = np.column_stack([np.cos(between), np.sin(between)]) / np.cos(half)[:, None]
@@ -124,8 +124,8 @@ def random_cracks() -> CrackProblem:
 
 
 def with_reference(problem: CrackProblem, quick: bool = False) -> CrackProblem:
-    """The problem with order 10 on half again as many elements, graded finely, for its reference; ``quick``: order 8 on as many as
-    ever, 1e-7 from that at most."""
+    """The problem with order 10 on half again as many elements, graded finely, for its reference; ``quick``: order 8 on
+    as many as ever, 1e-7 from that at most."""
     if problem.reference is not None:
         return problem
     order, elements, sides, layers = (8, 4, 6, 6) if quick else (10, 6, 9, 8)

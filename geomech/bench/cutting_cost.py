@@ -1,7 +1,7 @@
 """What it costs to cut rock into blocks: networks of 10² to 10⁵ blocks, blocks a second, memory, exponent.
 
-Processor time of one thread, which neighbours on the machine disturb less than a clock; the shortest of some repeats. What is
-cut is checked: the blocks' areas add up to the rock's.
+Processor time of one thread, which neighbours on the machine disturb less than a clock; the shortest of some repeats.
+What is cut is checked: the blocks' areas add up to the rock's.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ ROCK = np.array([[0.0, 0.0], [SIDE, 0.0], [SIDE, SIDE], [0.0, SIDE]])
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds to make the joints of ``network`` and to cut them; ``memory`` of the process at its peak so far, MB; ``lost``,
-    the rock's area that no block has, relative."""
+    """Seconds to make the joints of ``network`` and to cut them; ``memory`` of the process at its peak so far, MB;
+    ``lost``, the rock's area that no block has, relative."""
 
     network: str
     blocks: int
@@ -92,7 +92,8 @@ def cost(network: str, n: int, repeats: int) -> Cost:
 
 
 def exponent(costs: list[Cost]) -> float:
-    """Of the seconds of cutting in the number of blocks, by regression from the second size on: the first is all overhead."""
+    """Of the seconds of cutting in the number of blocks, by regression from the second size on: the first is all
+    overhead."""
     n, seconds = np.log([c.blocks for c in costs[1:]]), np.log([c.cutting for c in costs[1:]])
     return float(np.polyfit(n, seconds, 1)[0])
 

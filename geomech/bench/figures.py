@@ -28,7 +28,8 @@ ERROR, TIME = "error", "time"
 WORSE = 1.1
 #: … and above round-off, which differs among machines and libraries. Errors below `EXACT` may be as large as that.
 EXACT = 1e-9
-#: A time is longer when it is more than so many times what it was: medians on a machine with other users vary by a third.
+#: A time is longer when it is more than so many times what it was: medians on a machine with other users vary by a
+#: third.
 LONGER = 1.5
 
 #: Distributions whose versions are told.
@@ -96,18 +97,19 @@ def said(about: dict) -> str:
 
 
 def stopwatch() -> Callable[[], float]:
-    """Starts; what it returns tells the seconds since then, by the clock or of this process's processors, whichever are fewer.
+    """Starts; what it returns tells the seconds since then, by the clock or of this process's processors, whichever are
+    fewer.
 
-    Waiting while other programs have the processor is left out so; work on several threads is still told by the clock. Not
-    for what waits for a disk or for a child process.
+    Waiting while other programs have the processor is left out so; work on several threads is still told by the clock.
+    Not for what waits for a disk or for a child process.
     """
     clock, processor = time.perf_counter(), time.process_time()
     return lambda: min(time.perf_counter() - clock, time.process_time() - processor)
 
 
 def processor_seconds() -> float:
-    """Of this process and of its children that have ended, user and system; of this process alone where the system tells no
-    more."""
+    """Of this process and of its children that have ended, user and system; of this process alone where the system
+    tells no more."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
 
@@ -159,8 +161,8 @@ def write(
 
 
 def read(path: Path, *, quick: bool | None = None) -> dict:
-    """What `write` wrote. Raises FileNotFoundError, and ValueError for a file of something else, or of a run that was ``quick`` where
-    this one is not (or the other way round): figures of the same name are then of other sizes."""
+    """What `write` wrote. Raises FileNotFoundError, and ValueError for a file of something else, or of a run that was
+    ``quick`` where this one is not (or the other way round): figures of the same name are then of other sizes."""
     try:
         told = json.loads(Path(path).read_text(encoding="utf-8"))
     except json.JSONDecodeError as error:

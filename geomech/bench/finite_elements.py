@@ -121,7 +121,8 @@ def _energy_release(field, q, dx) -> float:
 
 
 def _interaction(field, q, x, turn, mode: int, dx) -> float:
-    """K of ``mode`` 0 or 1: E'/2 times the interaction integral with Williams' field of that mode, in the tip's frame."""
+    """K of ``mode`` 0 or 1: E'/2 times the interaction integral with Williams' field of that mode, in the tip's
+    frame."""
     gradient = np.einsum("ac,cd...,bd->ab...", turn, field.grad, turn, optimize=True)
     dq = np.einsum("ac,c...->a...", turn, q.grad)
     other = _williams_gradient(x, mode)
@@ -133,7 +134,8 @@ def _interaction(field, q, x, turn, mode: int, dx) -> float:
 
 
 def _williams_gradient(x: np.ndarray, mode: int) -> np.ndarray:
-    """(2, 2, …) ∂u_i/∂x_j of the singular field with K = 1 (Williams 1957), by the complex potential φ' = K/(2√(2πz))."""
+    """(2, 2, …) ∂u_i/∂x_j of the singular field with K = 1 (Williams 1957), by the complex potential φ' =
+    K/(2√(2πz))."""
     z = x[0] + 1j * x[1]
     kappa, mu = 3 - 4 * ROCK.effective_poissons_ratio, ROCK.shear_modulus
     k = 1.0 if mode == 0 else -1j

@@ -1,9 +1,9 @@
-"""Random slopes, jointed and cracked (`random_slopes`), run end to end with what must hold of any scene held against every
-cycle (`slope_invariants`).
+"""Random slopes, jointed and cracked (`random_slopes`), run end to end with what must hold of any scene held against
+every cycle (`slope_invariants`).
 
-A slope is `RIGHT`; `REPORTED`: something did not hold, and a warning of the run says so; `REFUSED` for one of the `refusals`;
-`LONG`: its time was up, and all held until then; or `WRONG`: something did not hold in silence, or another error came.
-Seconds are those of the processor, so that the verdict does not depend on what else runs.
+A slope is `RIGHT`; `REPORTED`: something did not hold, and a warning of the run says so; `REFUSED` for one of the
+`refusals`; `LONG`: its time was up, and all held until then; or `WRONG`: something did not hold in silence, or another
+error came. Seconds are those of the processor, so that the verdict does not depend on what else runs.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ PARTS = ("model", "shapes", "scene", "dda", "ddm", "coupling")
 
 @dataclass(frozen=True)
 class Watched:
-    """What became of a ``seed``: ``reason`` is the name of that of a refusal, ``message`` the error's; ``faults`` (in silence)
-    and ``told`` (a warning says so) name the cycle; ``worst`` of every invariant's quantity."""
+    """What became of a ``seed``: ``reason`` is the name of that of a refusal, ``message`` the error's; ``faults`` (in
+    silence) and ``told`` (a warning says so) name the cycle; ``worst`` of every invariant's quantity."""
 
     seed: int
     verdict: str
@@ -81,7 +81,8 @@ class _TimeUp(BaseException):
 
 
 def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watched:
-    """Load and run the scene of a ``seed`` (or ``text``) for at most so many processor ``seconds``, every cycle checked."""
+    """Load and run the scene of a ``seed`` (or ``text``) for at most so many processor ``seconds``, every cycle
+    checked."""
     from ..coupling import cycles
     from ..scene import load_scene
 
@@ -135,7 +136,8 @@ class _Heard(logging.Handler):
 
 @contextmanager
 def _at_most(seconds: float) -> Iterator[None]:
-    """Raises `_TimeUp`, saying where it was, after so many ``seconds`` of the processor; where there are no timers, never."""
+    """Raises `_TimeUp`, saying where it was, after so many ``seconds`` of the processor; where there are no timers,
+    never."""
     if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -162,8 +164,8 @@ def measure(quick: bool = False) -> Measured:
 def measure_many(
     seeds: Sequence[int], seconds: float = LIMIT, folder: Path = FOLDER, workers: int | None = None
 ) -> Measured:
-    """What became of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture go to ``folder``. Seeds that the same
-    program has run before, as the rows there tell, are not run again."""
+    """What became of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture go to ``folder``.
+    Seeds that the same program has run before, as the rows there tell, are not run again."""
     from ..render.slope_outcomes import draw
 
     program, rows = _program(), folder / "slopes.jsonl"

@@ -1,4 +1,5 @@
-"""What an element–point pair costs: influence matrices and fields, one thread, near and far pairs, all kinds of elements."""
+"""What an element–point pair costs: influence matrices and fields, one thread, near and far pairs, all kinds of
+elements."""
 
 from __future__ import annotations
 

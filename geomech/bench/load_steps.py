@@ -1,7 +1,7 @@
 """Fixed load steps against steps from event to event: the two-crack specimen to coalescence, its loads and their cost.
 
-Fixed steps find an event at the end of the step in which it comes about, so that loads are right to a step; steps to events
-find the load itself, whatever the longest step.
+Fixed steps find an event at the end of the step in which it comes about, so that loads are right to a step; steps to
+events find the load itself, whatever the longest step.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class Point:
 
 
 def of_run(overrides: list[str], repeats: int) -> dict:
-    """Loads of the events (Pa), number of cycles and of solutions of cracked blocks, shortest time of ``repeats`` (s)."""
+    """Loads of the events (Pa), number of cycles and of solutions of cracked blocks, shortest time of ``repeats``
+    (s)."""
     from ..pipeline import cycles
     from ..scene import load_scene
 
@@ -53,7 +54,8 @@ def of_run(overrides: list[str], repeats: int) -> dict:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``steps.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: two fixed steps, once each."""
+    """The table; leaves ``steps.json`` and ``work_precision.png`` in `FOLDER`. ``quick``: two fixed steps, once
+    each."""
     from ..render.work_precision import draw
 
     if not SCENE.exists():

@@ -1,7 +1,8 @@
 """What a command loads before it does anything: modules by layer, heavy libraries, and the kernels that it compiles.
 
-Python tells the time of every import (``-X importtime``); Numba leaves an index file for every function it compiled. A command
-is cold when what it loads has to come from the disk: the files of the packages are put out of the system's memory before.
+Python tells the time of every import (``-X importtime``); Numba leaves an index file for every function it compiled. A
+command is cold when what it loads has to come from the disk: the files of the packages are put out of the system's
+memory before.
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ def compiled(folder: Path) -> dict[str, int]:
 
 
 def table(commands: Mapping[str, Sequence[str]]) -> list[str]:
-    """A line a command: seconds by layer, heavy libraries loaded. A run's folder is ``RUN`` for those that come after it."""
+    """A line a command: seconds by layer, heavy libraries loaded. A run's folder is ``RUN`` for those that come after
+    it."""
     lines = ["imports by layer, ms (each module's own time, told by Python, which slows them)"]
     with tempfile.TemporaryDirectory() as scratch:
         for label, arguments in commands.items():
@@ -77,8 +79,9 @@ def table(commands: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def seconds(command: Sequence[str], environment: Mapping[str, str] | None = None) -> float:
-    """Of ``command`` from launch to exit, by the clock or of the processors (the process's own and its children's), whichever are
-    fewer: waiting while other programs have the processor is left out. Raises subprocess.CalledProcessError when it fails."""
+    """Of ``command`` from launch to exit, by the clock or of the processors (the process's own and its children's),
+    whichever are fewer: waiting while other programs have the processor is left out. Raises
+    subprocess.CalledProcessError when it fails."""
     clock, before = time.perf_counter(), os.times()
     subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     waited, after = time.perf_counter() - clock, os.times()
@@ -88,8 +91,8 @@ def seconds(command: Sequence[str], environment: Mapping[str, str] | None = None
 
 
 def put_out_of_memory(names: Sequence[str] = ("geomech", *HEAVY, "numpy", "llvmlite")) -> float | None:
-    """Have the system forget the files of packages, as far as no other program uses them: their size, MB; None where it cannot be
-    asked to."""
+    """Have the system forget the files of packages, as far as no other program uses them: their size, MB; None where it
+    cannot be asked to."""
     if not hasattr(os, "posix_fadvise"):
         return None
     size = 0
@@ -111,8 +114,8 @@ def put_out_of_memory(names: Sequence[str] = ("geomech", *HEAVY, "numpy", "llvml
 
 
 def kernels(scenes: Mapping[str, Sequence[str]], environment: Mapping[str, str]) -> list[str]:
-    """A line a scene: the kernels that its run compiles into an empty cache, by package, and `seconds` of that and of the
-    next run."""
+    """A line a scene: the kernels that its run compiles into an empty cache, by package, and `seconds` of that and of
+    the next run."""
     lines = ["kernels compiled by a first run (seconds of it, and of the next)"]
     for label, arguments in scenes.items():
         with tempfile.TemporaryDirectory() as cache:

@@ -1,7 +1,7 @@
 """Hundreds of cracks: iterating on compressed equations beside factoring them.
 
-Cracks of lengths 1 to 6 in the infinite plane, each in a cell of its own, under one load that opens them; processor time of
-one thread or more, matrices and solution together, a body made anew.
+Cracks of lengths 1 to 6 in the infinite plane, each in a cell of its own, under one load that opens them; processor
+time of one thread or more, matrices and solution together, a body made anew.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import numpy as np
 
 from .figures import Measured
 
-#: Cracks are the squares of these; networks beyond ``FACTORED`` cracks a side are not factored (minutes, many gigabytes).
+#: Cracks are the squares of these; networks beyond ``FACTORED`` cracks a side are not factored (minutes, many
+#: gigabytes).
 SIDES, FACTORED = (5, 7, 11, 16, 23, 36), 16
 
 

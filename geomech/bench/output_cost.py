@@ -1,8 +1,10 @@
-"""What writing a large run costs: a wall of 10 000 bricks over 500 cycles, beside the steps themselves and beside other writers.
+"""What writing a large run costs: a wall of 10 000 bricks over 500 cycles, beside the steps themselves and beside other
+writers.
 
-A run of some steps says what a step costs while blocks move; its last cycle is then written as often as a long run would, moved
-on a little from one to the next, so that every number in the files is another. The share of writing is that of a cycle's writing
-in a step and its writing, both in seconds of processor, as if nothing were done side by side; the run itself waits for less.
+A run of some steps says what a step costs while blocks move; its last cycle is then written as often as a long run
+would, moved on a little from one to the next, so that every number in the files is another. The share of writing is
+that of a cycle's writing in a step and its writing, both in seconds of processor, as if nothing were done side by side;
+the run itself waits for less.
 """
 
 from __future__ import annotations
@@ -30,9 +32,9 @@ SHARE = 0.1
 
 @dataclass(frozen=True)
 class Written:
-    """What `blocks` over so many ``cycles`` came to: seconds that the run waited a cycle and ``processor`` seconds of all threads a
-    cycle, bytes of its files a cycle and of the blocks' file a cell, and bytes of arrays (before they are packed) a second until
-    all was on disk, by the clock and of the processor."""
+    """What `blocks` over so many ``cycles`` came to: seconds that the run waited a cycle and ``processor`` seconds of
+    all threads a cycle, bytes of its files a cycle and of the blocks' file a cell, and bytes of arrays (before they are
+    packed) a second until all was on disk, by the clock and of the processor."""
 
     blocks: int
     cells: int

@@ -1,7 +1,9 @@
-"""How far blocks and cracks must agree: time and error of a wall with cracked bricks by the tolerance of the coupling's passes.
+"""How far blocks and cracks must agree: time and error of a wall with cracked bricks by the tolerance of the coupling's
+passes.
 
-A step is repeated until the strain of every brick's cracks is the one that the blocks were moved with, to a tolerance. A loose one
-takes a single pass, as staggered schemes do; the error is that of the stress intensity factors, against a tolerance of 1e-9.
+A step is repeated until the strain of every brick's cracks is the one that the blocks were moved with, to a tolerance.
+A loose one takes a single pass, as staggered schemes do; the error is that of the stress intensity factors, against a
+tolerance of 1e-9.
 """
 
 from __future__ import annotations

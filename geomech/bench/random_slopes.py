@@ -8,8 +8,8 @@ import numpy as np
 
 
 def scene_text(seed: int) -> str:
-    """The scene file of a ``seed``: outline, joint sets whose dead ends are cracks, rock, laws, water, in-situ stress, shaking,
-    static or dynamic, fixed steps or events."""
+    """The scene file of a ``seed``: outline, joint sets whose dead ends are cracks, rock, laws, water, in-situ stress,
+    shaking, static or dynamic, fixed steps or events."""
     rng = np.random.default_rng(seed)
     face, width, height = _outline(rng)
     base = [

@@ -10,8 +10,8 @@ from .. import dda, ddm
 
 @dataclass(frozen=True)
 class Reason:
-    """Errors of ``kind`` whose message has ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence; ``drawn``: only before
-    anything has moved or grown."""
+    """Errors of ``kind`` whose message has ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence;
+    ``drawn``: only before anything has moved or grown."""
 
     name: str
     kind: type[Exception]
@@ -74,7 +74,8 @@ REASONS = (
 
 
 def reason_of(error: Exception, begun: bool = True) -> str | None:
-    """The name of the reason that ``error`` gives, before or (``begun``) after the first cycle; None: it is none of `REASONS`."""
+    """The name of the reason that ``error`` gives, before or (``begun``) after the first cycle; None: it is none of
+    `REASONS`."""
     for reason in REASONS:
         fits = type(error) is reason.kind and not (begun and reason.drawn)
         if fits and re.search(reason.pattern, str(error)):

@@ -1,7 +1,8 @@
 """What a scene does not need is not done: what each of these skips saves, and that its results are the same.
 
-Every row is the same work twice in one process, without the skip and with it, the shorter of two times each (once in a quick run); the difference is
-the largest of the states' coordinates and stress intensity factors, relative. Modules are counted in processes of their own.
+Every row is the same work twice in one process, without the skip and with it, the shorter of two times each (once in a
+quick run); the difference is the largest of the states' coordinates and stress intensity factors, relative. Modules are
+counted in processes of their own.
 """
 
 from __future__ import annotations
@@ -129,7 +130,8 @@ def _written(problem: Problem, interior: bool) -> Results:
 
 
 def _searches(skip: bool) -> Results:
-    """Pairs of blocks at rest but for a thousandth of the window a time, sought anew or kept; each list as a set of results."""
+    """Pairs of blocks at rest but for a thousandth of the window a time, sought anew or kept; each list as a set of
+    results."""
     from ..dda import near_pairs
 
     blocks = block_scenes.wall(1000)

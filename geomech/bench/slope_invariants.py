@@ -16,8 +16,8 @@ from ..model import OPEN, Cycle, Problem
 
 @dataclass(frozen=True)
 class Invariant:
-    """``bound`` of a quantity that is relative to what ``meaning`` says; a run that goes beyond it is wrong, unless a warning
-    with one of the words ``told`` says so: in this step or the one before, or (``lasting``) in any before."""
+    """``bound`` of a quantity that is relative to what ``meaning`` says; a run that goes beyond it is wrong, unless a
+    warning with one of the words ``told`` says so: in this step or the one before, or (``lasting``) in any before."""
 
     meaning: str
     bound: float
@@ -25,7 +25,8 @@ class Invariant:
     lasting: bool = True
 
 
-#: A block and cracks that do not agree strain too much, lie in their neighbours, and are out of balance by their strain.
+#: A block and cracks that do not agree strain too much, lie in their neighbours, and are out of balance by their
+#: strain.
 _HANGS, _STRAINED = "no common strain", "beyond the elastic range"
 
 INVARIANTS = {
@@ -55,8 +56,8 @@ INVARIANTS = {
 
 
 class Invariants:
-    """The cycles so far: ``worst`` of every quantity, ``faults`` of what went beyond its bound without a word, and those
-    that a warning ``told`` of. ``heard`` gives the warnings so far."""
+    """The cycles so far: ``worst`` of every quantity, ``faults`` of what went beyond its bound without a word, and
+    those that a warning ``told`` of. ``heard`` gives the warnings so far."""
 
     def __init__(self, problem: Problem, heard: Callable[[], list[str]]) -> None:
         self.heard = heard
@@ -117,8 +118,8 @@ class Invariants:
     def _balance(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
         told = cycle.statistics
         yield "motion", told.get("unbalanced", 0.0), "the blocks"
-        # Contacts that are pressed in, or stand apart, act off the outlines by as much; strained blocks, by their corners' angles.
-        # (Found: up to 0.5 of the strain at the start of the step.)
+        # Contacts that are pressed in, or stand apart, act off the outlines by as much; strained blocks, by their
+        # corners' angles. (Found: up to 0.5 of the strain at the start of the step.)
         yield "balance", told.get("traction_imbalance", 0.0), "cracked blocks"
         yield "agreement", told.get("compliance_mismatch", 0.0), "cracked blocks"
         # As the budget counts it: works, or what is stored where next to nothing moves.

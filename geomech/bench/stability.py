@@ -1,8 +1,8 @@
-"""Where the solvers stay right. The block solver: maps over penalty, time step, contrasts, slivers, offsets, overlaps, speeds,
-debris; cracks and cracked blocks: `crack_limits`.
+"""Where the solvers stay right. The block solver: maps over penalty, time step, contrasts, slivers, offsets, overlaps,
+speeds, debris; cracks and cracked blocks: `crack_limits`.
 
-Every cell is a small scene with a reference that was not computed with it: right (within the bound said), refused with a
-reason, reported (beyond the bound, and a warning says so), or wrong. The bounds leave room for true elasticity only.
+Every cell is a small scene with a reference that was not computed with it: right (within the bound said), refused with
+a reason, reported (beyond the bound, and a warning says so), or wrong. The bounds leave room for true elasticity only.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from .stability_grid import QUANTITIES, REFUSED, REPORTED, RIGHT, WRONG, Map, ta
 
 
 def measure(quick: bool = False) -> Measured:
-    """The maps as text; JSON and pictures of the verdicts, and of condition numbers, residuals, energy gained and penetration
-    go to outputs/stability. ``quick`` takes every other value and fewer steps, and draws the
+    """The maps as text; JSON and pictures of the verdicts, and of condition numbers, residuals, energy gained and
+    penetration go to outputs/stability. ``quick`` takes every other value and fewer steps, and draws the
     verdicts only."""
     from ..render.stability_map import draw, draw_quantity
 

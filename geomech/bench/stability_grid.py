@@ -1,7 +1,7 @@
 """A grid of small scenes with a reference each, and what became of them.
 
-Every cell is right (within the bound said), refused with a reason, reported (beyond the bound, and a warning says so), or
-wrong.
+Every cell is right (within the bound said), refused with a reason, reported (beyond the bound, and a warning says so),
+or wrong.
 """
 
 from __future__ import annotations

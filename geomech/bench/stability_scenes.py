@@ -22,8 +22,9 @@ WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a scene did: ``error`` in the measure that its map states; ``penetration`` in block sizes; ``gain`` of mechanical
-    energy over all there was; ``cuts`` of steps; ``condition`` number and ``residual`` of the equations. nan: there are none."""
+    """What a scene did: ``error`` in the measure that its map states; ``penetration`` in block sizes; ``gain`` of
+    mechanical energy over all there was; ``cuts`` of steps; ``condition`` number and ``residual`` of the equations.
+    nan: there are none."""
 
     error: float
     penetration: float = math.nan

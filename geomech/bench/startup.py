@@ -1,7 +1,7 @@
 """Whole-process times of the things a user waits for: imports, `check`, a specimen run to its end, the first run.
 
-From launch to exit of a fresh Python, medians of repeated runs (`loading.seconds`). The first run compiles the kernels into an
-empty cache; all others find them compiled. A cold start is told by the clock.
+From launch to exit of a fresh Python, medians of repeated runs (`loading.seconds`). The first run compiles the kernels
+into an empty cache; all others find them compiled. A cold start is told by the clock.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from .figures import Measured
 
 PIPELINE = Path("pipelines/two_cracks")
 
-#: What is told by layers: a scene drawn in its file, one drawn in Gmsh, runs of blocks alone and of cracks, and what is done with
-#: them. Of a quick run only the first and the run of cracks.
+#: What is told by layers: a scene drawn in its file, one drawn in Gmsh, runs of blocks alone and of cracks, and what is
+#: done with them. Of a quick run only the first and the run of cracks.
 COMMANDS = {
     "--help": ["--help"],
     "check, drawn in TOML": ["check", str(PIPELINE / "toml.toml")],
@@ -71,7 +71,8 @@ def measure(quick: bool = False) -> Measured:
         if not quick:
             cold = [_cold([*geomech, "check", str(PIPELINE)]) for _ in range(3)]
             rows.append(("the same, cold: libraries read from the disk, by the clock", statistics.median(cold)))
-        # Each into a folder of its own: files that are there already are written over, which is quicker than making them.
+        # Each into a folder of its own: files that are there already are written over, which is quicker than making
+        # them.
         for phi in (0,) if quick else (0, 30, 60, 90):
             count = 1 if quick else 3 if phi in (0, 90) else 2
             times = [loading.seconds(run(phi, f"phi_{phi}_{k}")) for k in range(count)]

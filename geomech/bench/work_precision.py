@@ -1,7 +1,9 @@
-"""Run time against error of the stress intensity factors: this solver, constant and quadratic elements, finite elements.
+"""Run time against error of the stress intensity factors: this solver, constant and quadratic elements, finite
+elements.
 
 Everything is timed in one run of one process: assembly and solution from nothing (mesh included), the median of three
-repetitions or more after one that is not counted, which the error is of. The error is the largest of any tip's K_I or K_II, relative to the largest K.
+repetitions or more after one that is not counted, which the error is of. The error is the largest of any tip's K_I or
+K_II, relative to the largest K.
 """
 
 from __future__ import annotations
@@ -42,8 +44,8 @@ METHODS = (OURS, ASKED, LOW, QUADRATIC, FITTED, CALIBRATED, FEM)
 ONE_CRACK_S, SPECIMEN_S, RATIO, ERROR = 1e-3, 30e-3, 200.0, 1e-4
 #: Seconds that a method's last point may take about.
 LONGEST = 4.0
-#: Orders of this solver, digits asked for, elements of a crack of other methods, refinements of finite elements; those of a quick
-#: run for single cracks, bodies, and many cracks.
+#: Orders of this solver, digits asked for, elements of a crack of other methods, refinements of finite elements; those
+#: of a quick run for single cracks, bodies, and many cracks.
 ORDERS, DIGITS, COUNTS, REFINEMENTS = range(2, 11), range(2, 9), [2**k for k in range(2, 13)], (1, 2, 3, 4)
 QUICK_ORDERS = {"arc": (2, 4, 6), "50 random cracks": (2, 3, 4)}
 QUICK_DIGITS = {"arc": (2, 4), "50 random cracks": (2, 4)}
@@ -65,8 +67,9 @@ class Point:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes few sizes, the same ones on
-    every machine; else constant elements are given `RATIO` times this solver's time to `ERROR` at least."""
+    """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes few sizes, the
+    same ones on every machine; else constant elements are given `RATIO` times this solver's time to `ERROR` at
+    least."""
     from ..render.work_precision import draw
 
     points = [point for name in PROBLEMS for point in _curves(name, quick)]
@@ -92,8 +95,9 @@ def measure(quick: bool = False) -> Measured:
 
 
 def timed(work: Callable[[], Found]) -> tuple[Found, float]:
-    """What ``work`` gives, and the seconds that it takes when it is done again: the median of three times, or of as many as a
-    twentieth of a second has room for; that of the first alone where it takes more than a third of a second."""
+    """What ``work`` gives, and the seconds that it takes when it is done again: the median of three times, or of as
+    many as a twentieth of a second has room for; that of the first alone where it takes more than a third of a
+    second."""
     spent_on = stopwatch()
     found = work()
     first = spent_on()
@@ -108,8 +112,8 @@ def timed(work: Callable[[], Found]) -> tuple[Found, float]:
 
 
 def _curves(name: str, quick: bool) -> Iterator[Point]:
-    """The sizes of a quick run, or `LONGEST` s a method, but constant elements `RATIO` times this solver's time to `ERROR` where
-    that is longer."""
+    """The sizes of a quick run, or `LONGEST` s a method, but constant elements `RATIO` times this solver's time to
+    `ERROR` where that is longer."""
     orders, digits = (
         (QUICK_ORDERS.get(name, (2, 3, 4, 6, 8)), QUICK_DIGITS.get(name, (2, 4, 6))) if quick else (ORDERS, DIGITS)
     )
@@ -155,7 +159,8 @@ def _curves(name: str, quick: bool) -> Iterator[Point]:
 def _constant_elements(
     name: str, problem: CrackProblem | None, low: float, counts: Sequence[int], longest: float | None
 ) -> list[Point]:
-    """Both ways to K from one solution each: with the ``counts`` of elements, or on until the last takes ``longest`` s."""
+    """Both ways to K from one solution each: with the ``counts`` of elements, or on until the last takes ``longest``
+    s."""
     rows: dict[str, list[Point]] = {FITTED: [], CALIBRATED: []}
     n, rest = counts[0], iter(counts[1:])
     while True:
@@ -237,8 +242,8 @@ def own_time(points: list[Point], problem: str, error: float) -> float | None:
 
 
 def extrapolated(points: list[Point], problem: str, method: str, error: float) -> float | None:
-    """Time at which ``method`` would come down to ``error`` if its error went on falling with its unknowns as between its
-    last two points, and its time grew no faster than they; None where the error does not fall."""
+    """Time at which ``method`` would come down to ``error`` if its error went on falling with its unknowns as between
+    its last two points, and its time grew no faster than they; None where the error does not fall."""
     curve = sorted((p for p in points if (p.problem, p.method) == (problem, method)), key=lambda p: p.size)[-2:]
     if len(curve) < 2:
         return None

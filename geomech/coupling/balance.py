@@ -1,5 +1,5 @@
-"""One pass at one load: the blocks move, their forces load the cracked ones, and the strain that cracks bring is the one
-that the blocks assumed."""
+"""One pass at one load: the blocks move, their forces load the cracked ones, and the strain that cracks bring is the
+one that the blocks assumed."""
 
 from __future__ import annotations
 
@@ -20,29 +20,31 @@ from .side_by_side import side_by_side
 #: block's strain.
 COMPLIANCE_TOLERANCE = 1e-6
 
-#: … in dynamics this one: what is left is corrected by the next of many steps, and far below what a toughness is known to.
+#: … in dynamics this one: what is left is corrected by the next of many steps, and far below what a toughness is known
+#: to.
 DYNAMIC_TOLERANCE = 1e-4
 
-#: Strains below this part of the largest one in a cracked block are not asked to agree better than that one's: a block in
-#: free flight has hardly any.
+#: Strains below this part of the largest one in a cracked block are not asked to agree better than that one's: a block
+#: in free flight has hardly any.
 STILL = 1e-3
 
-#: Passes at one geometry; they agree after two to eight, or some more where faces open and close. A lag that is left is corrected by
-#: the next step.
+#: Passes at one geometry; they agree after two to eight, or some more where faces open and close. A lag that is left is
+#: corrected by the next step.
 COMPLIANCE_PASSES = 20
 
 #: After so many of them blocks whose forces and strain still chase each other are taken to hang (`hanging`).
 PATIENCE = 10
 
-#: Larger lags than this are no state: a shorter step is tried, in which inertia leaves strain less to do, so many times by half.
+#: Larger lags than this are no state: a shorter step is tried, in which inertia leaves strain less to do, so many times
+#: by half.
 NO_ANSWER = 0.1
 SHORTER = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The step of the blocks, the solutions of the cracked ones (block → `ddm.Solution`), their TIP rows with the criterion's
-    angle and K_eq, and how well the two solvers agree."""
+    """The step of the blocks, the solutions of the cracked ones (block → `ddm.Solution`), their TIP rows with the
+    criterion's angle and K_eq, and how well the two solvers agree."""
 
     result: StepResult
     solutions: dict
@@ -53,9 +55,9 @@ class Balance:
 def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     """DDA step, boundary loads, DDM solves, until the crack strain that DDA assumed is the one DDM finds.
 
-    ``load_time``: when the loads are those of that time, whatever step the blocks take; it then is the new time. Of ``now``
-    the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`, also where blocks and cracks agree at no
-    step.
+    ``load_time``: when the loads are those of that time, whatever step the blocks take; it then is the new time. Of
+    ``now`` the response, loads, solutions and statistics are renewed, nothing else. Raises `dda.NotConverged`, also
+    where blocks and cracks agree at no step.
     """
     begun, static = now.response, now.system.scheme.static
     # At rest nothing is taken to hang for its softness (`hanging`), but where there is no answer without it.
@@ -74,7 +76,8 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 
 
 def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool) -> tuple[Balance, np.ndarray]:
-    """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative strain)."""
+    """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative
+    strain)."""
     settling = Settling()
     static = now.system.scheme.static
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
@@ -130,8 +133,8 @@ def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
 def _take_response(
     now: CrackedBlocks, state: State, settling: Settling, tolerance: float
 ) -> tuple[dda.CrackResponse, np.ndarray]:
-    """What the next pass should assume, and how far off the last assumption was in each cracked block (relative strain). Sets what
-    the next step should begin with."""
+    """What the next pass should assume, and how far off the last assumption was in each cracked block (relative
+    strain). Sets what the next step should begin with."""
     blocks = np.array(list(now.solutions), int)
     with now.timed("compliance"):
         answers = _answers(now, state)

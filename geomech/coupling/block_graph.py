@@ -106,7 +106,8 @@ class BlockGraph:
         )
 
     def closes(self) -> bool:
-        """Whether the cracks, with each boundary loop shrunk to a point, hold a cycle: only then do they divide rock."""
+        """Whether the cracks, with each boundary loop shrunk to a point, hold a cycle: only then do they divide
+        rock."""
         root = list(range(len(self.points)))
 
         def find(n: int) -> int:

@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 def elastic_bodies(
     problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, works: list[Work], removed: np.ndarray | None = None
 ) -> tuple[dict[int, Body], dict[int, np.ndarray]]:
-    """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole network.
-    What keeps a fixed block in place, and so what strains it, is not known; what is ``removed`` (n_blocks,) is not there.
+    """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole
+    network. What keeps a fixed block in place, and so what strains it, is not known; what is ``removed`` (n_blocks,) is
+    not there.
 
-    ``kept``: earlier bodies of the same blocks. Those of which nothing has changed are taken as they are, of others whatever
-    has not is reused; the rest is made side by side. ``works``: the counts of what was done, of bodies without an earlier one
-    new ones at the end.
+    ``kept``: earlier bodies of the same blocks. Those of which nothing has changed are taken as they are, of others
+    whatever has not is reused; the rest is made side by side. ``works``: the counts of what was done, of bodies without
+    an earlier one new ones at the end.
     """
     cracked = np.arange(blocks.n_blocks) if problem.growth.initiation else np.unique(cracks.block)
     rigid = np.array([m.rigid for m in problem.materials], bool)
@@ -73,8 +74,8 @@ def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
 def boundary_loads(
     problem: Problem, blocks: Blocks, state: State, motion: Motion, result, bodies: dict
 ) -> dict[int, BoundaryLoad]:
-    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on that
-    geometry the forces are in equilibrium."""
+    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on
+    that geometry the forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
     strengths = [joint.tensile_strength for joint in problem.joints]
     acting = beside_acting(result.contacts, blocks.n_blocks)
@@ -130,9 +131,10 @@ def solve_bodies(
     names: Sequence[str] = (),
 ) -> dict:
     """block → solution of its body, side by side; ``warm``: earlier solutions, whose face states are the first guess;
-    ``history``: what crack faces with friction remember of the load step before. An earlier solution of the same geometry
-    under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same, too, and nothing is to be worked
-    out anew (``skip``). Raises what `ddm.Body.solve` raises, with the block's name, of ``names``, before it."""
+    ``history``: what crack faces with friction remember of the load step before. An earlier solution of the same
+    geometry under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same,
+    too, and nothing is to be worked out anew (``skip``). Raises what `ddm.Body.solve` raises, with the block's name, of
+    ``names``, before it."""
     from .. import ddm
 
     solved_from = {} if solved_from is None else solved_from
@@ -155,8 +157,8 @@ def solve_bodies(
     return dict(zip(bodies, side_by_side(solved, list(bodies), threads_for(bodies))))
 
 
-#: Unknowns of a body from which solving it on a thread of its own pays: what is smaller takes about a millisecond, most of it
-#: in the interpreter, and threads then wait for each other (a fourth slower on two cores with 400 unknowns).
+#: Unknowns of a body from which solving it on a thread of its own pays: what is smaller takes about a millisecond, most
+#: of it in the interpreter, and threads then wait for each other (a fourth slower on two cores with 400 unknowns).
 LARGE = 1000
 
 

@@ -36,11 +36,12 @@ def turned_compliance(compliance: np.ndarray, angle: float) -> np.ndarray:
 
 
 def passive(compliance: np.ndarray) -> np.ndarray:
-    """``compliance`` (3, 3) without what would give energy back: the nearest positive semidefinite one, whatever the axes.
+    """``compliance`` (3, 3) without what would give energy back: the nearest positive semidefinite one, whatever the
+    axes.
 
-    Faces that slide under Coulomb's friction answer a normal stress with slip, but no shear stress with opening; the symmetric
-    part of such a response has a negative direction, in which a block, as soft as the rock or softer, would have no stiffness.
-    What is left out stays in the offset, and passes find it.
+    Faces that slide under Coulomb's friction answer a normal stress with slip, but no shear stress with opening; the
+    symmetric part of such a response has a negative direction, in which a block, as soft as the rock or softer, would
+    have no stiffness. What is left out stays in the offset, and passes find it.
     """
     size = np.array([1.0, 1.0, np.sqrt(0.5)])  # of Mandel's components, in which axes turn without change of length
     values, vectors = np.linalg.eigh(size[:, None] * compliance * size)

@@ -1,12 +1,12 @@
-"""Where the energy goes that blocks spend on their cracks: it is stored around them, rubbed off between their faces, released
-at their tips as they grow, and set free where blocks part.
+"""Where the energy goes that blocks spend on their cracks: it is stored around them, rubbed off between their faces,
+released at their tips as they grow, and set free where blocks part.
 
-The block solver knows the work of its mean stress on the strain of its cracks, A σ : dε_c. By Clapeyron's theorem a body with
-jumps [u] whose faces bear t where the same loads would bring t₀ without them stores ½ ∫ (t₀ − t)·[u] more; what a tip
-releases over an increment is ∫ G da, G = (K_I² + K_II²)/E' (Irwin 1957), by the trapezoidal rule of G before, of K_eq, for the
-way it turns, and after, each K once at the load of the step's end and once at that of its begin. So four quantities found apart
-from each other have to add up; what is left over is told. Over the steps of a run that leaves what uneven forces do: they open
-cracks, and blocks of one strain do not feel it.
+The block solver knows the work of its mean stress on the strain of its cracks, A σ : dε_c. By Clapeyron's theorem a
+body with jumps [u] whose faces bear t where the same loads would bring t₀ without them stores ½ ∫ (t₀ − t)·[u] more;
+what a tip releases over an increment is ∫ G da, G = (K_I² + K_II²)/E' (Irwin 1957), by the trapezoidal rule of G
+before, of K_eq, for the way it turns, and after, each K once at the load of the step's end and once at that of its
+begin. So four quantities found apart from each other have to add up; what is left over is told. Over the steps of a run
+that leaves what uneven forces do: they open cracks, and blocks of one strain do not feel it.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ class CrackEnergy:
     stored     around cracks, now
     friction   rubbed off between crack faces
     fracture   released at tips that grew
-    parting    released as tips met something and blocks parted: the last ligaments, and what the cracks stored that are walls now; and
-               as tips grew in blocks that hang (`hanging`), which spend less on it than ∫ G da under held forces
-    residual   work − stored − friction − fracture − parting: of increments and steps, and since blocks feel their cracks' mean
-               strain only
+    parting    released as tips met something and blocks parted: the last ligaments, and what the cracks stored that are
+               walls now; and as tips grew in blocks that hang (`hanging`), which spend less on it than ∫ G da under
+               held forces
+    residual   work − stored − friction − fracture − parting: of increments and steps, and since blocks feel their
+               cracks' mean strain only
     """
 
     work: float = 0.0
@@ -60,7 +61,8 @@ class CrackEnergy:
     _last: np.ndarray | None = None
 
     def passed(self, tips: np.ndarray, blocks: Blocks, materials: tuple[Material, ...], hanging: Hanging) -> None:
-        """A pass of the present step has ended with ``tips``, of which some are about to grow, or none; some are in blocks ``hanging``."""
+        """A pass of the present step has ended with ``tips``, of which some are about to grow, or none; some are in
+        blocks ``hanging``."""
         self._first = tips if self._first is None else self._first
         self._last = tips
         if not len(tips) or not (self._growing or (tips["grown"] > 0).any()):
@@ -77,7 +79,8 @@ class CrackEnergy:
             if key in now:
                 self._released += 0.5 * grown * share * (before + now[key])
             else:
-                # A tip that has met something: G rises without bound as the last ligament goes, its integral by no rule.
+                # A tip that has met something: G rises without bound as the last ligament goes, its integral by no
+                # rule.
                 self._parted = True
         turned = (tips["k_eq"] ** 2 / modulus).tolist()
         shares = self._shares()
@@ -88,9 +91,9 @@ class CrackEnergy:
         }
 
     def _shares(self) -> dict[_Key, float]:
-        """What part of a tip's G there is over the present step, in which its load has changed: K·K₀/K² with K₀ as the step
-        began. Passes grow tips by the load of the step's end, but they grow all the time; forces that rise by a part of
-        themselves would release that part too much."""
+        """What part of a tip's G there is over the present step, in which its load has changed: K·K₀/K² with K₀ as the
+        step began. Passes grow tips by the load of the step's end, but they grow all the time; forces that rise by a
+        part of themselves would release that part too much."""
         if self._began is None or self._first is None:
             return {}
         before = {key: (row["k_i"], row["k_ii"]) for key, row in zip(_keys(self._began), self._began)}
@@ -109,8 +112,8 @@ class CrackEnergy:
     def after(
         self, before: State, state: State, blocks: Blocks, felt: dict[int, tuple[float, Solution]], hanging: Hanging
     ) -> None:
-        """The step from ``before`` to ``state`` has been taken; ``felt`` at its end is block → (share, `ddm.Solution`), what blocks are strained by;
-        ``hanging`` are those that feel no more than their mean stress."""
+        """The step from ``before`` to ``state`` has been taken; ``felt`` at its end is block → (share, `ddm.Solution`),
+        what blocks are strained by; ``hanging`` are those that feel no more than their mean stress."""
         strain = state.crack_strain - before.crack_strain
         mean = 0.5 * (before.stress + state.stress)
         work = float(blocks.areas(before.vertices) @ np.sum(mean * strain, axis=1))

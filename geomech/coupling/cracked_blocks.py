@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 class CrackedBlocks:
     """What a load step begins with, and what its passes change.
 
-    ``state`` is that at the start of the step; ``problem`` has the loads as they are on the present blocks. ``number`` and
-    ``load_step`` count cycles and load steps. ``bodies`` (block → elastic body), ``nodes_of`` (block → its nodes in the whole
-    network), ``solutions``, ``loads`` and ``compliances`` are of the last pass; ``response`` is what the blocks are to
-    assume of their cracks, ``hanging`` which of them feel only their mean stress, ``acted`` the statistics of the last step, with what it
-    takes to move blocks.
+    ``state`` is that at the start of the step; ``problem`` has the loads as they are on the present blocks. ``number``
+    and ``load_step`` count cycles and load steps. ``bodies`` (block → elastic body), ``nodes_of`` (block → its nodes in
+    the whole network), ``solutions``, ``loads`` and ``compliances`` are of the last pass; ``response`` is what the
+    blocks are to assume of their cracks, ``hanging`` which of them feel only their mean stress, ``acted`` the
+    statistics of the last step, with what it takes to move blocks.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -79,7 +79,8 @@ class CrackedBlocks:
         self.bodies, self.nodes_of = self.bodies_of(self.cracks, self.bodies)
 
     def bodies_of(self, cracks: Cracks, kept: dict) -> tuple[dict, dict[int, np.ndarray]]:
-        """The elastic bodies that ``cracks`` would make of the present blocks, and their nodes; see `elastic_bodies`."""
+        """The elastic bodies that ``cracks`` would make of the present blocks, and their nodes; see
+        `elastic_bodies`."""
         with self.timed("ddm assembly"):
             return elastic_bodies(self.problem, self.blocks, cracks, kept, self.works, self.removed)
 
@@ -104,8 +105,8 @@ class CrackedBlocks:
     # -- changes of the blocks -----------------------------------------------------------------------------------------
 
     def _take_blocks(self, parent: np.ndarray | None = None) -> None:
-        """New blocks: a new block system. Of blocks that are their ``parent`` (n_blocks,), whole, under another number what
-        is known of their cracks is kept."""
+        """New blocks: a new block system. Of blocks that are their ``parent`` (n_blocks,), whole, under another number
+        what is known of their cracks is kept."""
         problem = self.problem
         self.system = dda.BlockSystem(
             self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda
@@ -164,8 +165,8 @@ class CrackedBlocks:
         return np.flatnonzero(new).tolist()
 
     def _settle_in_situ(self) -> None:
-        """Begin with the blocks at rest under the in-situ stress; where they are then is the reference. Cracks are as if cut
-        into them then: they open and slide from the first step on."""
+        """Begin with the blocks at rest under the in-situ stress; where they are then is the reference. Cracks are as
+        if cut into them then: they open and slide from the first step on."""
         with self.timed("dda"):
             found = dda.in_situ_state(self.system, self.problem.in_situ, self.problem.loads)
         motion = Motion.of(self.blocks, found.state.vertices)
@@ -173,7 +174,8 @@ class CrackedBlocks:
         def moved(block: int, point) -> tuple[float, float]:
             return tuple(motion.current(block, np.asarray(point, dtype=float)).tolist())
 
-        # Cracks that end from both sides at one point of a joint may share its node: their blocks take it to two places.
+        # Cracks that end from both sides at one point of a joint may share its node: their blocks take it to two
+        # places.
         ends = np.column_stack([self.cracks.segments.ravel(), np.repeat(self.cracks.block, 2)])
         kept, numbers = np.unique(ends, axis=0, return_inverse=True)
         node, owner = kept.T

@@ -9,9 +9,9 @@ _PATIENCE = 3
 
 
 class Crossing:
-    """The zero of a rising function, sought from points that are added one by one: secants until two points lie on either
-    side of it, then the Illinois rule (Dowell & Jarratt 1971), which keeps it between them, or half their interval where that
-    has not halved it in three points.
+    """The zero of a rising function, sought from points that are added one by one: secants until two points lie on
+    either side of it, then the Illinois rule (Dowell & Jarratt 1971), which keeps it between them, or half their
+    interval where that has not halved it in three points.
 
     ``slope`` is that of the last two points, before there are two a guess.
     """
@@ -57,7 +57,8 @@ class Crossing:
 
     @property
     def next(self) -> float:
-        """Where to look next; infinite where the last points leave no zero ahead. Raises ValueError before there is one."""
+        """Where to look next; infinite where the last points leave no zero ahead. Raises ValueError before there is
+        one."""
         if self.enclosed:
             (a, f), (b, g) = self._low, self._high
             if self._since >= _PATIENCE:

@@ -1,9 +1,10 @@
 """The coupling cycle: blocks move, their contact forces load the cracked ones, cracks grow and soften them, again.
 
 At each load the cycle is repeated from the same start of the step until no tip grows; every pass is yielded as a
-`Cycle`. The state that leaves the last pass starts the next load step. Where the load follows the cracks (`event_steps`),
-each pass in which they grow is a load step of its own. Blocks part where a pass has left them: in statics the passes that
-follow at the same load begin there (unless the block hung by a thread), in dynamics the next step does.
+`Cycle`. The state that leaves the last pass starts the next load step. Where the load follows the cracks
+(`event_steps`), each pass in which they grow is a load step of its own. Blocks part where a pass has left them: in
+statics the passes that follow at the same load begin there (unless the block hung by a thread), in dynamics the next
+step does.
 """
 
 from __future__ import annotations
@@ -35,17 +36,17 @@ def cycles(problem: Problem) -> Iterator[Cycle]:
     """Run ``problem``, one `Cycle` a coupling cycle, from the initial state (number 0) to the scene's end.
 
     A static run also ends when a block goes out of reach, with a ``collapse`` event. Raises `geomech.dda.NotConverged`
-    when the block system finds no consistent contact state even at the smallest step, and ValueError where a dynamic run is
-    to step from event to event.
+    when the block system finds no consistent contact state even at the smallest step, and ValueError where a dynamic
+    run is to step from event to event.
     """
     return Coupling(problem).cycles()
 
 
 @dataclass(frozen=True)
 class UnderWay:
-    """A load step of which a pass has grown cracks: what its next pass, number ``next_pass``, goes on with. ``told`` are the
-    events of the pass before, ``pending`` those that taking the growth has brought; ``until``, in dynamics, the time at which the
-    pass before has ended, ``whole`` s after the step began."""
+    """A load step of which a pass has grown cracks: what its next pass, number ``next_pass``, goes on with. ``told``
+    are the events of the pass before, ``pending`` those that taking the growth has brought; ``until``, in dynamics, the
+    time at which the pass before has ended, ``whole`` s after the step began."""
 
     dt: float
     load_time: float | None
@@ -240,8 +241,9 @@ class Coupling:
         raise AssertionError("unreachable: the last pass takes no growth")
 
     def _until(self, until: float) -> Balance:
-        """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of that time: where
-        the blocks now need shorter steps, it takes as many as lead there, and all but the last are gone on from."""
+        """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of
+        that time: where the blocks now need shorter steps, it takes as many as lead there, and all but the last are
+        gone on from."""
         now = self.now
         while True:
             found = balanced(now, until - now.state.time, None)

@@ -1,14 +1,14 @@
 """Load steps that end where something happens: at the time, and so at the load, at which the most driven tip has just
-K_eq = K_Ic, or whole rock its strength, or a contact or a crack face changes its state (`first_change`), instead of at the end
-of the fixed step in which that comes about.
+K_eq = K_Ic, or whole rock its strength, or a contact or a crack face changes its state (`first_change`), instead of at
+the end of the fixed step in which that comes about.
 
-While nothing changes state K is nearly linear in the load, so secants find that time in two or three solutions, all of them
-steps from the same start. On the way there steps are as long as blocks may move in one. Loads at which tips start, join
-and cut through then do not depend on the time step.
+While nothing changes state K is nearly linear in the load, so secants find that time in two or three solutions, all of
+them steps from the same start. On the way there steps are as long as blocks may move in one. Loads at which tips start,
+join and cut through then do not depend on the time step.
 
-With control "toughness" the load follows the cracks: every increment of growth is made at the load at which the most driven
-tip has K_eq = K_Ic, whether that is higher than the last one (stable growth) or lower (growth that would run away under a
-dead load). Time is then no more than what the loads are functions of, and goes back where the load does.
+With control "toughness" the load follows the cracks: every increment of growth is made at the load at which the most
+driven tip has K_eq = K_Ic, whether that is higher than the last one (stable growth) or lower (growth that would run
+away under a dead load). Time is then no more than what the loads are functions of, and goes back where the load does.
 """
 
 from __future__ import annotations
@@ -28,19 +28,20 @@ from .growing import drive
 
 #: An event is found when the drive, K_eq/K_Ic, is off one by less than this.
 SETTLED = 1e-6
-#: Tips driven within this part of their toughness grow with the one that has reached it: images of one another by symmetry
-#: differ by the rounding of their paths, which must not part them.
+#: Tips driven within this part of their toughness grow with the one that has reached it: images of one another by
+#: symmetry differ by the rounding of their paths, which must not part them.
 TOGETHER = 1e-3
-#: Forces are in equilibrium on the geometry at the start of a step. A step to an event that would move blocks by more than the
-#: first (in units of half the height, as ``max_displacement_ratio``) goes the second part of the way, and the next one the
-#: rest: K at the event is then off by no more than the former, times what K depends on the shape of the blocks.
+#: Forces are in equilibrium on the geometry at the start of a step. A step to an event that would move blocks by more
+#: than the first (in units of half the height, as ``max_displacement_ratio``) goes the second part of the way, and the
+#: next one the rest: K at the event is then off by no more than the former, times what K depends on the shape of the
+#: blocks.
 NEAR, APPROACH = 1e-5, 0.98
 #: Steps on the way are to move blocks by this part of what a step may.
 USE = 0.8
 #: Solutions that one search may take, and those without the event between two of them.
 MOST, OPEN = 40, 5
-#: Two times nearer than this part of themselves are one. An event between them is a jump of the drive (faces that close or
-#: begin to slip), and tips grow at the later one, beyond it.
+#: Two times nearer than this part of themselves are one. An event between them is a jump of the drive (faces that close
+#: or begin to slip), and tips grow at the later one, beyond it.
 JUMP = 1e-6
 
 
@@ -65,8 +66,9 @@ class EventSteps:
         self.changes = FirstChange(run.events)
 
     def first_pass(self, now: CrackedBlocks, end: float) -> Balance:
-        """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; with control
-        "toughness" back to it where it lies behind. ``reached`` then says whether they are there. Raises `dda.NotConverged`."""
+        """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; with
+        control "toughness" back to it where it lies behind. ``reached`` then says whether they are there. Raises
+        `dda.NotConverged`."""
         start = now.state.time
         search = Crossing(self._rate)
         if self._drive is None:
@@ -116,7 +118,8 @@ class EventSteps:
             if self.reached or (excess < 0 and not goes_on):
                 break
             if search.next <= start:
-                # Driven from the start on, by tips that growth has not brought to rest: the load does not go back for them.
+                # Driven from the start on, by tips that growth has not brought to rest: the load does not go back for
+                # them.
                 self.reached = True
                 break
             aim = min(search.next, limit)
@@ -151,8 +154,9 @@ class EventSteps:
         return found, excess
 
     def _at(self, now: CrackedBlocks, time: float, free: bool = False) -> tuple[Balance, float]:
-        """A pass at the loads of ``time`` from the start of the step, or at those at which something changes its state on the way
-        there, and how far the drive then is above one. A ``free`` one may be cut short by how far blocks may move."""
+        """A pass at the loads of ``time`` from the start of the step, or at those at which something changes its state
+        on the way there, and how far the drive then is above one. A ``free`` one may be cut short by how far blocks may
+        move."""
         found = self._solve(now, time, free)
         found = self.changes.first(
             now, found, partial(self._solve, now), partial(self._towards, now.state.time), self._most(now)

@@ -79,8 +79,8 @@ def _ends(acting: list, gapes: list, length: float, way: int) -> list[tuple[tupl
 def add_at_end(
     pieces: Pieces, blocks: Blocks, side: list[int], line: tuple, place: float, force: tuple[float, float]
 ) -> None:
-    """A ``force`` at a ``place`` of a straight side where its pressure ends: that on the grid, from which moments are taken, and
-    not that of the contact, which is off it."""
+    """A ``force`` at a ``place`` of a straight side where its pressure ends: that on the grid, from which moments are
+    taken, and not that of the contact, which is off it."""
     start, _, (ax, ay), _ = line
     marks = [place_along(blocks.vertices[k].tolist(), start, (ax, ay)) for k in side[1:-1]]
     edge = side[bisect_right(marks, place)]

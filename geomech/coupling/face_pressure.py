@@ -1,9 +1,10 @@
 """The pressure on a joint face that has the force and moment of its contacts and pulls nowhere.
 
-A resultant in the middle third is the linear pressure on the whole length. Nearer to an end it would pull at the other one; it
-is then what a no-tension face does, a triangle on a shorter length, as a mixture of two triangles of fixed lengths, so that a
-body meets the same few loads again and again. At the very end all of it is a lone force, as it is when the contact there is
-the only one that is left: the pressure goes over into it without a jump, which would leave blocks and cracks no state to settle in.
+A resultant in the middle third is the linear pressure on the whole length. Nearer to an end it would pull at the other
+one; it is then what a no-tension face does, a triangle on a shorter length, as a mixture of two triangles of fixed
+lengths, so that a body meets the same few loads again and again. At the very end all of it is a lone force, as it is
+when the contact there is the only one that is left: the pressure goes over into it without a jump, which would leave
+blocks and cracks no state to settle in.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ Piece = tuple[float, float, float, float]
 
 
 def no_pull(length: float, force: float, moment: float) -> tuple[list[Piece], float, float]:
-    """Pieces (start, end, p_start, p_end) of a pressure on [0, length], linear on each (they add up), and lone forces at its
-    start and at its end, all together with resultant ``force`` and ``moment`` about 0.
+    """Pieces (start, end, p_start, p_end) of a pressure on [0, length], linear on each (they add up), and lone forces
+    at its start and at its end, all together with resultant ``force`` and ``moment`` about 0.
 
-    None of it is negative where the force is positive and its line of action meets the face; a resultant outside cannot be
-    carried without pull and stays linear, pull and all, since force and moment come first.
+    None of it is negative where the force is positive and its line of action meets the face; a resultant outside cannot
+    be carried without pull and stays linear, pull and all, since force and moment come first.
     """
     arm = moment / force if force > 0 else -1.0
     if 0 <= arm < length / 3:
@@ -37,8 +38,8 @@ def linear(length: float, force: float, moment: float) -> Piece:
 
 
 def _near_end(length: float, force: float, arm: float) -> tuple[list[tuple[float, float]], float]:
-    """(reach, peak) of the triangles from the near end that have their resultant at ``arm`` from it, and the lone force at
-    that end."""
+    """(reach, peak) of the triangles from the near end that have their resultant at ``arm`` from it, and the lone force
+    at that end."""
     # A triangle's resultant is a third of its reach from its peak.
     place = 3 * arm / length * TRIANGLES
     below = min(int(place), TRIANGLES - 1)

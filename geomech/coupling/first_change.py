@@ -1,11 +1,11 @@
 """The load at which the first contact, or crack face, changes its state on the way to another load.
 
-While all states stand, what each of them has in `reserve` falls linearly with the load: two passes before a change tell where it
-comes about, and a pass just beyond that shows it. What changes without a warning of that kind (bonds that break as one, corners
-that slide off) is enclosed by halves.
+While all states stand, what each of them has in `reserve` falls linearly with the load: two passes before a change tell
+where it comes about, and a pass just beyond that shows it. What changes without a warning of that kind (bonds that
+break as one, corners that slide off) is enclosed by halves.
 
-Changes far apart are found one by one. In a rush of them, as where a wall settles brick by brick, more and more of them are taken
-together, so that it costs no more than some dozen steps more than without.
+Changes far apart are found one by one. In a rush of them, as where a wall settles brick by brick, more and more of them
+are taken together, so that it costs no more than some dozen steps more than without.
 """
 
 from __future__ import annotations
@@ -24,15 +24,16 @@ from .watched import Change, Watched
 
 log = logging.getLogger(__name__)
 
-#: A change is found when it is known to this part of the time (and so, where loads are proportional to it, of the load); among
-#: more than `MANY` contacts to that one.
+#: A change is found when it is known to this part of the time (and so, where loads are proportional to it, of the
+#: load); among more than `MANY` contacts to that one.
 FOUND, ROUGHLY, MANY = 1e-6, 1e-3, 100
 #: The first look into a way of which nothing is known, as a part of it: near its start all states stand.
 FIRST_LOOK = 1 / 64
 #: Looks for one change; what has not been found then is told where it is known to have come about.
 LOOKS = 12
-#: A step to a change is short if it is less than this part of what a step may be. After a short one changes nearer than `MORE` times
-#: (of many contacts, `MUCH_MORE`) as much as before are taken together, after others nearer than `LESS` times as much.
+#: A step to a change is short if it is less than this part of what a step may be. After a short one changes nearer than
+#: `MORE` times (of many contacts, `MUCH_MORE`) as much as before are taken together, after others nearer than `LESS`
+#: times as much.
 SHORT, MORE, MUCH_MORE, LESS = 1 / 8, 1.5, 3.0, 0.25
 
 
@@ -57,9 +58,9 @@ class FirstChange:
         self, now: CrackedBlocks, found: Balance, solve: Callable[[float], Balance], approach: Callable[[float], float],
         most: float,
     ) -> Balance:  # fmt: skip
-        """``found``, or the pass at the first change on the way there from the start of the step: what ``solve`` finds at a time. It
-        is the last one that was solved. ``approach`` says how far to go towards a time in one step, ``most`` is how long
-        one may be, s."""
+        """``found``, or the pass at the first change on the way there from the start of the step: what ``solve`` finds
+        at a time. It is the last one that was solved. ``approach`` says how far to go towards a time in one step,
+        ``most`` is how long one may be, s."""
         self.reached = False
         if not self.kinds:
             return found
@@ -120,8 +121,8 @@ class FirstChange:
         return found
 
     def _before(self, now: CrackedBlocks, high: Watched, solve: Callable[[float], Balance]) -> list[Watched]:
-        """Passes before ``high`` in which nothing has changed yet, the last one that with which its states are compared; none where
-        blocks find no states so near to the start."""
+        """Passes before ``high`` in which nothing has changed yet, the last one that with which its states are
+        compared; none where blocks find no states so near to the start."""
         if self._seen is not None and self._seen.same_faces(high) and self._seen.numbering == high.numbering:
             return [self._seen] if self._older is None else [self._older, self._seen]
         start = now.state.time
@@ -164,8 +165,8 @@ class FirstChange:
 
 
 def _first_of(changes: list[Change], low: list[Watched], high: Watched) -> float | None:
-    """The time at which the first of ``changes``, found in the pass ``high``, comes about by the last two passes before it; None
-    where they do not tell."""
+    """The time at which the first of ``changes``, found in the pass ``high``, comes about by the last two passes before
+    it; None where they do not tell."""
     if len(low) < 2 or low[-2].time == low[-1].time:
         return None
     times = []
@@ -184,8 +185,8 @@ def _first_of(changes: list[Change], low: list[Watched], high: Watched) -> float
 
 
 def _reserve(change: Change, of: Watched, high: Watched) -> np.ndarray:
-    """What the contacts or nodes that ``change`` is about had in reserve in an earlier pass; nan where they were not there, or had
-    changed before."""
+    """What the contacts or nodes that ``change`` is about had in reserve in an earlier pass; nan where they were not
+    there, or had changed before."""
     rows = change.rows
     none = np.full(len(rows), np.nan)
     if not change.contacts:

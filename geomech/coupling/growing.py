@@ -23,9 +23,9 @@ def growth_of_tips(
     together: float = 1.0,
     longest: np.ndarray | float = np.inf,
 ):
-    """The new network (`ddm.growth.Growth`) when some of ``tips`` has a K_eq of ``enough`` times its toughness, else None;
-    those with ``together`` times theirs grow with it. No tip goes farther than ``longest`` (n_tips,) m, and none with 0.
-    Sets the angles that were followed."""
+    """The new network (`ddm.growth.Growth`) when some of ``tips`` has a K_eq of ``enough`` times its toughness, else
+    None; those with ``together`` times theirs grow with it. No tip goes farther than ``longest`` (n_tips,) m, and none
+    with 0. Sets the angles that were followed."""
     k_ic = _toughness(now, tips)
     if not np.any((tips["k_eq"] >= enough * k_ic) & (np.asarray(longest) > 0)):
         return None
@@ -57,8 +57,8 @@ def _toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
 
 
 def drive(now: CrackedBlocks, found: Balance) -> float:
-    """How near to growth the cracks are: the largest K_eq/K_Ic, or the largest overstress where cracks may be born; growth
-    starts at one."""
+    """How near to growth the cracks are: the largest K_eq/K_Ic, or the largest overstress where cracks may be born;
+    growth starts at one."""
     most = float(np.max(found.tips["k_eq"] / _toughness(now, found.tips), initial=0.0))
     if now.problem.growth.initiation:
         from .births import born_first
@@ -98,7 +98,8 @@ def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Eve
 
 
 def part_here(now: CrackedBlocks, growth, state: State) -> bool:
-    """Whether ``growth`` (None: there is none) cuts blocks in two whose parts can go on from ``state``, where the pass has left them."""
+    """Whether ``growth`` (None: there is none) cuts blocks in two whose parts can go on from ``state``, where the pass
+    has left them."""
     if growth is None or not growth.joins:
         return False
     with now.timed("growth"):
@@ -107,8 +108,9 @@ def part_here(now: CrackedBlocks, growth, state: State) -> bool:
 
 
 def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tuple[Event, ...]:
-    """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought, at ``state``, the end of the
-    pass with these ``solutions``. Where the blocks stand there, the parts begin with the forces of their faces."""
+    """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought, at ``state``, the
+    end of the pass with these ``solutions``. Where the blocks stand there, the parts begin with the forces of their
+    faces."""
     names = now.cracks.names
     events = []
     for join in growth.joins:

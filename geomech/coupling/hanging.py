@@ -1,16 +1,18 @@
 """Blocks that hang together by thin ligaments: their cracks answer to the mean stress alone.
 
-The block solver's blocks strain evenly. The strain that the forces on a block open its cracks by is that of their mean stress σ
-and what bending and uneven pressure add; what they add has no counterpart: forces that bend cracks open do no work on
-an even strain. While cracks are short that is a small part. In a block that is nearly cut through it is nearly all of it, forces and
-strain chase each other with a gain of up to hundreds, and there are states that no passes find, or that take energy from nowhere. So
-the cracks of these blocks bring the strain ε_c = κ ∂W/∂σ, with W(σ) the complementary energy, per area, that they add to the body under
-a uniform stress, faces closing or not. W is convex: blocks and cracks agree in a few passes, and no energy is gained. What drives the
-tips is solved under the actual forces as ever.
+The block solver's blocks strain evenly. The strain that the forces on a block open its cracks by is that of their mean
+stress σ and what bending and uneven pressure add; what they add has no counterpart: forces that bend cracks open do no
+work on an even strain. While cracks are short that is a small part. In a block that is nearly cut through it is nearly
+all of it, forces and strain chase each other with a gain of up to hundreds, and there are states that no passes find,
+or that take energy from nowhere. So the cracks of these blocks bring the strain ε_c = κ ∂W/∂σ, with W(σ) the
+complementary energy, per area, that they add to the body under a uniform stress, faces closing or not. W is convex:
+blocks and cracks agree in a few passes, and no energy is gained. What drives the tips is solved under the actual forces
+as ever.
 
-In statics no motion can take energy from anywhere, and passes that agree are an equilibrium of the forces that act: there a block
-hangs only where its passes do not agree, and all soft ones only in a step in which that is not enough. (A specimen sheared between the halves of a box has no shear on its sides, which its mean
-stress would put there: as it came to hang it bore 4 % less at once, and its cracks then ran through.)
+In statics no motion can take energy from anywhere, and passes that agree are an equilibrium of the forces that act:
+there a block hangs only where its passes do not agree, and all soft ones only in a step in which that is not enough. (A
+specimen sheared between the halves of a box has no shear on its sides, which its mean stress would put there: as it
+came to hang it bore 4 % less at once, and its cracks then ran through.)
 """
 
 from __future__ import annotations
@@ -25,12 +27,13 @@ from .compliance import stress_rotation
 if TYPE_CHECKING:
     from ..ddm import Body, FaceMemory, Solution
 
-#: A block hangs from where its cracks, were they all open, make it so many times softer than its rock in some direction. (An
-#: edge crack through half of a square adds 4.)
+#: A block hangs from where its cracks, were they all open, make it so many times softer than its rock in some
+#: direction. (An edge crack through half of a square adds 4.)
 SOFT = 4.0
 
-#: … and is taken for no more than so many times softer. What hangs by less (an edge crack through three quarters of a square) is two
-#: blocks already: neighbours hold them in place, not the ligament, and the strain of the two as one would run into the neighbours.
+#: … and is taken for no more than so many times softer. What hangs by less (an edge crack through three quarters of a
+#: square) is two blocks already: neighbours hold them in place, not the ligament, and the strain of the two as one
+#: would run into the neighbours.
 SOFTEST = 30.0
 
 
@@ -53,8 +56,8 @@ class Hanging:
         self._blocks.add(block)
 
     def find(self, bodies: dict[int, Body], elastic: np.ndarray, contacts: np.ndarray) -> None:
-        """Add those of the ``bodies`` (block →) that are soft beside their ``elastic`` compliance (n_blocks, 3, 3) and that CONTACT rows
-        press: forces that go with a block's strain are those of contacts."""
+        """Add those of the ``bodies`` (block →) that are soft beside their ``elastic`` compliance (n_blocks, 3, 3) and
+        that CONTACT rows press: forces that go with a block's strain are those of contacts."""
         pressed = contacts[(contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)]
         for block in np.unique([pressed["block"], pressed["other"]]).tolist():
             if block not in bodies or block in self._blocks:
@@ -67,8 +70,9 @@ class Hanging:
         return min(1.0, SOFTEST / max(self._soft(block, body, elastic), SOFT))
 
     def answer(self, block: int, body: Body, stress: np.ndarray, rotation: float, began: FaceMemory | None) -> Solution:
-        """The solution of ``body``, which has turned by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current axes. Faces begin with what
-        they remember of such solutions, or with ``began`` where there is none. Raises `ddm.NotConverged`."""
+        """The solution of ``body``, which has turned by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current
+        axes. Faces begin with what they remember of such solutions, or with ``began`` where there is none. Raises
+        `ddm.NotConverged`."""
         from .. import ddm
 
         load = ddm.BodyLoad(remote_stress=stress_rotation(-rotation) @ stress)
@@ -81,7 +85,8 @@ class Hanging:
         self._memory = {b: known.memory for b, known in self.solutions.items() if known.memory is not None}
 
     def inherited(self, parent: np.ndarray, whole: np.ndarray) -> Hanging:
-        """That of new blocks: of those that are their ``parent`` (n_blocks,), ``whole`` (k,) numbers, what is known stays."""
+        """That of new blocks: of those that are their ``parent`` (n_blocks,), ``whole`` (k,) numbers, what is known
+        stays."""
         solutions, memory, softness = (
             {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
             for known in (self.solutions, self._memory, self._softness)

@@ -13,9 +13,9 @@ from ..model import GROUND, Loads
 def on_children(loads: Loads, parent: np.ndarray, child: Callable[[int, tuple[float, float]], int]) -> Loads:
     """``loads`` with the numbers of the blocks after a split.
 
-    ``parent`` (n_blocks,) is the block before it of every block after it; ``child(block, point)`` the part of ``block`` that
-    holds a point. What acts at a point goes with the part that has it, what moves or takes out a block as a whole does so to
-    all its parts.
+    ``parent`` (n_blocks,) is the block before it of every block after it; ``child(block, point)`` the part of ``block``
+    that holds a point. What acts at a point goes with the part that has it, what moves or takes out a block as a whole
+    does so to all its parts.
     """
 
     def parts(block: int) -> list[int]:

@@ -33,9 +33,9 @@ LONE_SPREAD = 1.0 / 20.0
 class Pieces:
     """Loaded pieces of the outline as they are found: pairs of x and y at their two ends.
 
-    ``left_out``: directions of faces, and by what moment (N m) shears along each of them stretch the block beyond what the
-    tractions on it do: those of two contacts that oppose each other have neither resultant nor moment. ``couple``: the moment
-    (N m) that forces lose which act beyond the end of the edge that bears them, see `add_couple`.
+    ``left_out``: directions of faces, and by what moment (N m) shears along each of them stretch the block beyond what
+    the tractions on it do: those of two contacts that oppose each other have neither resultant nor moment. ``couple``:
+    the moment (N m) that forces lose which act beyond the end of the edge that bears them, see `add_couple`.
     """
 
     def __init__(self) -> None:
@@ -126,8 +126,8 @@ def add_corner_force(pieces: Pieces, blocks: Blocks, vertex: int, force: Sequenc
 
 
 def add_edge_force(pieces: Pieces, blocks: Blocks, edge: int, point: Sequence[float], force: Sequence[float]) -> None:
-    """A force at a ``point`` of an edge, spread over a short piece of it with the same moment. One beyond its end acts at that
-    end, and with the couple that is then left."""
+    """A force at a ``point`` of an edge, spread over a short piece of it with the same moment. One beyond its end acts
+    at that end, and with the couple that is then left."""
     (x, y), (ex, ey) = blocks.vertices[edge].tolist(), blocks.vertices[blocks.next_vertex[edge]].tolist()
     length = math.hypot(ex - x, ey - y)
     ax, ay = (ex - x) / length, (ey - y) / length
@@ -154,8 +154,8 @@ def add_edge_force(pieces: Pieces, blocks: Blocks, edge: int, point: Sequence[fl
 
 
 def add_couple(pieces: Pieces, blocks: Blocks, block: int) -> None:
-    """The ``couple`` as an even shear flow q along all edges of the ``block``: Bredt's M = 2 A q. It has no resultant, stretches
-    nothing in the mean, and stays small however short the edge is that the forces have slid beyond."""
+    """The ``couple`` as an even shear flow q along all edges of the ``block``: Bredt's M = 2 A q. It has no resultant,
+    stretches nothing in the mean, and stays small however short the edge is that the forces have slid beyond."""
     if not pieces.couple:
         return
     area, _, _ = blocks.area_moments(block)

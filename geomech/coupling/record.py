@@ -1,4 +1,5 @@
-"""The record of a cycle: with the scene's leading load, its axial strain, all crack faces in one table; and of events."""
+"""The record of a cycle: with the scene's leading load, its axial strain, all crack faces in one table; and of
+events."""
 
 from __future__ import annotations
 
@@ -51,9 +52,10 @@ def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Ev
 
 
 def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[str, float]) -> float:
-    """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one. Where the block
-    of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of the step. Where
-    the weight leads (`WEIGHT`), that of a column as high as the scene, ρ g h of the heaviest moving rock, Pa."""
+    """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one. Where
+    the block of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of
+    the step. Where the weight leads (`WEIGHT`), that of a column as high as the scene, ρ g h of the heaviest moving
+    rock, Pa."""
     name = problem.load_edge
     edges = blocks.edges_named(name) if name else []
     if not len(edges):

@@ -18,14 +18,16 @@ _LEAST = 0.05
 
 
 class Settling:
-    """The next offset of the crack strains, from those tried so far and what came out (Anderson 1965; Walker & Ni 2011).
+    """The next offset of the crack strains, from those tried so far and what came out (Anderson 1965; Walker & Ni
+    2011).
 
-    A pass assumes the crack strain offset + S σ and finds another one. Handing back what it found is a fixed-point iteration,
-    which gains a factor of three to thirty a pass: contacts whose forces it moves load the cracks otherwise than by the
-    blocks' mean stress, which is all that S knows. Here the last `DEPTH` passes are combined so that, were the answer linear, their differences from agreement
-    would cancel as far as they can. Where S itself has changed, with the states of crack faces, what was before tells nothing for
-    all blocks together; a block whose difference has turned about is then relaxed by Aitken's factor (Irons & Tuck 1969), for faces that
-    close at one answer and open at the other would go on for ever.
+    A pass assumes the crack strain offset + S σ and finds another one. Handing back what it found is a fixed-point
+    iteration, which gains a factor of three to thirty a pass: contacts whose forces it moves load the cracks otherwise
+    than by the blocks' mean stress, which is all that S knows. Here the last `DEPTH` passes are combined so that, were
+    the answer linear, their differences from agreement would cancel as far as they can. Where S itself has changed,
+    with the states of crack faces, what was before tells nothing for all blocks together; a block whose difference has
+    turned about is then relaxed by Aitken's factor (Irons & Tuck 1969), for faces that close at one answer and open at
+    the other would go on for ever.
     """
 
     def __init__(self) -> None:
@@ -35,8 +37,9 @@ class Settling:
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def next(self, offset: np.ndarray, residual: np.ndarray, compliance: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """(n, 3) the offset to assume. ``offset`` (n, 3) is that of the last pass (told for the present ``compliance``), (n, 3, 3), ``residual`` the crack
-        strain found less the one assumed; ``size`` (n,) of the blocks' strain weighs them."""
+        """(n, 3) the offset to assume. ``offset`` (n, 3) is that of the last pass (told for the present
+        ``compliance``), (n, 3, 3), ``residual`` the crack strain found less the one assumed; ``size`` (n,) of the
+        blocks' strain weighs them."""
         known = self._compliance
         if known is None or np.abs(known - compliance).max() > _SAME * np.abs(compliance).max():
             self._offsets, self._residuals, self._compliance = [], [], compliance

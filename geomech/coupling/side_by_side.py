@@ -18,8 +18,8 @@ _pools: dict[int, ThreadPoolExecutor] = {}
 def side_by_side(work: Callable[[_Item], _Result], items: Sequence[_Item], threads: int | None = None) -> list[_Result]:
     """``work(item)`` of all ``items``, in their order, on ``threads`` threads (default `THREADS`).
 
-    Every item is worked on by one thread alone, so that results do not depend on how many there are; ``work`` must change
-    nothing that two items share. Of several exceptions that of the first item is raised, when all have ended.
+    Every item is worked on by one thread alone, so that results do not depend on how many there are; ``work`` must
+    change nothing that two items share. Of several exceptions that of the first item is raised, when all have ended.
     """
     threads = min(THREADS if threads is None else threads, len(items))
     if threads < 2:

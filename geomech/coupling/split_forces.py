@@ -1,14 +1,15 @@
 """What crack faces carry when blocks part along them becomes what the contacts of the new blocks begin with.
 
-The last solution of the whole body is in equilibrium, and so is every part of it under the tractions on its own boundary. Each
-segment of a new face hands its traction on to the contacts at its two ends by the linear shape functions, which keep force and
-moment, press nowhere where the faces do not and break no Coulomb law that they obey. Faces that are apart leave a gap, and
-faces that have slid their slip. Along what the crack has only just cut, rock bore the stress: where it pressed as a whole, its
-resultant stays, with as much shear as the new joint can take; where it pulled, it lets go. Edges that a mouth has divided are treated likewise, with the traction from
-outside. The other contacts of the parts keep the forces that they had, whatever their springs become.
+The last solution of the whole body is in equilibrium, and so is every part of it under the tractions on its own
+boundary. Each segment of a new face hands its traction on to the contacts at its two ends by the linear shape
+functions, which keep force and moment, press nowhere where the faces do not and break no Coulomb law that they obey.
+Faces that are apart leave a gap, and faces that have slid their slip. Along what the crack has only just cut, rock bore
+the stress: where it pressed as a whole, its resultant stays, with as much shear as the new joint can take; where it
+pulled, it lets go. Edges that a mouth has divided are treated likewise, with the traction from outside. The other
+contacts of the parts keep the forces that they had, whatever their springs become.
 
-All that holds where the last pass has left the blocks. In statics a block that hangs by a thread is strained beyond measure
-before it parts; it then starts from where the load step began, and nothing is told.
+All that holds where the last pass has left the blocks. In statics a block that hangs by a thread is strained beyond
+measure before it parts; it then starts from where the load step began, and nothing is told.
 """
 
 from __future__ import annotations
@@ -35,12 +36,13 @@ _ALIGNED = 0.9975
 _IN_ROCK = 12
 #: Gauss points on a piece of a load that is linear: its moment is a cubic at most.
 _IN_LOAD = 2
-#: Faces that are farther apart than this part of the smaller block's size (√area) are told to be so far, and press no deeper into
-#: each other: contacts are sought as far off as faces pass each other by, which must not reach the blocks' other sides.
+#: Faces that are farther apart than this part of the smaller block's size (√area) are told to be so far, and press no
+#: deeper into each other: contacts are sought as far off as faces pass each other by, which must not reach the blocks'
+#: other sides.
 _FARTHEST = 0.02
-#: Faces have opened, beyond the width that they were given, by no more than this part of that size. Parts stand where their parent
-#: did, face on face, and as they close lie in each other by the gap that is told; one that hung by a thread had opened by any
-#: amount, without inertia. Half of what is refused in a drawing.
+#: Faces have opened, beyond the width that they were given, by no more than this part of that size. Parts stand where
+#: their parent did, face on face, and as they close lie in each other by the gap that is told; one that hung by a
+#: thread had opened by any amount, without inertia. Half of what is refused in a drawing.
 _OPENED = 0.5 * REFUSED
 #: Mean strains of cracks up to here are small: strains of rock that breaks are a few thousandths.
 _SMALL = 0.01
@@ -50,8 +52,8 @@ _NOTHING = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class _Faces:
-    """Crack faces of a solved body at points: traction (normal, shear) at nodes with their share of the length, gaps and slip
-    at the ends of elements; reference coordinates."""
+    """Crack faces of a solved body at points: traction (normal, shear) at nodes with their share of the length, gaps
+    and slip at the ends of elements; reference coordinates."""
 
     nodes: np.ndarray  # (k, 2)
     share: np.ndarray  # (k,) m
@@ -86,7 +88,8 @@ class _Faces:
         )
 
     def on(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """(places from 0 to 1, shares m, tractions) on the segment from ``a`` to ``b``; None where it is no crack yet."""
+        """(places from 0 to 1, shares m, tractions) on the segment from ``a`` to ``b``; None where it is no crack
+        yet."""
         here = np.repeat(self._elements_on(a, b), len(self.nodes) // len(self.ends))
         # Elements graded to a corner at its end may be shorter than what tells them from the segment.
         if self.share[here].sum() < 0.5 * np.hypot(*(b - a)):
@@ -107,12 +110,14 @@ class _Faces:
 
 
 def holds_together(state: State, blocks: np.ndarray) -> bool:
-    """Whether the ``blocks`` (numbers) have small strains of cracks in ``state``, so that parts may begin where they stand."""
+    """Whether the ``blocks`` (numbers) have small strains of cracks in ``state``, so that parts may begin where they
+    stand."""
     return bool(np.abs(state.crack_strain[blocks]).max(initial=0.0) <= _SMALL)
 
 
 def _along(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where on the segment from ``a`` to ``b`` the ``points`` (n, 2) are, 0 to 1, and which of them are on it at all."""
+    """Where on the segment from ``a`` to ``b`` the ``points`` (n, 2) are, 0 to 1, and which of them are on it at
+    all."""
     d = b - a
     square = float(d @ d)
     place = (points - a) @ d / square
@@ -144,8 +149,8 @@ def contacts_after(
 ) -> np.ndarray:
     """CONTACT rows for the blocks of ``split``, whose next step begins with the forces at the end of the last.
 
-    ``system`` is that of the new blocks, ``before`` are those that were cut, ``solutions`` and boundary ``loads`` (block →) those
-    of the last pass at ``split.state``; ``acting`` are the loads of the blocks.
+    ``system`` is that of the new blocks, ``before`` are those that were cut, ``solutions`` and boundary ``loads``
+    (block →) those of the last pass at ``split.state``; ``acting`` are the loads of the blocks.
     """
     blocks, state = split.blocks, split.state
     found = system.contacts_near(state)
@@ -162,7 +167,8 @@ def contacts_after(
 
 
 def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_part: np.ndarray) -> dda.ToldContacts:
-    """``told`` as forces along the contacts' own axes; contacts of parts (n_blocks,) of which nothing is told keep what they bear."""
+    """``told`` as forces along the contacts' own axes; contacts of parts (n_blocks,) of which nothing is told keep what
+    they bear."""
     across = found.geometry[:, 1:3]
     normal = np.sum(told.force * across, axis=1)
     shear = np.sum(told.force * normal_of(across), axis=1)
@@ -173,7 +179,8 @@ def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_pa
     size = np.sqrt(blocks.areas())
     farthest = _FARTHEST * np.minimum(size[found.block], size[found.other])
     gap = np.minimum(told.gap, farthest)
-    # Joints as soft as their law says, of the little length that a corner may be left with, cannot bear what a whole face did.
+    # Joints as soft as their law says, of the little length that a corner may be left with, cannot bear what a whole
+    # face did.
     normal = np.minimum(normal, found.springs.normal * farthest)
     most = np.where(rough, np.inf, found.springs.peak * np.maximum(normal, 0.0))
     shear = np.where(found.bonded > 0, shear, np.clip(shear, -most, most))
@@ -235,8 +242,9 @@ def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rota
 
 
 def _in_rock(solution, a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places, shares and tractions on a segment of rock that the last solution had whole: its resultant, if that presses, where
-    rock was pressed. Bent rock that lets go of its tension keeps no more of its pressure than is in balance."""
+    """Places, shares and tractions on a segment of rock that the last solution had whole: its resultant, if that
+    presses, where rock was pressed. Bent rock that lets go of its tension keeps no more of its pressure than is in
+    balance."""
     gauss, weight = np.polynomial.legendre.leggauss(_IN_ROCK)
     place, share = 0.5 * (gauss + 1), 0.5 * weight * np.hypot(*(b - a))
     vector = traction(solution.stress(a + place[:, None] * (b - a)), normal)
@@ -261,9 +269,9 @@ def _contact_at(rows, found, across: np.ndarray, edges: tuple[int, int]) -> int:
 def _tell_of_divided_edges(
     told: _Told, found, split: Split, before: Blocks, parent: int, load: BoundaryLoad, loaded: set[str]
 ) -> None:
-    """The traction from outside on edges of ``parent`` that mouths have divided, or that end at a vertex that is two now, to the
-    contacts on the sides that their parts are in. Where contacts and an edge ``load`` share a side the traction is not theirs
-    alone, and nothing is told."""
+    """The traction from outside on edges of ``parent`` that mouths have divided, or that end at a vertex that is two
+    now, to the contacts on the sides that their parts are in. Where contacts and an edge ``load`` share a side the
+    traction is not theirs alone, and nothing is told."""
     blocks, owner = split.blocks, split.blocks.vertex_block
     old_vertices = np.bincount(split.vertex_origin[split.vertex_origin >= 0], minlength=before.n_vertices)
     twice = old_vertices > 1
@@ -294,8 +302,9 @@ def _tell_of_divided_edges(
 
 def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndarray:
     """(n, k) what part of a force at each ``place`` (k,) on an edge is that of each contact ``at`` (n,), with the block
-    ``neighbour`` (n,): by the linear shape functions, among the contacts of the neighbour that reaches there, of two that do of the
-    one that reaches further. (Two neighbours' corners meet on the edge within less than faces slide by.)"""
+    ``neighbour`` (n,): by the linear shape functions, among the contacts of the neighbour that reaches there, of two
+    that do of the one that reaches further. (Two neighbours' corners meet on the edge within less than faces slide
+    by.)"""
     out = np.zeros((len(at), len(place)))
     groups = [np.flatnonzero(neighbour == b) for b in np.unique(neighbour).tolist()]
     reach = np.array([[at[rows].min(), at[rows].max()] for rows in groups])
@@ -314,7 +323,8 @@ def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndar
 
 
 def _contacts_on(found, split: Split, side: list[int]) -> np.ndarray:
-    """The contacts on the straight ``side`` of a part (the vertices along it), with blocks that are no parts of the same parent."""
+    """The contacts on the straight ``side`` of a part (the vertices along it), with blocks that are no parts of the
+    same parent."""
     blocks, vertices = split.blocks, split.state.vertices
     block = int(blocks.vertex_block[side[0]])
     others = split.parent != split.parent[block]
@@ -328,7 +338,8 @@ def _contacts_on(found, split: Split, side: list[int]) -> np.ndarray:
 
 
 def _loads_on(load: BoundaryLoad, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (k,) from 0 to 1 on the edge from ``a`` to ``b``, reference coordinates, and the forces (k, 2) N of ``load`` there."""
+    """Places (k,) from 0 to 1 on the edge from ``a`` to ``b``, reference coordinates, and the forces (k, 2) N of
+    ``load`` there."""
     gauss, weight = np.polynomial.legendre.leggauss(_IN_LOAD)
     places, forces = [np.zeros(0)], [np.zeros((0, 2))]
     length = float(np.hypot(*(b - a)))

@@ -34,7 +34,8 @@ class Split:
     cracks     what is not a block face now, each segment with the child that holds it
     parent     (n_blocks,) the block before the split that each one comes from
     lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, for slivers are merged
-    vertex_origin, edge_origin   (n_vertices,) the vertex, and the edge, before the split that each vertex, and the edge that leaves
+    vertex_origin, edge_origin   (n_vertices,) the vertex, and the edge, before the split that each vertex, and the edge
+                                 that leaves
                it, is (part of); −1 for a new vertex and for an edge that was a crack face
     edge_span  (n_vertices, 2) from where to where on that edge, 0 to 1
     """
@@ -73,9 +74,9 @@ def split_blocks(
 
     Children inherit material, fixity and the names of their edges; new edges are called "crack:<name>", children
     "<parent>/1", "<parent>/2" … The parent's vertices keep reference and current coordinates to the last bit, new ones
-    follow its affine motion. The velocity is the parent's field, told about the child's centroid, so that mass, momentum
-    and angular momentum are those of the parent. Stress is the parent's, or what ``mean_stress[block]`` gives for the
-    child's loops. A child that still holds cracks keeps the parent's crack strain, one that is whole has none.
+    follow its affine motion. The velocity is the parent's field, told about the child's centroid, so that mass,
+    momentum and angular momentum are those of the parent. Stress is the parent's, or what ``mean_stress[block]`` gives
+    for the child's loops. A child that still holds cracks keeps the parent's crack strain, one that is whole has none.
 
     Contacts follow their vertices and edges. One whose vertex now belongs to two blocks is dropped (and logged): the
     next contact search finds it on both. Raises ValueError for a crack mouth that is not on its block's boundary.

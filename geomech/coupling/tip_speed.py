@@ -1,9 +1,10 @@
 """How far tips may run in a step of a dynamic run: no faster than a part of the speed of Rayleigh's wave.
 
-A crack that is driven harder than its toughness asks for runs, and what drives it comes and goes with the waves in its block.
-A step that let it grow until it arrests would give it, in a millisecond, the length that seconds of the same load
-would; and a push of one step's length would grow what it never had the time to. The wave's speed bounds that of a crack in tension (Freund
-1990); those measured in rock and glass stay below about half of it (Ravi-Chandar & Knauss 1984).
+A crack that is driven harder than its toughness asks for runs, and what drives it comes and goes with the waves in its
+block. A step that let it grow until it arrests would give it, in a millisecond, the length that seconds of the same
+load would; and a push of one step's length would grow what it never had the time to. The wave's speed bounds that of a
+crack in tension (Freund 1990); those measured in rock and glass stay below about half of it (Ravi-Chandar & Knauss
+1984).
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from ..model import Blocks, Problem
 class TipSpeed:
     """The way that each tip, by its crack and end, still has in the present step.
 
-    ``problem.growth.speed_limit`` times c_R times the step. Of a tip that is driven but has too little way for the shortest
-    increment, that much is kept for the next step: it grows when it could have got there. Rock without mass has no
-    limit.
+    ``problem.growth.speed_limit`` times c_R times the step. Of a tip that is driven but has too little way for the
+    shortest increment, that much is kept for the next step: it grows when it could have got there. Rock without mass
+    has no limit.
     """
 
     def __init__(self, problem: Problem) -> None:

@@ -1,13 +1,13 @@
 """Contact forces of a block made into one boundary load of its elastic body, with the same force and moment.
 
-The contacts of one joint face (two edges that lie against each other) are one distribution with the resultant and moment of
-its contact forces: linear, or, but for bonds with tensile strength, a triangle where that would pull although the resultant
-pushes (`face_pressure`). It ends where
-the faces do: a contact that opens takes the pressure back from its place the further the wider it gapes. Shear follows the
-pressure, so that it breaks Coulomb's law nowhere unless it breaks it as a whole. A lone vertex pressed into an edge spreads
-over a short piece of that edge; a lone force on a block's own corner is resolved along the corner's two edges and enters there
-as shear, which keeps both force and moment exactly. What presses beyond the end of an edge acts at that end, and its moment
-about it on the whole outline. Tractions change without a jump as contacts come and go.
+The contacts of one joint face (two edges that lie against each other) are one distribution with the resultant and
+moment of its contact forces: linear, or, but for bonds with tensile strength, a triangle where that would pull although
+the resultant pushes (`face_pressure`). It ends where
+the faces do: a contact that opens takes the pressure back from its place the further the wider it gapes. Shear follows
+the pressure, so that it breaks Coulomb's law nowhere unless it breaks it as a whole. A lone vertex pressed into an edge
+spreads over a short piece of that edge; a lone force on a block's own corner is resolved along the corner's two edges
+and enters there as shear, which keeps both force and moment exactly. What presses beyond the end of an edge acts at
+that end, and its moment about it on the whole outline. Tractions change without a jump as contacts come and go.
 
 Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force
 on the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al.
@@ -17,11 +17,11 @@ All of it lives in the block's reference frame: points are mapped back by the bl
 back by its rotation. What the forces then leave out of balance is the block's inertia (d'Alembert): it is put on as
 a body force, linear in x, so that the elastic problem is in equilibrium to round-off.
 
-What the forces leave out of the block's mean stress, its strain's inertia and viscosity take: in the block solver an even
-stress, and an even stress it is here. The mean stress of the load is then the block's own, whose work on the strain of the cracks
-is all that the block spends on them. (As a body force, the strain's inertia would load a crack in the middle by half as much
-again, with nobody to do that work: cracks that run under waves gained 2 % of the load's work, and viscous stress that opened
-them took as much.)
+What the forces leave out of the block's mean stress, its strain's inertia and viscosity take: in the block solver an
+even stress, and an even stress it is here. The mean stress of the load is then the block's own, whose work on the
+strain of the cracks is all that the block spends on them. (As a body force, the strain's inertia would load a crack in
+the middle by half as much again, with nobody to do that work: cracks that run under waves gained 2 % of the load's
+work, and viscous stress that opened them took as much.)
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class BoundaryLoad:
     remote_stress (3,) the even stress besides, Pa;
     points and forces (k, 2) what acts at points, None without, ``kelvin`` as in `ddm.BodyLoad`;
     body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
-    resultant that inertia had to balance beyond the solver's own acceleration on the block as it is strained, relative to the
-    forces' size.
+    resultant that inertia had to balance beyond the solver's own acceleration on the block as it is strained, relative
+    to the forces' size.
     """
 
     segments: np.ndarray
@@ -151,7 +151,8 @@ def _balanced(
     body_force = -force / area
     imbalance = 0.0
     if size > 0:
-        # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as much.
+        # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as
+        # much.
         strain = turn_back @ motion.gradient[block]
         strained = strain @ second @ strain.T
         missed = (
@@ -163,7 +164,8 @@ def _balanced(
 
 
 def _with_torque(symmetric: np.ndarray, spread: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The gradient of a body force, ``symmetric`` but for the angular inertia that leaves no moment beside forces of ``spread``."""
+    """The gradient of a body force, ``symmetric`` but for the angular inertia that leaves no moment beside forces of
+    ``spread``."""
     torque = _turning(spread + second @ symmetric) / float(np.trace(second))
     return symmetric + np.array([[0.0, torque], [-torque, 0.0]])
 

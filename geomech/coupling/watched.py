@@ -1,9 +1,9 @@
 """What contacts between blocks and crack faces do in a pass, and what of it is another than before.
 
-Of the contacts between two blocks, and of the nodes of a crack's faces, the first that slips (``slip``) and the last that did not yet
-(``sliding``: nothing holds any more but friction) are told of, and so with what opens (``opening``, ``parting``); of what
-closes, or sticks again, the first. Every contact that opens or closes is told of, and every bond that is lost. Faces are followed
-through growth by the segments that they had before.
+Of the contacts between two blocks, and of the nodes of a crack's faces, the first that slips (``slip``) and the last
+that did not yet (``sliding``: nothing holds any more but friction) are told of, and so with what opens (``opening``,
+``parting``); of what closes, or sticks again, the first. Every contact that opens or closes is told of, and every bond
+that is lost. Faces are followed through growth by the segments that they had before.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from ..model import OPEN, SLIP, STICK
 from .balance import Balance
 from .cracked_blocks import CrackedBlocks
 
-#: Nearer than this part of their tributary length, a contact that opens and one that closes between the same two blocks are one: a
-#: corner may be held by either block's edge.
+#: Nearer than this part of their tributary length, a contact that opens and one that closes between the same two blocks
+#: are one: a corner may be held by either block's edge.
 _SAME_PLACE = 0.02
 
 _DOES = {
@@ -32,8 +32,8 @@ _TAKES = {
 
 @dataclass(frozen=True)
 class Change:
-    """``kind`` of event; ``rows``: contacts or nodes of faces (of the states after it) that have changed, ``contacts`` which of the
-    two they are; ``last``: all have now, and they were the last ones to; where (m) and what is told."""
+    """``kind`` of event; ``rows``: contacts or nodes of faces (of the states after it) that have changed, ``contacts``
+    which of the two they are; ``last``: all have now, and they were the last ones to; where (m) and what is told."""
 
     kind: str
     contacts: bool
@@ -47,10 +47,10 @@ class Change:
 class Watched:
     """The states of a pass that ended at ``time``, s.
 
-    Contacts, one row for each corner of a block and the block it touches, by ``key`` (n,) in rising order: ``state``, ``bonded``,
-    ``reserve`` N (`dda.StepResult`), ``point`` (n, 2), ``pair`` (n, 2) of blocks, ``length`` (n,) m; ``numbering`` of blocks and
-    vertices that keys belong to. Nodes of crack faces: ``face_state`` and ``face_reserve`` Pa (`ddm.Solution`), ``face_point`` (m, 2),
-    ``segment`` (m, 4) ends of their segment, ``crack`` (m,).
+    Contacts, one row for each corner of a block and the block it touches, by ``key`` (n,) in rising order: ``state``,
+    ``bonded``, ``reserve`` N (`dda.StepResult`), ``point`` (n, 2), ``pair`` (n, 2) of blocks, ``length`` (n,) m;
+    ``numbering`` of blocks and vertices that keys belong to. Nodes of crack faces: ``face_state`` and ``face_reserve``
+    Pa (`ddm.Solution`), ``face_point`` (m, 2), ``segment`` (m, 4) ends of their segment, ``crack`` (m,).
     """
 
     time: float
@@ -190,8 +190,8 @@ def _of_both(segment: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _turns(before: np.ndarray, after: np.ndarray) -> list[tuple[str, bool]]:
-    """What kinds of events it is that states ``before`` (n,) of a joint, or a crack, have become ``after`` (m,), and which of them is
-    that of the last contact or node."""
+    """What kinds of events it is that states ``before`` (n,) of a joint, or a crack, have become ``after`` (m,), and
+    which of them is that of the last contact or node."""
     (o, t, s), (o2, t2, s2) = (np.bincount(each, minlength=3).tolist() for each in (before, after))
     closed, closed2 = t + s, t2 + s2
     turns = (

@@ -1,10 +1,12 @@
 """In dynamics a tip feels its block's boundary only when waves have come from there.
 
-The crack solver answers at once: forces on the block, its inertia as a body force, all of the block in equilibrium. Of a sudden
-force that is wrong until waves have crossed the block: a block that falls on its base is decelerated as a whole, its
-strain is not there yet, and the inertia of the strain to come puts the middle in *tension* (by half of the pressure on a bar pressed at both ends,
-for a quarter of the time that a wave takes). Contacts that knock on their springs bring such spikes in every step. So a tip grows by the mean of K_eq over the time that a wave from the boundary takes to it, the form of the incubation-time
-criterion (1/τ) ∫ K dt ≥ K_Ic over the last τ of Petrov & Morozov (1994), where steps are shorter than that.
+The crack solver answers at once: forces on the block, its inertia as a body force, all of the block in equilibrium. Of
+a sudden force that is wrong until waves have crossed the block: a block that falls on its base is decelerated as a
+whole, its strain is not there yet, and the inertia of the strain to come puts the middle in *tension* (by half of the
+pressure on a bar pressed at both ends, for a quarter of the time that a wave takes). Contacts that knock on their
+springs bring such spikes in every step. So a tip grows by the mean of K_eq over the time that a wave from the boundary
+takes to it, the form of the incubation-time criterion (1/τ) ∫ K dt ≥ K_Ic over the last τ of Petrov & Morozov (1994),
+where steps are shorter than that.
 """
 
 from __future__ import annotations
@@ -32,8 +34,8 @@ class WaveTime:
     def drive(
         self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad] = _NONE
     ) -> np.ndarray:
-        """(n_tips,) the lesser of K_eq in the present step of ``dt`` s and of its mean over the time of a wave, Pa √m, from what
-        is loaded of its block's boundary (block → `BoundaryLoad`), or any of it where nothing is."""
+        """(n_tips,) the lesser of K_eq in the present step of ``dt`` s and of its mean over the time of a wave, Pa √m,
+        from what is loaded of its block's boundary (block → `BoundaryLoad`), or any of it where nothing is."""
         driven = tips["k_eq"].copy()
         for row, time in self._longer(tips, blocks, dt, loads):
             tip = tips[row]

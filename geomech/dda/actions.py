@@ -1,4 +1,5 @@
-"""What acts in a step beyond forces: motion that is given, and bolts, whose states are found together with the contacts'."""
+"""What acts in a step beyond forces: motion that is given, and bolts, whose states are found together with the
+contacts'."""
 
 from __future__ import annotations
 
@@ -22,9 +23,9 @@ Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Set
 
 
 def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0) -> np.ndarray:
-    """(2,) m/s² gravity at the time ``acting``, less the acceleration of a base that the blocks are seen from: its mean over
-    the time ``dt`` from ``start`` + ``ahead``, that over the step (``ahead`` 0) so that velocities are exact, or in statics its
-    value at ``acting``."""
+    """(2,) m/s² gravity at the time ``acting``, less the acceleration of a base that the blocks are seen from: its mean
+    over the time ``dt`` from ``start`` + ``ahead``, that over the step (``ahead`` 0) so that velocities are exact, or
+    in statics its value at ``acting``."""
     gravity = loads.gravity.at(acting)
     if loads.base is None or loads.base.frame != "base":
         return gravity
@@ -84,8 +85,8 @@ class StepActions:
         return pairs.block, np.where(pairs.other == GROUND, pairs.block, pairs.other)
 
     def held(self, held: np.ndarray | None) -> np.ndarray | None:
-        """What of the unknowns ``held`` (n_blocks, 6) the step has to hold itself: not those of blocks whose motion is given in
-        part, which hold them with what is given."""
+        """What of the unknowns ``held`` (n_blocks, 6) the step has to hold itself: not those of blocks whose motion is
+        given in part, which hold them with what is given."""
         if held is None:
             return None
         if self.imposed is not None:
@@ -102,8 +103,8 @@ class StepActions:
         gap: np.ndarray, settle: Settle,
     ) -> tuple[Settled, np.ndarray]:  # fmt: skip
         """Settled contacts and the solver's unknowns (n_free, 6), given ones among them. Changes matrix, right side and
-        vectors in place, to those of the equations that are solved; given motion adds to what contacts' gaps and ``stretch`` begin
-        with. Raises `Unsettled`."""
+        vectors in place, to those of the equations that are solved; given motion adds to what contacts' gaps and
+        ``stretch`` begin with. Raises `Unsettled`."""
         if self.bolts is not None:
             self.bolts.stiffen_turning(matrix, self.order, self.moments)
         shift = np.zeros((len(found), 2))
@@ -180,8 +181,8 @@ class StepActions:
         return spare[:-1]
 
     def work_forces(self, reaction: np.ndarray | None, contacts: np.ndarray, centroid: np.ndarray) -> np.ndarray:
-        """(n_blocks, 6) N, N m whose work given motion does: ``reaction`` on moving blocks, on fixed ones what holds them against
-        their CONTACT rows."""
+        """(n_blocks, 6) N, N m whose work given motion does: ``reaction`` on moving blocks, on fixed ones what holds
+        them against their CONTACT rows."""
         out = np.zeros((self.blocks.n_blocks, 6)) if reaction is None else reaction.copy()
         if self.imposed is not None and self.imposed.moving_base:
             driven = self.imposed.increment.any(axis=1)
@@ -191,8 +192,9 @@ class StepActions:
     def acted(
         self, settled: Settled, unknowns: np.ndarray, contacts: np.ndarray, points: np.ndarray, new_vertices: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray | None, dict[str, float]]:
-        """(POINT_FORCE rows ``points`` with those of bolts and moved points, (n_blocks, 6) N and N m that it takes to give
-        moving blocks their motion (None without), statistics), and the bolts remember the step. ``contacts`` CONTACT rows."""
+        """(POINT_FORCE rows ``points`` with those of bolts and moved points, (n_blocks, 6) N and N m that it takes to
+        give moving blocks their motion (None without), statistics), and the bolts remember the step. ``contacts``
+        CONTACT rows."""
         rows, reaction, statistics = [points], None, {}
         if self.imposed is not None:
             pushes = [

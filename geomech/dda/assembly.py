@@ -20,8 +20,8 @@ DENSE_BLOCKS = 60
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """What links blocks besides contacts: ``blocks`` (k, 6, 6) of the matrix at ``row`` and ``column`` (k,) of its 6×6 blocks,
-    which stand at ``places`` (k, 6, 6) of the flat matrix."""
+    """What links blocks besides contacts: ``blocks`` (k, 6, 6) of the matrix at ``row`` and ``column`` (k,) of its 6×6
+    blocks, which stand at ``places`` (k, 6, 6) of the flat matrix."""
 
     row: np.ndarray
     column: np.ndarray
@@ -33,8 +33,8 @@ class Links:
 class Pattern:
     """Where each 6×6 block stands in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
 
-    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. ``solver`` is None for a dense matrix. ``links``
-    are those that other things than contacts make, None without.
+    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. ``solver`` is None for a dense matrix.
+    ``links`` are those that other things than contacts make, None without.
     """
 
     n: int
@@ -80,7 +80,8 @@ def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pa
 def sparse_pattern(
     order: np.ndarray, block: np.ndarray, other: np.ndarray, points: np.ndarray, kept: BlockSolver | None = None
 ) -> Pattern:
-    """Pattern of a block-sparse matrix, its 6×6 blocks stored one after the other. ``points`` (n_blocks, 2) m: centroids.
+    """Pattern of a block-sparse matrix, its 6×6 blocks stored one after the other. ``points`` (n_blocks, 2) m:
+    centroids.
 
     The ``kept`` solver serves on as long as no two blocks meet that did not when it was made.
     """

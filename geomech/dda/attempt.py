@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
 #: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
 _PLACED = 20
-#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the radius of corners.
+#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the radius of
+#: corners.
 _BENDS, _KNOWN = 4, 0.1
 
 
@@ -159,7 +160,8 @@ class Attempt:
                     break
                 bends -= 1
             elif tries % _PLACED == 0:
-                # Which part touches may follow contacts that jump at any step: these faces stand on their corners in this one.
+                # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
+                # this one.
                 better = found.cornered(better)
             found = better.trying(found.rows(settled))
         else:
@@ -168,7 +170,8 @@ class Attempt:
         self.vectors, self.weight = vectors, weight
 
     def _bent(self, found: ContactSet, settled: Settled, unknowns: np.ndarray) -> ContactSet | None:
-        """The contacts ``found`` with the gaps that the motion of ``unknowns`` really leads to; None if those are known."""
+        """The contacts ``found`` with the gaps that the motion of ``unknowns`` really leads to; None if those are
+        known."""
         system = self.system
         if system.scheme.static or not len(found) or not self.n_free:
             return None

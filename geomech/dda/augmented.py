@@ -1,13 +1,13 @@
 """Contacts that do not penetrate: multipliers that take over what penalty springs hold.
 
 N = λₙ − kₙ g and S = λₜ − kₛ s, with the multipliers raised to N and S after every open–close iteration to the end
-(Uzawa; Hestenes 1969, Simo & Laursen 1992), until the gap g of closed contacts and the elastic motion s of sticking ones
-are below a tolerance. The penalty then decides how quickly, not how exactly, faces are held. The states are those of
-max(0, λₙ − kₙ g), so that contacts open and close by the same test. While the states stand, the map from multipliers to forces
-is linear and Anderson's (1965) mixing is GMRES on it, which soft springs in short steps need.
+(Uzawa; Hestenes 1969, Simo & Laursen 1992), until the gap g of closed contacts and the elastic motion s of sticking
+ones are below a tolerance. The penalty then decides how quickly, not how exactly, faces are held. The states are those
+of max(0, λₙ − kₙ g), so that contacts open and close by the same test. While the states stand, the map from multipliers
+to forces is linear and Anderson's (1965) mixing is GMRES on it, which soft springs in short steps need.
 
-Multipliers are remembered as the contact's forces; what is left of s is remembered too, so that tolerances do not add up to
-creep. Contacts with a joint's own stiffness have a spring that is real, and keep it.
+Multipliers are remembered as the contact's forces; what is left of s is remembered too, so that tolerances do not add
+up to creep. Contacts with a joint's own stiffness have a spring that is real, and keep it.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from .open_close import Settled, Unsettled
 _DEPTH = 12
 #: Updates of the multipliers before the step is cut. Springs as soft as the blocks take about ten in statics.
 _MOST_UPDATES = 60
-#: After so many, and again and again, the springs become so much stiffer (Bertsekas 1982): soft ones in short steps are slow
-#: where states still change.
+#: After so many, and again and again, the springs become so much stiffer (Bertsekas 1982): soft ones in short steps are
+#: slow where states still change.
 _PATIENCE, _STIFFER = 10, 5.0
 
 
@@ -62,8 +62,8 @@ def settle_augmented(
     tolerance: float,
 ) -> Settled:
     """The settled step of ``found`` with multipliers; ``solve`` (contacts, springs, starting gaps) iterates open–close
-    states; ``springs`` and starting ``gap`` (n,) are those of the step, ``held`` (n,) twice says which contacts have penalty springs, normal
-    and shear. ``tolerance`` m.
+    states; ``springs`` and starting ``gap`` (n,) are those of the step, ``held`` (n,) twice says which contacts have
+    penalty springs, normal and shear. ``tolerance`` m.
 
     Raises `Unsettled` when the multipliers do not settle.
     """

@@ -1,5 +1,5 @@
-"""How many threads the BLAS of NumPy and of SciPy work on: sums come out in another order, and so rounded otherwise, with another
-number of them, and events of blocks and cracks tell last digits apart after a few steps."""
+"""How many threads the BLAS of NumPy and of SciPy work on: sums come out in another order, and so rounded otherwise,
+with another number of them, and events of blocks and cracks tell last digits apart after a few steps."""
 
 from __future__ import annotations
 

@@ -1,13 +1,13 @@
 """Solutions of one 6×6-block system after another, each with no more work than its difference from the last asks for.
 
 Where springs have changed since the last factorisation, only the fronts of their blocks and those above are eliminated
-again; where blocks have hardly moved, none. What is kept so, or factored in single precision, preconditions GMRES (Saad &
-Schultz 1986), which brings the residual down to round-off.
+again; where blocks have hardly moved, none. What is kept so, or factored in single precision, preconditions GMRES (Saad
+& Schultz 1986), which brings the residual down to round-off.
 
-Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for a
-factorisation and a substitution, ms): these factors 9 + 1.1 and 210 + 19, in single precision 6 + 0.6 and 122 + 11; PARDISO of
-MKL 2026 11 to 19 + 6 and 245 to 478 + 61; an incomplete factorisation with GMRES 234 and 5400; smoothed aggregation (pyamg 5, six
-fields an aggregate) and block Jacobi do not come to 1e-10 in 500 iterations.
+Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for
+a factorisation and a substitution, ms): these factors 9 + 1.1 and 210 + 19, in single precision 6 + 0.6 and 122 + 11;
+PARDISO of MKL 2026 11 to 19 + 6 and 245 to 478 + 61; an incomplete factorisation with GMRES 234 and 5400; smoothed
+aggregation (pyamg 5, six fields an aggregate) and block Jacobi do not come to 1e-10 in 500 iterations.
 """
 
 from __future__ import annotations
@@ -27,15 +27,16 @@ RESIDUAL = 1e-12
 ROUND_OFF = 2e-15
 #: Refinements of a solution at most.
 REFINEMENTS = 3
-#: A 6×6 diagonal block has changed when one of its entries has by more than this part of the largest: what stiff springs
-#: lose so stays below the inertia that holds a block against them (measured: 1e-3 takes twice the time at dt = 1 ms).
+#: A 6×6 diagonal block has changed when one of its entries has by more than this part of the largest: what stiff
+#: springs lose so stays below the inertia that holds a block against them (measured: 1e-3 takes twice the time at dt =
+#: 1 ms).
 CHANGED = 1e-6
 #: Solutions in a cycle of GMRES at most.
 TRIES = 16
 #: Where fronts cannot be eliminated one by one, factors that differ in so few blocks are not made anew.
 FEW = 12
-#: Free blocks from which factors are in single precision: half the memory, and on walls of 10 000 bricks three quarters of the
-#: time although a solution takes two substitutions more; of 1 000 as quick.
+#: Free blocks from which factors are in single precision: half the memory, and on walls of 10 000 bricks three quarters
+#: of the time although a solution takes two substitutions more; of 1 000 as quick.
 SINGLE = 4000
 
 
@@ -60,8 +61,8 @@ def multiply(data, pointer, columns, x):
 
 @_jit
 def _changed(data, diagonal, factored, tolerance):
-    """(n,) whether a diagonal block of ``data`` differs from the one ``factored`` (n, 36) by more than this part of its largest
-    entry."""
+    """(n,) whether a diagonal block of ``data`` differs from the one ``factored`` (n, 36) by more than this part of its
+    largest entry."""
     n = len(diagonal)
     out = np.empty(n, np.bool_)
     for b in range(n):
@@ -86,8 +87,9 @@ def _take(data, diagonal, changed, factored):
 class BlockSolver:
     """Solves A x = b for one pattern of 6×6 blocks and matrices that change from time to time.
 
-    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both triangles
-    and the diagonal, sorted by row then column. The order of elimination is internal. ``counts`` tells what was done.
+    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
+    triangles and the diagonal, sorted by row then column. The order of elimination is internal. ``counts`` tells what
+    was done.
     """
 
     def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray):
@@ -113,8 +115,8 @@ class BlockSolver:
         return np.searchsorted(self.keys, keys)
 
     def solve(self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL) -> np.ndarray:
-        """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row, with a residual ``within`` that part of ``right``, or of
-        round-off. Raises numpy.linalg.LinAlgError."""
+        """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row, with a residual ``within`` that part of
+        ``right``, or of round-off. Raises numpy.linalg.LinAlgError."""
         if self._factors.single:
             try:
                 x = self._solved(data, right, within)
@@ -127,16 +129,17 @@ class BlockSolver:
         return self._solved(data, right, within)
 
     def _hold(self, dtype: type) -> None:
-        """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.4 GB."""
+        """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.4
+        GB."""
         tree, self._has_factors = self._factors.tree, False
         del self._factors
         self._factors = Factors(*self._pattern, dtype, tree)
 
     def rough_solution(self, data: np.ndarray) -> Callable[..., np.ndarray]:
-        """What gives x (6n,) for one right side after the other, ``solution(right, within, start)``, with a residual ``within`` that
-        part of it, from where it is known to ``start`` (6n,), from factors in single precision (half the time of double ones,
-        where that is all the digits asked for), which leave those of `solve` alone, unless they are of so many blocks that
-        single ones take their place. Raises numpy.linalg.LinAlgError."""
+        """What gives x (6n,) for one right side after the other, ``solution(right, within, start)``, with a residual
+        ``within`` that part of it, from where it is known to ``start`` (6n,), from factors in single precision (half
+        the time of double ones, where that is all the digits asked for), which leave those of `solve` alone, unless
+        they are of so many blocks that single ones take their place. Raises numpy.linalg.LinAlgError."""
 
         def exactly(right: np.ndarray, within: float, start: np.ndarray | None = None) -> np.ndarray:
             return self.solve(data, right, within)
@@ -167,8 +170,8 @@ class BlockSolver:
         return solution
 
     def _rough_factors(self) -> Factors | None:
-        """Factors in single precision, with room of their own or, of many blocks, in the place of those of `solve`; None where
-        they do not serve."""
+        """Factors in single precision, with room of their own or, of many blocks, in the place of those of `solve`;
+        None where they do not serve."""
         if not self._rough_serves:
             return None
         if self.n >= SINGLE:
@@ -216,8 +219,8 @@ class BlockSolver:
         self.counts["shares"] += share
 
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> None:
-        """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only. Raises
-        numpy.linalg.LinAlgError when it is singular."""
+        """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only.
+        Raises numpy.linalg.LinAlgError when it is singular."""
         self._has_factors = False
         share = self._factors.factor(data, changed)
         _take(data, self._diagonal, np.ones(self.n, np.bool_) if changed is None else changed, self._factored)
@@ -258,7 +261,8 @@ class BlockSolver:
         return None
 
     def _krylov(self, data: np.ndarray, rest: np.ndarray, target: float, factors: Factors) -> np.ndarray | None:
-        """The correction that brings ``rest`` down to ``target``, None if it would take more than ``TRIES`` solutions."""
+        """The correction that brings ``rest`` down to ``target``, None if it would take more than ``TRIES``
+        solutions."""
         size = float(np.linalg.norm(rest))
         basis, directions = [rest / size], []
         hessenberg = np.zeros((TRIES + 1, TRIES))

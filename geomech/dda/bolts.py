@@ -1,8 +1,9 @@
 """Bolts in a step: springs between two blocks along their axis and across it, that yield, go slack and break.
 
-T = P + k (l − l₀ − lₚ) along the axis from the first to the second end (P pretension, l₀ the length at installation, lₚ what it
-yielded), between its limits; across it a dowel, and the stiffness T/l that a taut bolt has against turning. The states are
-found with the step, not after it: a bolt that would carry more than it can is given its limit and the step solved again.
+T = P + k (l − l₀ − lₚ) along the axis from the first to the second end (P pretension, l₀ the length at installation, lₚ
+what it yielded), between its limits; across it a dowel, and the stiffness T/l that a taut bolt has against turning. The
+states are found with the step, not after it: a bolt that would carry more than it can is given its limit and the step
+solved again.
 """
 
 from __future__ import annotations
@@ -150,7 +151,8 @@ class BoltSet:
         return same
 
     def springs(self) -> tuple[np.ndarray, np.ndarray]:
-        """((n, 2) stiffness N/m, (n, 2) forces at no motion N on the second block along and across) in the present states.
+        """((n, 2) stiffness N/m, (n, 2) forces at no motion N on the second block along and across) in the present
+        states.
 
         Forces are those that the pairs' vectors take to generalised ones: along, −T.
         """
@@ -178,8 +180,9 @@ class BoltSet:
         return out
 
     def stiffen_turning(self, matrix: np.ndarray, order: np.ndarray, moments: np.ndarray) -> None:
-        """Add to ``matrix`` (n_free, 6, 6), in place, that a taut bolt turns the block it hangs on back: its force F at the arm
-        a from the centroid has the moment a × F − ϑ a·F after a turn ϑ. Found too late, it would swing ever further."""
+        """Add to ``matrix`` (n_free, 6, 6), in place, that a taut bolt turns the block it hangs on back: its force F at
+        the arm a from the centroid has the moment a × F − ϑ a·F after a turn ϑ. Found too late, it would swing ever
+        further."""
         tension = np.clip(self.trial, 0.0, self.most)
         for side, owner in enumerate((self.pairs.block, self.pairs.other)):
             pull = (1.0, -1.0)[side] * tension[:, None] * self.pairs.axes[:, 0]
@@ -191,7 +194,8 @@ class BoltSet:
     def assemble(
         self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(matrix, right) with the bolts' diagonal blocks and forces, and the (n, 6, 6) blocks (first block, second)."""
+        """(matrix, right) with the bolts' diagonal blocks and forces, and the (n, 6, 6) blocks (first block,
+        second)."""
         matrix, right = matrix.copy(), right.copy()
         k, at_rest = self.springs()
         push = at_rest - k * self.pairs.shift
@@ -205,7 +209,8 @@ class BoltSet:
         return matrix, right, stiff[:, :6, 6:]
 
     def remember(self, memory: np.ndarray, motion: np.ndarray, point_at) -> None:
-        """Write into the BOLT rows ``memory`` what the step did; ``point_at(block, at)`` is where points are after it."""
+        """Write into the BOLT rows ``memory`` what the step did; ``point_at(block, at)`` is where points are after
+        it."""
         forces = self.forces(motion)
         for row, k in enumerate(self.number):
             bolt, kept = self.bolts[k], memory[k]
@@ -226,7 +231,8 @@ class BoltSet:
                 kept["broken"] = True
 
     def point_rows(self, forces: np.ndarray) -> np.ndarray:
-        """POINT_FORCE rows of both ends of every bolt (those in the ground left out) under ``forces`` (n, 2) as in `forces`."""
+        """POINT_FORCE rows of both ends of every bolt (those in the ground left out) under ``forces`` (n, 2) as in
+        `forces`."""
         rows = np.zeros(2 * len(self.number), POINT_FORCE)
         on_second = np.einsum("nk,nkd->nd", forces, self.pairs.axes)
         own = [self.bolts[k] for k in self.number]

@@ -1,15 +1,16 @@
 """Bonds of whole faces: what two corners of a face hold together, and when the bond between them fails.
 
-An edge on an edge is held by contacts at the ends of the overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle are the
-resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which between blocks that deform evenly is a straight
-line. Its extreme fibre is at
+An edge on an edge is held by contacts at the ends of the overlap ℓ. Their pulls Tᵢ at the distances aᵢ from its middle
+are the resultants T = Σ Tᵢ and M = Σ Tᵢ aᵢ of the stress along the face, which between blocks that deform evenly is a
+straight line. Its extreme fibre is at
 
     σ = T/ℓ + 6 |M|/ℓ²      (Navier; for two corners 2 (2 T₁ − T₀)/ℓ at the end 1),
 
-and where that reaches the tensile strength a brittle bond fails from end to end, unless the resultant presses within the
-face: then the crack from its edge ends before the other, and what is left holds by friction and cohesion but no pull. Sheared,
-the face holds Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts, for what one end does not hold the other does. The
-corners one by one would hold three times the moment, and half the cohesion where one end slips before the other.
+and where that reaches the tensile strength a brittle bond fails from end to end, unless the resultant presses within
+the face: then the crack from its edge ends before the other, and what is left holds by friction and cohesion but no
+pull. Sheared, the face holds Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts, for what one end does not hold the
+other does. The corners one by one would hold three times the moment, and half the cohesion where one end slips before
+the other.
 """
 
 from __future__ import annotations
@@ -70,8 +71,8 @@ class BondedFaces:
 def on_lines(
     block: np.ndarray, other: np.ndarray, geometry: np.ndarray, some: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The contacts ``some`` (k,) of a `ContactSet`, face by face: their rows, where each face begins among them and ends, and
-    where they lie along it (m)."""
+    """The contacts ``some`` (k,) of a `ContactSet`, face by face: their rows, where each face begins among them and
+    ends, and where they lie along it (m)."""
     first, last = np.minimum(block[some], other[some]), np.maximum(block[some], other[some])
     order = np.lexsort((last, first))
     some = some[order]
@@ -85,7 +86,8 @@ def on_lines(
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _on_one_line(first, last, swapped, geometry):
-    """Number of the face of each contact (n,), and where it lies along it (m), the contacts ordered by pairs of blocks."""
+    """Number of the face of each contact (n,), and where it lies along it (m), the contacts ordered by pairs of
+    blocks."""
     n = first.shape[0]
     face, lead, along = np.empty(n, np.int64), np.empty(n, np.int64), np.zeros(n)
     pair, faces = 0, 0
@@ -133,7 +135,8 @@ def check_faces(
     new_bonded,
     violation,
 ):
-    """Put right, in place, what `check_states` calls for contacts whose whole face is bonded; other arguments as there."""
+    """Put right, in place, what `check_states` calls for contacts whose whole face is bonded; other arguments as
+    there."""
     for f in range(length.shape[0]):
         intact, out, pulls = True, False, False
         pull = moment = strength = drawn = sheared = capacity = firm = least = 0.0

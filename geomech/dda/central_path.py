@@ -1,18 +1,19 @@
 """Contact states found along the central path: what to try when switching contact by contact leads nowhere.
 
 Where many contacts open, close and slide at once, as in a wall on which its weight is put suddenly, each set of states
-moves the blocks so far that most of the next set is wrong too. The interior-point method never decides: every contact keeps
-a force N > 0 and a gap w > 0, and sliding contacts slip rates α, β > 0 beside the strengths S has left on either side,
+moves the blocks so far that most of the next set is wrong too. The interior-point method never decides: every contact
+keeps a force N > 0 and a gap w > 0, and sliding contacts slip rates α, β > 0 beside the strengths S has left on either
+side,
 
     w = g + N/kₙ,   N w = ε,       (μN + c ∓ S) (α, β) = ε,   Δs + (S − S₀)/kₛ = β − α,
 
 and ε is driven to zero by Newton's method with Mehrotra's (1992) predictor and corrector and Gondzio's (1996) further
-correctors, which bring products far from ε back towards it, for the linear complementarity problem of Coulomb friction in an
-implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring between stiff and none, so that each
-iteration is one factorisation of the matrix of the open–close iterations. Where steps become short the contacts are centred
-again about the motion at hand, with a larger ε. Bonds hold, as springs: whether they break is asked when all else is right.
-Friction on the present normal force is no gradient of an energy and nothing guarantees the end; what comes out is only a
-proposal, and the open–close iterations go on from it.
+correctors, which bring products far from ε back towards it, for the linear complementarity problem of Coulomb friction
+in an implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring between stiff and none,
+so that each iteration is one factorisation of the matrix of the open–close iterations. Where steps become short the
+contacts are centred again about the motion at hand, with a larger ε. Bonds hold, as springs: whether they break is
+asked when all else is right. Friction on the present normal force is no gradient of an energy and nothing guarantees
+the end; what comes out is only a proposal, and the open–close iterations go on from it.
 """
 
 from __future__ import annotations
@@ -29,26 +30,27 @@ from .contacts import ContactSet
 
 #: The bond of a contact that has slipped and not lost all cohesion: it may slide.
 SLIPPED = 2
-#: ε is counted in units of the squared load on the blocks about a contact over its stiffness. It starts at so many times the mean of N²/kₙ
-#: in the last open–close iteration (slopes of 400 to 1 000 blocks: 1 takes a third more iterations, 1 000 walls a tenth more),
-#: and not below the second number.
+#: ε is counted in units of the squared load on the blocks about a contact over its stiffness. It starts at so many
+#: times the mean of N²/kₙ in the last open–close iteration (slopes of 400 to 1 000 blocks: 1 takes a third more
+#: iterations, 1 000 walls a tenth more), and not below the second number.
 _START, _LEAST_START = 100.0, 0.1
-#: Further correctors of a step at most, sought while it goes less far than this (with four, paths of slopes come to an end
-#: sooner; with none they take a quarter more iterations), …
+#: Further correctors of a step at most, sought while it goes less far than this (with four, paths of slopes come to an
+#: end sooner; with none they take a quarter more iterations), …
 _CORRECTORS, _FAR = 3, 0.9
-#: … that bring products to within this factor of their target, for steps longer by a factor and an amount, and are worth while
-#: where a step gets so much of this.
+#: … that bring products to within this factor of their target, for steps longer by a factor and an amount, and are
+#: worth while where a step gets so much of this.
 _SPREAD, _FARTHER, _FURTHER, _GAIN = 10.0, 1.2, 0.1, 0.1
-#: So often contacts are centred again where steps have become short, with so much larger an ε than then (with the same one
-#: the path ends where it did).
+#: So often contacts are centred again where steps have become short, with so much larger an ε than then (with the same
+#: one the path ends where it did).
 _AGAIN, _LARGER = 4, 10.0
-#: A contact's load is the largest within so many blocks of it. (With the load of its own two blocks a pebble below a large block
-#: stops the path at once; with so many, slopes of 400 to 1 000 blocks take a tenth fewer iterations too.)
+#: A contact's load is the largest within so many blocks of it. (With the load of its own two blocks a pebble below a
+#: large block stops the path at once; with so many, slopes of 400 to 1 000 blocks take a tenth fewer iterations too.)
 _PASSED_ON = 3
-#: Where the step is as short as that because of so small a part of the contacts (or so few), those alone are centred again about the
-#: motion that the others allow, with so much larger an ε, at most so many times: those that stop it before so much of the way.
-#: (Friction on two neighbours' corners may leave no way along the path. On a slope of 1 000 blocks that slides, steps for which
-#: all contacts were centred again, in vain, took 250 iterations and now take 40; with ε 100 times larger one in three still does.)
+#: Where the step is as short as that because of so small a part of the contacts (or so few), those alone are centred
+#: again about the motion that the others allow, with so much larger an ε, at most so many times: those that stop it
+#: before so much of the way. (Friction on two neighbours' corners may leave no way along the path. On a slope of 1 000
+#: blocks that slides, steps for which all contacts were centred again, in vain, took 250 iterations and now take 40;
+#: with ε 100 times larger one in three still does.)
 _ALONE, _ALONE_FEW, _ALONE_FAR, _ALONE_LARGER, _ALONE_AGAIN = 0.005, 8, 0.3, 1000.0, 40
 #: No step goes farther than this part of the way to where a force or a gap vanishes.
 _SHORT_OF = 0.99
@@ -58,11 +60,12 @@ _CLEAR = 3.0
 _END, _STUCK = 1e-14, 1e-3
 #: … and so many in a row that are shorter than this, hardly.
 _BLOCKED, _SHORT = 5, 0.05
-#: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their difference.
+#: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their
+#: difference.
 _LEAST_LEFT = 1e-14
-#: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. Walls of 1 000
-#: bricks take as many steps as with 1e-12, of 10 000 as with 1e-6. The predictor, which only says how far to aim, needs less, and
-#: correctors begin with it.
+#: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. Walls of
+#: 1 000 bricks take as many steps as with 1e-12, of 10 000 as with 1e-6. The predictor, which only says how far to aim,
+#: needs less, and correctors begin with it.
 WITHIN, _GUESSED = 1e-4, 1e-2
 
 
@@ -120,8 +123,8 @@ def assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, 
 
 
 def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
-    """What solves with the matrix of ``data`` for one right side after the other, to a residual ``within`` that part of it, from a
-    ``start`` (6 n,) on that is nearly it. Raises numpy.linalg.LinAlgError."""
+    """What solves with the matrix of ``data`` for one right side after the other, to a residual ``within`` that part of
+    it, from a ``start`` (6 n,) on that is nearly it. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is not None:
         return pattern.solver.rough_solution(data)
@@ -135,9 +138,9 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _pulls(goals, numbers, missed, soft, stiff_along, slope):
-    """(3, n) N of a Newton step where blocks stand still: normal forces, shear forces without what answers these, and with it.
-    ``goals`` (3, n) J for the products, ``numbers`` (6, n) N, w, α, β and the strengths left above and below S, ``missed`` (2, n) m of
-    gap and slip."""
+    """(3, n) N of a Newton step where blocks stand still: normal forces, shear forces without what answers these, and
+    with it. ``goals`` (3, n) J for the products, ``numbers`` (6, n) N, w, α, β and the strengths left above and below
+    S, ``missed`` (2, n) m of gap and slip."""
     out = np.empty((3, len(soft)))
     for c in range(len(soft)):
         normal, width, back, ahead, above, below = numbers[:, c]
@@ -149,8 +152,8 @@ def _pulls(goals, numbers, missed, soft, stiff_along, slope):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _changes(goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, kn, mu, rough):
-    """Changes (6, n) of the ``numbers``, (n,) of S, and how far along them positive numbers stay so, at most 1: ``motion`` (n, 2) m of
-    the blocks, the rest as for `_pulls`."""
+    """Changes (6, n) of the ``numbers``, (n,) of S, and how far along them positive numbers stay so, at most 1:
+    ``motion`` (n, 2) m of the blocks, the rest as for `_pulls`."""
     n = len(stiff)
     out, shear, far = np.empty((6, n)), np.empty(n), 1.0
     for c in range(n):
@@ -179,11 +182,12 @@ def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
 
 
 class CentralPath:
-    """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which hold,
-    ``forces`` (n,) N normal forces of the size to be expected.
+    """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which
+    hold, ``forces`` (n,) N normal forces of the size to be expected.
 
-    Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins. ``missed``: what is
-    left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their stiffness.
+    Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins. ``missed``:
+    what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
+    stiffness.
     """
 
     def __init__(
@@ -225,8 +229,8 @@ class CentralPath:
 
         load = np.append(np.abs(right).max(axis=1, initial=0.0), 0.0)
         mine, others = order[self._at[0]], order[self._at[1]]
-        # Small blocks pass on what large ones press them with: contacts in units of a small block's own load would have forces
-        # that are nothing beside what they must balance, and no step of the path would get anywhere.
+        # Small blocks pass on what large ones press them with: contacts in units of a small block's own load would have
+        # forces that are nothing beside what they must balance, and no step of the path would get anywhere.
         for _ in range(_PASSED_ON):
             known = load.copy()
             np.maximum.at(load, mine, known[others])
@@ -264,7 +268,8 @@ class CentralPath:
 
     def _centre(self, epsilon: np.ndarray) -> None:
         """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""
-        # The roots of w² − g w = ε/kₙ and of its like for N/kₙ, of which the smaller would cancel: their product is ε/kₙ.
+        # The roots of w² − g w = ε/kₙ and of its like for N/kₙ, of which the smaller would cancel: their product is
+        # ε/kₙ.
         larger = 0.5 * (np.sqrt(self._g**2 + 4.0 * epsilon / self._kn) + np.abs(self._g))
         smaller = epsilon / self._kn / larger
         self._width = np.where(self._g > 0.0, larger, smaller)
@@ -316,7 +321,8 @@ class CentralPath:
         numbers, missed = np.stack([normal, width, back, ahead, above, below]), np.stack([gap_missed, slip_missed])
 
         def newton(goals, within=WITHIN, start=None):
-            """Changes of the unknowns, of gap and motion along, of the six positive numbers and of S, and how far they may go."""
+            """Changes of the unknowns, of gap and motion along, of the six positive numbers and of S, and how far they
+            may go."""
             pulls = _pulls(goals, numbers, missed, soft, stiff_along, slope)
             side = residual.copy()
             add_forces(side, *self._at, pulls[0], pulls[2])
@@ -367,7 +373,8 @@ class CentralPath:
         return int(self._undecided().sum())
 
     def _without_few(self, numbers: np.ndarray, changes: np.ndarray, far: float) -> tuple[float, np.ndarray | None]:
-        """How far the ``changes`` (6, n) may go but for few contacts, and these, (n,) True; ``far`` and None where they are many."""
+        """How far the ``changes`` (6, n) may go but for few contacts, and these, (n,) True; ``far`` and None where they
+        are many."""
         falling = changes < 0.0
         falling[2:] &= self._rough
         reach = np.where(falling, -numbers / np.where(falling, changes, -1.0), np.inf).min(axis=0)

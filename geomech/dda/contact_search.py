@@ -3,11 +3,11 @@
 A vertex meets the interior of an edge when its corner points away from the edge. Where two corners meet, the lines
 through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
 entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
-within the other's edge; where each lies within the other's, the two corners are the ends of a short common face, and both
-stand for the line. Corners meet only if neither is nearer to a neighbour of the other: on outlines with edges shorter than the
-window, as cracks leave them, all are in reach of all, and the lines of far ones are crossed by blocks that do not touch.
-When two lines remain, the corners overlap only if both gaps are negative, and the line of the smaller penetration carries
-the contact; each is stored as the other's *partner*.
+within the other's edge; where each lies within the other's, the two corners are the ends of a short common face, and
+both stand for the line. Corners meet only if neither is nearer to a neighbour of the other: on outlines with edges
+shorter than the window, as cracks leave them, all are in reach of all, and the lines of far ones are crossed by blocks
+that do not touch. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
+smaller penetration carries the contact; each is stored as the other's *partner*.
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ def _meet(vertices, next_vertex, previous_vertex, v, w):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
-    """Whether an edge with this ``gap`` is what ``vertex`` meets at a corner, rather than the corner's ``other`` edge."""
+    """Whether an edge with this ``gap`` is what ``vertex`` meets at a corner, rather than the corner's ``other``
+    edge."""
     feasible, _, _, beside, _, _ = _against(vertices, next_vertex, previous_vertex, vertex, other)
     return not feasible or gap >= beside
 
@@ -114,8 +115,8 @@ def _join_partners(table, row, other):
 
 
 def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, pairs, window, old_keys) -> np.ndarray:
-    """(n_contacts, 4): vertex, edge, and up to two partner rows (−1: none), for all of the ``pairs`` (k, 2) of blocks, the
-    lower number first, that are nearer than ``window`` (m), pair by pair.
+    """(n_contacts, 4): vertex, edge, and up to two partner rows (−1: none), for all of the ``pairs`` (k, 2) of blocks,
+    the lower number first, that are nearer than ``window`` (m), pair by pair.
 
     ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
     representations of a corner on a corner is kept, so that contacts do not change names on round-off.
@@ -254,12 +255,14 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                     feasible, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
                     if not feasible or abs(gap) > window or along < -window or along > length + window:
                         continue
-                    # In a re-entrant corner a vertex may be past an edge's end by what it penetrates, not round the next corner.
+                    # In a re-entrant corner a vertex may be past an edge's end by what it penetrates, not round the
+                    # next corner.
                     if along < 0.0 and not convex[edge] and _nearer(vertices, v, previous_vertex[edge], edge):
                         continue
                     if along > length and not convex[end] and _nearer(vertices, v, next_vertex[end], end):
                         continue
-                    # Corner to corner is done above, for corners that meet; of others the shallower edge is met within its ends.
+                    # Corner to corner is done above, for corners that meet; of others the shallower edge is met within
+                    # its ends.
                     if convex[edge] and along <= window:
                         if along < 0.0 or _meet(vertices, next_vertex, previous_vertex, v, edge):
                             continue
@@ -311,7 +314,8 @@ def describe_contacts(
             if cosine < facing:
                 facing = cosine
                 mate[row] = own
-            # As near to an end as this, the corner stands for the end, too, and faces the edges on both sides of a flat node.
+            # As near to an end as this, the corner stands for the end, too, and faces the edges on both sides of a flat
+            # node.
             ends = _ENDS * max(length, own_length)
             for turn in range(3):
                 face = edge

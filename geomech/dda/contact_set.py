@@ -28,22 +28,26 @@ class ContactSet:
     vertex, edge, block, other, law   as in CONTACT rows
     partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
     rounding    (n,)     m, radius of corners: lines that miss each other by less still hold
-    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the faces in
-                ``points``, where their springs stand
+    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the
+                faces in ``points``, where their springs stand
     springs              stiffness and strengths
     state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
     normal, shear, slip        forces N and sliding m
-    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they have to
-                               come nearer than the geometry says to meet)
-    stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact does not
+    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they
+                               have to come nearer than the geometry says to meet)
+    stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact
+                               does not
                 count yet: what multipliers have left of it, and what given motion makes of it in the step
     inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
-    unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than at the corners
+    unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than
+                         at the corners
     relies_on_glue             corners have been left out that hold as long as all bonds do
     faces                      those that bonds hold at both ends; None without any
     by_length   (n,)           contacts whose shear stiffness is that of a law
-    points, lumped             faces whose springs stand inside them, and the contacts with theirs at the corners; None without any
-    arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the straight one
+    points, lumped             faces whose springs stand inside them, and the contacts with theirs at the corners; None
+                               without any
+    arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the
+                straight one
     tried                      state and direction that open–close iterations begin with, where these are others
     """
 
@@ -76,20 +80,22 @@ class ContactSet:
     tried: tuple[np.ndarray, np.ndarray] | None = None
 
     def trying(self, rows: np.ndarray) -> ContactSet:
-        """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are rows of the same contacts:
-        those with which another attempt at the step has ended."""
+        """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are
+        rows of the same contacts: those with which another attempt at the step has ended."""
         if len(rows) != len(self) or not all(
             np.array_equal(rows[name], getattr(self, name)) for name in ("vertex", "edge")
         ):
             return self
         way = np.where(rows["state"] == SLIP, np.sign(rows["shear_force"]), 0.0)
-        # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not known.
+        # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not
+        # known.
         known = (self.bonded == 0) | (rows["bonded"] == self.bonded)
         known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
         return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
 
     def like(self, rows: np.ndarray) -> ContactSet:
-        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press on."""
+        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press
+        on."""
         again = self.trying(rows)
         if again is self or self.points is None:
             return again
@@ -112,7 +118,8 @@ class ContactSet:
         )
 
     def misplaced(self, settled: Settled) -> ContactSet | None:
-        """The contacts with the springs of faces where the step, so ``settled``, has left them in contact; None if they stand so."""
+        """The contacts with the springs of faces where the step, so ``settled``, has left them in contact; None if they
+        stand so."""
         if self.points is None:
             return None
         better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
@@ -125,7 +132,8 @@ class ContactSet:
         return replace(self.lumped, arc=arc).placed(self.points)
 
     def cornered(self, better: ContactSet) -> ContactSet:
-        """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other parts."""
+        """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other
+        parts."""
         return self.lumped.placed(self.points.but(better.points))
 
     @cached_property
@@ -140,8 +148,8 @@ class ContactSet:
 
     @cached_property
     def behind(self) -> np.ndarray:
-        """(n,) True for lines of a pair of corners that the vertex has behind it while another keeps the corners apart: by that
-        one they come to overlap in this step, if they do."""
+        """(n,) True for lines of a pair of corners that the vertex has behind it while another keeps the corners apart:
+        by that one they come to overlap in this step, if they do."""
         gap, out = self.gap_before, np.zeros(len(self), bool)
         for column in self.partner.T:
             out |= (column >= 0) & (gap[column] > gap)
@@ -149,8 +157,8 @@ class ContactSet:
 
     @cached_property
     def reach(self) -> np.ndarray:
-        """(n,) m by which a closed contact may have left its edge when the step ends: one that meets the very end of an edge is
-        not pushed clear of it by what it presses."""
+        """(n,) m by which a closed contact may have left its edge when the step ends: one that meets the very end of an
+        edge is not pushed clear of it by what it presses."""
         passes = np.zeros(len(self), bool)
         for column in self.partner.T:
             passes |= (column >= 0) & self.behind[column]

@@ -10,25 +10,26 @@ import numpy as np
 from ..model import JointLaw
 
 #: Penalty over E' where the settings name none. Shi (1988) advises 10 to 100. The two springs of a face give way by a
-#: part 1/(2 · 40) of what the block itself is shortened; brick walls take about as many iterations a step from 1 to 40 E',
-#: half as many again with 160 and twice as many with 1000. The shear spring is as stiff.
+#: part 1/(2 · 40) of what the block itself is shortened; brick walls take about as many iterations a step from 1 to 40
+#: E', half as many again with 160 and twice as many with 1000. The shear spring is as stiff.
 PENALTY_RATIO = 40.0
-#: Between unlike blocks the geometric mean of both E' counts, at most this many times the softer. By the stiffer one alone
-#: walls of two rocks 1 : 1000 do not settle and 1 : 10⁶ costs five digits; by the softer one alone, steel platens on rock
-#: give way twelve times as much as they need.
+#: Between unlike blocks the geometric mean of both E' counts, at most this many times the softer. By the stiffer one
+#: alone walls of two rocks 1 : 1000 do not settle and 1 : 10⁶ costs five digits; by the softer one alone, steel platens
+#: on rock give way twelve times as much as they need.
 _MOST_CONTRAST = 32.0
-#: A joint's stiffness per area acts on a contact's tributary length, and on no less than this part of the smaller block's
-#: size, √area. A corner has no length: were it as stiff as the solver's penalty, blocks that slide or turn from a face onto a
-#: corner would begin on it with the penetration of the soft face, a hundred times the force and energy from nowhere, and
-#: what comes to lie on a sliver of a face would store its shear force in a spring that is next to none.
-#: Faces of slabs up to 100 : 1 are longer than that.
+#: A joint's stiffness per area acts on a contact's tributary length, and on no less than this part of the smaller
+#: block's size, √area. A corner has no length: were it as stiff as the solver's penalty, blocks that slide or turn from
+#: a face onto a corner would begin on it with the penetration of the soft face, a hundred times the force and energy
+#: from nowhere, and what comes to lie on a sliver of a face would store its shear force in a spring that is next to
+#: none. Faces of slabs up to 100 : 1 are longer than that.
 _LEAST_FACE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class JointTable:
-    """Joint laws as arrays (n_laws,); stiffness nan where the solver's penalty is to be used. Slopes are tangents of angles,
-    lengths m, stresses Pa; ``jrc`` 0 where a joint is not rough, ``closure`` inf where its stiffness is constant."""
+    """Joint laws as arrays (n_laws,); stiffness nan where the solver's penalty is to be used. Slopes are tangents of
+    angles, lengths m, stresses Pa; ``jrc`` 0 where a joint is not rough, ``closure`` inf where its stiffness is
+    constant."""
 
     friction: np.ndarray
     residual_friction: np.ndarray
@@ -83,10 +84,10 @@ class JointTable:
 class Springs:
     """Per contact (n,): stiffness N/m and strengths N, all per metre of thickness.
 
-    A contact that slides carries ``friction`` N + ``sliding``, one that sticks up to ``peak`` N + ``hold``, plus ``cohesion``
-    while it is bonded; it is pulled off at ``tension``. ``lift`` is what sliding opens, m per m along the edge's direction.
-    ``keeps`` marks those that slip does not wholly rob of cohesion. Laws that are no straight lines are here as the tangents
-    at the forces at hand (`CurvedJoints`).
+    A contact that slides carries ``friction`` N + ``sliding``, one that sticks up to ``peak`` N + ``hold``, plus
+    ``cohesion`` while it is bonded; it is pulled off at ``tension``. ``lift`` is what sliding opens, m per m along the
+    edge's direction. ``keeps`` marks those that slip does not wholly rob of cohesion. Laws that are no straight lines
+    are here as the tangents at the forces at hand (`CurvedJoints`).
     """
 
     normal: np.ndarray
@@ -113,12 +114,12 @@ def penalties(
     """(n,) Pa: penalty stiffness of contacts with tributary ``length`` (n,) m between ``block`` and ``other`` (n,); E'
     ``modulus`` Pa, ``area`` m², ``fixed`` and ``rigid`` (n_blocks,).
 
-    `PENALTY_RATIO` times the E' of both (a block that is fixed or rigid does not give way: the other's, so that a platen has
-    the same springs whether it stands or is moved) times the ratio of the face to the
-    block's depth behind it where that is above one, ≈ 4 ℓ²/A: the springs of a slab 1000 : 1 would otherwise give way by
-    twelve times its own shortening, and so give way by the hundredth that those of a square do. The time step does not
-    enter: walls settle as well at 10⁻³ as at 10⁶ times the time of a wave through a block, a stiffness bounded by m/dt²
-    only penetrates more, and a force that is a stiffness times a gap would jump whenever a step is cut.
+    `PENALTY_RATIO` times the E' of both (a block that is fixed or rigid does not give way: the other's, so that a
+    platen has the same springs whether it stands or is moved) times the ratio of the face to the
+    block's depth behind it where that is above one, ≈ 4 ℓ²/A: the springs of a slab 1000 : 1 would otherwise give way
+    by twelve times its own shortening, and so give way by the hundredth that those of a square do. The time step does
+    not enter: walls settle as well at 10⁻³ as at 10⁶ times the time of a wave through a block, a stiffness bounded by
+    m/dt² only penetrates more, and a force that is a stiffness times a gap would jump whenever a step is cut.
     """
     hold, hold_other = fixed[block] | rigid[block], fixed[other] | rigid[other]
     neither = hold & hold_other
@@ -131,8 +132,8 @@ def penalties(
 
 
 def least_face(block: np.ndarray, other: np.ndarray, area: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """(n,) m of face that the stiffness of a contact between ``block`` and ``other`` (n,) is that of at least; ``area`` m² and
-    ``fixed`` (n_blocks,)."""
+    """(n,) m of face that the stiffness of a contact between ``block`` and ``other`` (n,) is that of at least; ``area``
+    m² and ``fixed`` (n_blocks,)."""
     free = np.where(fixed, np.inf, area)
     smaller = np.minimum(free[block], free[other])
     return _LEAST_FACE * np.sqrt(np.where(np.isfinite(smaller), smaller, np.minimum(area[block], area[other])))
@@ -148,8 +149,8 @@ def contact_springs(
 ) -> Springs:
     """Springs of contacts with joint ``law`` (n,) and tributary ``length`` (n,) m, that have not slipped.
 
-    A law's stiffness (Pa/m) times the tributary length, at ``least`` (n,) m (`least_face`), takes the place of the penalty
-    (Pa). A lone corner has no tributary length and neither cohesion nor tensile strength.
+    A law's stiffness (Pa/m) times the tributary length, at ``least`` (n,) m (`least_face`), takes the place of the
+    penalty (Pa). A lone corner has no tributary length and neither cohesion nor tensile strength.
     """
     bearing = np.maximum(length, least)
     kn, ks = table.normal_stiffness[law], table.shear_stiffness[law]
@@ -178,13 +179,13 @@ def over_a_step(
     dt: float,
     arc: np.ndarray | float = 0.0,
 ) -> tuple[Springs, np.ndarray]:
-    """Springs and starting gap (n,) m whose forces are those that act over a step of ``dt``: ``weight`` θ times that of its
-    end and 1 − θ times that of its start, N = −kₙ (θ g₁ + (1−θ) g₀) − c ġ and S = S₀ − θ kₛ Δs.
+    """Springs and starting gap (n,) m whose forces are those that act over a step of ``dt``: ``weight`` θ times that of
+    its end and 1 − θ times that of its start, N = −kₙ (θ g₁ + (1−θ) g₀) − c ġ and S = S₀ − θ kₛ Δs.
 
-    c = ``damping`` · 2 √(kₙ m), ġ the mean over the step, ``mass`` (n,) kg of the lighter free block. What is open at the
-    start has no force there, unless ``joined`` (n,) by a bond, and approach counts for the dashpot only from touching on:
-    neither acts across an open gap. A step much longer than the contact's period leaves the spring as it was. ``arc`` (n,) m as in
-    `ContactSet`: what is added to g₁ though no displacement of the step does.
+    c = ``damping`` · 2 √(kₙ m), ġ the mean over the step, ``mass`` (n,) kg of the lighter free block. What is open at
+    the start has no force there, unless ``joined`` (n,) by a bond, and approach counts for the dashpot only from
+    touching on: neither acts across an open gap. A step much longer than the contact's period leaves the spring as it
+    was. ``arc`` (n,) m as in `ContactSet`: what is added to g₁ though no displacement of the step does.
     """
     if damping == 0.0 and np.all(weight == 1.0):
         return springs, gap + arc
@@ -196,6 +197,6 @@ def over_a_step(
 
 
 def end_of_step(start: np.ndarray, over: np.ndarray, sticking: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
-    """(n,) N shear force at the end of a step from that at its ``start`` and the one that acted ``over`` it; sliding contacts
-    keep the latter."""
+    """(n,) N shear force at the end of a step from that at its ``start`` and the one that acted ``over`` it; sliding
+    contacts keep the latter."""
     return over if np.all(weight == 1.0) else np.where(sticking, start + (over - start) / weight, over)

@@ -1,9 +1,9 @@
 """Forces that contacts carry in given states, and the states that these forces call for.
 
-A closed contact must not pull beyond its tensile strength, an open one must not penetrate, a sticking one must hold less than
-its strength μN + cℓ, and a sliding one would carry more than it does if it stuck (the return mapping of an elastic-plastic
-spring, under which exactly one of the states fits a given motion; the sign of the sliding, which Shi 1988 asks for, leaves
-cases in which none does).
+A closed contact must not pull beyond its tensile strength, an open one must not penetrate, a sticking one must hold
+less than its strength μN + cℓ, and a sliding one would carry more than it does if it stuck (the return mapping of an
+elastic-plastic spring, under which exactly one of the states fits a given motion; the sign of the sliding, which Shi
+1988 asks for, leaves cases in which none does).
 """
 
 from __future__ import annotations
@@ -79,11 +79,11 @@ def check_states(
 ):
     """The states that the ``forces`` (n, 4) of `contact_forces` call for.
 
-    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on a
-    corner holds until it has slid off by its ``reach`` (n,) m; lines that its vertex was ``behind`` (n,) as the step began are
-    not those by which it comes in. ``slack`` (m) is the
-    round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a thousand
-    times better.
+    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on
+    a corner holds until it has slid off by its ``reach`` (n,) m; lines that its vertex was ``behind`` (n,) as the step
+    began are not those by which it comes in. ``slack`` (m) is the
+    round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a
+    thousand times better.
     """
     n = state.shape[0]
     new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
@@ -96,7 +96,8 @@ def check_states(
             inside = True
             for k in range(2):
                 p = partner[c, k]
-                # Corners overlap only where both lines are crossed; the lesser penetration, or the first of equals, acts.
+                # Corners overlap only where both lines are crossed; the lesser penetration, or the first of equals,
+                # acts.
                 if p < 0:
                     continue
                 lesser = forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
@@ -104,8 +105,8 @@ def check_states(
                     inside = False
             if inside:
                 violation[c] = -normal[c] * gap
-                # The state to try is that of the springs under the motion at hand: sticking where it would have to slide,
-                # a contact may pull, open, close again and never come to sliding.
+                # The state to try is that of the springs under the motion at hand: sticking where it would have to
+                # slide, a contact may pull, open, close again and never come to sliding.
                 trial = shear0[c] - shear[c] * slide
                 if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
                     new_state[c], new_direction[c] = SLIP, np.sign(trial)
@@ -138,9 +139,9 @@ def check_states(
 
 
 def reserves(state, bonded, normal_force, shear_force, gap, springs) -> np.ndarray:
-    """(n,) N: how far contacts in these states are from leaving them, linear in the load while all states stand. Open ones: the
-    force that closing their gap would make; sticking ones: what is left of their strength, or of what presses them; sliding ones
-    the latter."""
+    """(n,) N: how far contacts in these states are from leaving them, linear in the load while all states stand. Open
+    ones: the force that closing their gap would make; sticking ones: what is left of their strength, or of what presses
+    them; sliding ones the latter."""
     lifts = normal_force + np.where(bonded == 1, springs.tension, 0.0)
     held = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
     strength = np.maximum(0.0, springs.peak * normal_force + held)

@@ -23,8 +23,8 @@ _TOUCH = 1e-7
 _ALIGNED = 0.99
 _UNKNOWN = -2
 _NEVER = -1
-#: Radius of corners, in sizes (√area) of the smaller block. Two corners that press on each other would slip off by less than
-#: they press each other in, and no state would fit; corners of rock are rounder than this.
+#: Radius of corners, in sizes (√area) of the smaller block. Two corners that press on each other would slip off by less
+#: than they press each other in, and no state would fit; corners of rock are rounder than this.
 _ROUNDING = 1e-5
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
@@ -33,8 +33,8 @@ _DEEPER = 2.0
 class ContactFinder:
     """Finds the contacts of ``blocks`` and gives each its law and springs.
 
-    ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow; ``rigid``
-    (n_blocks,) those that do not strain.
+    ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow;
+    ``rigid`` (n_blocks,) those that do not strain.
     """
 
     def __init__(
@@ -83,9 +83,10 @@ class ContactFinder:
         lumped: bool = False,
         broken: np.ndarray | None = None,
     ) -> ContactSet:
-        """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it; without
-        corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of faces that have a
-        stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken`` (vertex·n_vertices + edge), too."""
+        """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it;
+        without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
+        faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
+        (vertex·n_vertices + edge), too."""
         old = state.contacts
         if len(old):
             # Faces that slid apart press at a distance, those that do not fit pass each other by as much.
@@ -151,14 +152,16 @@ class ContactFinder:
             inside = inside & ~np.isin(vertex * len(vertices) + edge, broken)
 
         def bend(ends, length):
-            """Part of its length that the springs of a face are apart: they give by its rotation what its blocks would bend."""
+            """Part of its length that the springs of a face are apart: they give by its rotation what its blocks would
+            bend."""
             give = sum(
                 give_by_bending(
                     owner[ends[:, 0]], found.geometry[ends[:, 0], 1:3], vertices, self._start, self._area, self._modulus, self._bends
                 )
                 for owner in (block, other)
             )  # fmt: skip
-            # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold it.
+            # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold
+            # it.
             give[self._rigid[block[ends[:, 0]]] | self._rigid[other[ends[:, 0]]]] = 0.0
             own = 2.0 / (springs.normal[ends[:, 0]] * length**2)
             return np.sqrt(own / np.maximum(own, give))
@@ -206,7 +209,8 @@ class ContactFinder:
         contact_state, bonded, normal, shear = of("state"), of("bonded"), of("normal_force"), of("shear_force")
         slip, wear, lift, stretch = of("slip"), of("wear"), of("lift"), of("stretch")
         if not known.all():
-            # New contacts that touch already are tried closed first; one with a partner must show which line it crosses.
+            # New contacts that touch already are tried closed first; one with a partner must show which line it
+            # crosses.
             fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
             if len(old) == 0 and time == 0.0:
                 bonded[fresh & (geometry[:, 4] > 0)] = 1
@@ -226,8 +230,8 @@ class ContactFinder:
         }  # fmt: skip
 
     def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:
-        """Contacts that have not touched are as worn, and as far lifted, as the nearest that slides along their direction
-        between the same two blocks: these have moved by as much everywhere."""
+        """Contacts that have not touched are as worn, and as far lifted, as the nearest that slides along their
+        direction between the same two blocks: these have moved by as much everywhere."""
         touched = old[(old["wear"] > 0) & (old["state"] != OPEN)]
         if not len(touched):
             return
@@ -250,7 +254,8 @@ class ContactFinder:
         return self._table.closure
 
     def on_penalty(self, found: ContactSet) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) twice: contacts whose normal, and whose shear springs are the solver's penalties, not a joint's stiffness."""
+        """(n,) twice: contacts whose normal, and whose shear springs are the solver's penalties, not a joint's
+        stiffness."""
         t, lone = self._table, found.geometry[:, 4] <= 0
         by_peak = t.stiff_by_peak[found.law] & ~lone
         return (
@@ -306,15 +311,17 @@ class ContactFinder:
 
 
 def _among(keep: np.ndarray, partner: np.ndarray) -> np.ndarray:
-    """``partner`` (n, 2) of the rows ``keep`` (n,), counted among these; −1 for those that are left out, as for none."""
+    """``partner`` (n, 2) of the rows ``keep`` (n,), counted among these; −1 for those that are left out, as for
+    none."""
     number = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
     return number[partner[keep]]
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:
-    """The contacts ``found``, the springs of those that come ``out`` (n,) of their faces, inside which they ``stood``, at the
-    corners with the forces that they had: these are then where the faces, that do not fit any more, begin to press and to
-    pull. Forces of springs alone: what dashpots bore over the last step would stay in them as energy from nowhere."""
+    """The contacts ``found``, the springs of those that come ``out`` (n,) of their faces, inside which they ``stood``,
+    at the corners with the forces that they had: these are then where the faces, that do not fit any more, begin to
+    press and to pull. Forces of springs alone: what dashpots bore over the last step would stay in them as energy from
+    nowhere."""
     if stood is None:
         return replace(found, inset=inset)
     gap = found.geometry[:, 3]

@@ -70,7 +70,8 @@ class CurvedJoints:
         normal_force: np.ndarray,
         plastic: np.ndarray,
     ) -> tuple[Springs, np.ndarray]:
-        """``springs`` and starting ``gap`` (n,) with the tangents of the laws at ``normal_force`` N and ``plastic`` slip m.
+        """``springs`` and starting ``gap`` (n,) with the tangents of the laws at ``normal_force`` N and ``plastic``
+        slip m.
 
         ``springs`` and ``gap`` are those of straight laws, dashpots included, which ``found`` is without.
         """
@@ -172,7 +173,8 @@ class CurvedJoints:
     def misfit(
         self, was: Springs, gap_was: np.ndarray, now: Springs, gap_now: np.ndarray, state, forces: np.ndarray
     ) -> np.ndarray:
-        """(n,) N by which the ``forces`` (n, 4) of `check_states`, on the lines that were, miss the laws; 0 where they agree."""
+        """(n,) N by which the ``forces`` (n, 4) of `check_states`, on the lines that were, miss the laws; 0 where they
+        agree."""
         out = np.zeros(len(state))
         at = self.rows
         n, s, gap, slide = forces[at].T

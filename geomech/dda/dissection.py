@@ -1,8 +1,8 @@
 """The order in which a plane system of blocks is eliminated: nested dissection into fronts (George 1973).
 
 Blocks touch their neighbours in a plane, so a line of blocks parts a system in two halves that know nothing of each
-other, and each half again. Eliminated leaves first and separators last, the matrix fills in as little as it can. A *front*
-holds the rows of its own blocks and of those to which its elimination reaches (Duff & Reid 1983).
+other, and each half again. Eliminated leaves first and separators last, the matrix fills in as little as it can. A
+*front* holds the rows of its own blocks and of those to which its elimination reaches (Duff & Reid 1983).
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class Tree:
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _best_cut(order, pointer, neighbour, place, least):
-    """(price, k, whether the first part gives the separator) of the cheapest cut of the blocks in ``order`` into the first k and
-    the rest, neither below ``least``; ``place`` (n,) is room, −1 all over, and left so."""
+    """(price, k, whether the first part gives the separator) of the cheapest cut of the blocks in ``order`` into the
+    first k and the rest, neither below ``least``; ``place`` (n,) is room, −1 all over, and left so."""
     m = len(order)
     for q in range(m):
         place[order[q]] = q
@@ -96,7 +96,8 @@ def _best_cut(order, pointer, neighbour, place, least):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _meets(order, at, mine, pointer, neighbour, place):
-    """(m,) whether each block in ``order`` is of the first ``at`` (or, not ``mine``, of the rest) and meets one on the other side."""
+    """(m,) whether each block in ``order`` is of the first ``at`` (or, not ``mine``, of the rest) and meets one on the
+    other side."""
     m = len(order)
     out = np.zeros(m, np.bool_)
     for q in range(m):
@@ -153,7 +154,8 @@ def _around(blocks: np.ndarray, pointer: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
-    """The tree for matrix blocks at (``rows``, ``columns``), both triangles and the diagonal, sorted by row then column."""
+    """The tree for matrix blocks at (``rows``, ``columns``), both triangles and the diagonal, sorted by row then
+    column."""
     n = len(points)
     pointer = np.searchsorted(rows, np.arange(n + 1))
     fronts, parent = dissect(points, pointer, columns)
@@ -218,8 +220,8 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
 
 
 def _independent(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """Subtrees, as ranges of fronts in postorder, none of which holds more than an eighth of the arithmetic; and the fronts
-    above them, those first whose children are."""
+    """Subtrees, as ranges of fronts in postorder, none of which holds more than an eighth of the arithmetic; and the
+    fronts above them, those first whose children are."""
     cost = own * (own + far) ** 2.0
     first = np.arange(len(parent))
     for f, p in enumerate(parent):

@@ -26,8 +26,8 @@ from ..model import OPEN, SLIP
 
 log = logging.getLogger(__name__)
 
-#: A gain above this part of the energy that has been turned over is reported. Sliding, falling and colliding blocks stay
-#: within 3e-4 (most below 1e-5), a specimen strained by half a per cent within 3e-3.
+#: A gain above this part of the energy that has been turned over is reported. Sliding, falling and colliding blocks
+#: stay within 3e-4 (most below 1e-5), a specimen strained by half a per cent within 3e-3.
 GAIN = 0.01
 
 
@@ -73,8 +73,8 @@ class StepEnergy(NamedTuple):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _product(first, second, b, c, d, area, xx, yy, xy):
-    """∫ u·w of two first-order fields with unknowns ``first[b]`` and ``second[b]``, whose strains c and d stand apart, over a
-    block of these moments."""
+    """∫ u·w of two first-order fields with unknowns ``first[b]`` and ``second[b]``, whose strains c and d stand apart,
+    over a block of these moments."""
     p, q = 0.5 * c[2] - first[b, 2], 0.5 * c[2] + first[b, 2]
     r, s = 0.5 * d[2] - second[b, 2], 0.5 * d[2] + second[b, 2]
     # u = (u0 + εx x + p y, v0 + q x + εy y)
@@ -103,7 +103,8 @@ def _stored(stiffness, gap, limit, bonded):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def sliding(vectors, unknowns, order, block, other):
-    """(n,) m: motion of every contact along its edge, from ``vectors`` (n, 2, 12) and scaled ``unknowns`` (n_free, 6)."""
+    """(n,) m: motion of every contact along its edge, from ``vectors`` (n, 2, 12) and scaled ``unknowns`` (n_free,
+    6)."""
     out = np.zeros(block.shape[0])
     for c in range(out.shape[0]):
         for side in range(2):
@@ -159,11 +160,11 @@ def step_energies(
     """The terms of `StepEnergy` in its order, (14,).
 
     Blocks: ``increment``, ``carried``, ``acceleration``, ``load`` (n_blocks, 6) as solved with, ``old_velocity`` and
-    ``velocity`` before and after the step, ``old_stress``, ``tangent``, ``stress0`` with σ′ = tangent Δε + stress0; ``weight``
-    θ and dampings of the time scheme. Contacts (n,): states and bonds before and after, gaps from where the faces meet,
-    ``arc``, ``lifted``, ``slip`` and motion along the edge (``sliding``) in the step (m); forces that acted over the step, and shear
-    forces at its two ends (N); ``normal`` N/m, the spring without dashpot, and ``shear``, that of the step (``theta`` times
-    the spring), 0 where a multiplier holds and nothing is stored; ``closure`` (n_laws,) m.
+    ``velocity`` before and after the step, ``old_stress``, ``tangent``, ``stress0`` with σ′ = tangent Δε + stress0;
+    ``weight`` θ and dampings of the time scheme. Contacts (n,): states and bonds before and after, gaps from where the
+    faces meet, ``arc``, ``lifted``, ``slip`` and motion along the edge (``sliding``) in the step (m); forces that acted
+    over the step, and shear forces at its two ends (N); ``normal`` N/m, the spring without dashpot, and ``shear``, that
+    of the step (``theta`` times the spring), 0 where a multiplier holds and nothing is stored; ``closure`` (n_laws,) m.
     """
     kinetic = elastic = contact = before = fallen = loads = cracks = 0.0
     friction = viscous = bond = scheme = lost = overlap = 0.0
@@ -268,7 +269,8 @@ def step_energies(
 
 @dataclass(frozen=True)
 class EnergyBudget:
-    """Energies of a run, J/m: what its steps did, added up. ``budget = budget.after(result.energy, result.state.time)``.
+    """Energies of a run, J/m: what its steps did, added up. ``budget = budget.after(result.energy,
+    result.state.time)``.
 
     work       weight and loads
     losses     friction, damping, bonds, time scheme, carried velocity, cracks
@@ -276,8 +278,8 @@ class EnergyBudget:
     start      stored as the first step began
     stored     stored now
     split      stored energy that has changed because blocks were cut or dug out (`cut`)
-    residual   stored + losses − work − overlap − split − start: what updating the geometry between steps has added (> 0) or
-               taken away, and round-off
+    residual   stored + losses − work − overlap − split − start: what updating the geometry between steps has added (>
+               0) or taken away, and round-off
     """
 
     steps: int = 0
@@ -333,7 +335,8 @@ class EnergyBudget:
         return float(self.totals[_LOSSES].sum())
 
     def left_over(self, at_cracks: float = 0.0) -> float:
-        """The residual as a part of all energy turned over; ``at_cracks`` J/m of the work on them are not accounted for there."""
+        """The residual as a part of all energy turned over; ``at_cracks`` J/m of the work on them are not accounted for
+        there."""
         return (self.residual - at_cracks) / self.turnover if self.turnover else 0.0
 
     def statistics(self) -> dict[str, float]:

@@ -1,9 +1,9 @@
 """Static equilibrium found by itself: pseudo-time continuation of static steps.
 
-A static step, which carries no velocity, solves (2M/dt² + K) d = F: of what is out of balance its inertia takes the part
-2M d/dt². Small dt moves blocks gently until contacts have found one another, large dt is Newton's method for statics.
-dt therefore starts at some transits of sound through a block and grows from step to step (pseudo-transient continuation:
-Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is as small as asked for. Where
+A static step, which carries no velocity, solves (2M/dt² + K) d = F: of what is out of balance its inertia takes the
+part 2M d/dt². Small dt moves blocks gently until contacts have found one another, large dt is Newton's method for
+statics. dt therefore starts at some transits of sound through a block and grows from step to step (pseudo-transient
+continuation: Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is as small as asked for. Where
 nothing holds the blocks it never is, and they move on: a collapse.
 """
 
@@ -33,14 +33,15 @@ RELAXATION_STEP = np.dtype(
         ("cuts", np.int64),
     ]
 )
-#: The first step is this many transits of sound through the smallest block. A wall of a thousand bricks settles in 103, 69,
-#: 65, 51 and 55 open–close iterations from 10, 30, 100, 300 and 1000 of them, the last after one cut; much shorter steps
-#: change forces by so little that round-off decides about contacts.
+#: The first step is this many transits of sound through the smallest block. A wall of a thousand bricks settles in 103,
+#: 69, 65, 51 and 55 open–close iterations from 10, 30, 100, 300 and 1000 of them, the last after one cut; much shorter
+#: steps change forces by so little that round-off decides about contacts.
 _FIRST_TRANSITS = 100.0
 #: dt grows by this factor from step to step, unless blocks already move nearly as far as a step may move them.
 _GROWTH, _NEARLY = 4.0, 0.3
-#: Blocks that have gone this part of their size √area, with no more balance after so many steps than before them, go on; what
-#: flies freely, with nearly all its weight to move it, may still land. Walls and slopes that stand take 3 to 15 steps.
+#: Blocks that have gone this part of their size √area, with no more balance after so many steps than before them, go
+#: on; what flies freely, with nearly all its weight to move it, may still land. Walls and slopes that stand take 3 to
+#: 15 steps.
 _GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
 #: Inertia stays above this part of the contacts' stiffness, so that blocks that nothing pushes stay put.
 _LEAST_INERTIA = 1e-10
@@ -81,11 +82,14 @@ def equilibrium(
     crack: CrackResponse | None = None,
     watch: Callable[[StepResult, np.void], None] | None = None,
 ) -> Equilibrium:
-    """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default: state.time).
+    """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default:
+    state.time).
 
-    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. A block that has gone ``reach`` m
-    and is out of balance still is taken to have collapsed; by default that is a tenth of the blocks' extent, or a twentieth of
-    the block's own size once the unbalanced force has stopped falling. ``watch`` sees every step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in the answer.
+    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. A block that has gone
+    ``reach`` m and is out of balance still is taken to have collapsed; by default that is a tenth of the blocks'
+    extent, or a twentieth of the block's own size once the unbalanced force has stopped falling. ``watch`` sees every
+    step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in
+    the answer.
     """
     if not tolerance > 0:
         raise ValueError(f"the tolerance of the unbalanced force must be positive, got {tolerance!r}")
@@ -185,9 +189,9 @@ def rounding_force(system: BlockSystem) -> float:
 
 
 def unbalanced_force(system: BlockSystem, result: StepResult) -> float:
-    """Largest force (or moment over √area) out of balance on a free block in a static step: its inertia 2M d/dt², over the
-    mean of all forces on free blocks, contact forces and loads by their magnitudes; 0 where no force acts. What contacts make
-    of the rounding of coordinates is no force: blocks that have come apart without weight are at rest."""
+    """Largest force (or moment over √area) out of balance on a free block in a static step: its inertia 2M d/dt², over
+    the mean of all forces on free blocks, contact forces and loads by their magnitudes; 0 where no force acts. What
+    contacts make of the rounding of coordinates is no force: blocks that have come apart without weight are at rest."""
     free = ~system.blocks.fixed
     f, a = result.forces, result.acceleration
     h2 = f.area

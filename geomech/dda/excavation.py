@@ -19,8 +19,8 @@ class Excavations:
         self._known: dict[tuple[Excavation, ...], np.ndarray] = {}
 
     def removed(self, loads: Loads, time: float) -> np.ndarray | None:
-        """(n_blocks,) True for blocks that are gone in a step that begins at ``time``; None before anything is. The same array
-        as long as nothing more is taken out."""
+        """(n_blocks,) True for blocks that are gone in a step that begins at ``time``; None before anything is. The
+        same array as long as nothing more is taken out."""
         past = tuple(e for e in loads.excavations if e.time <= time + _SAME * abs(time))
         if not past:
             return None
@@ -57,7 +57,8 @@ class Excavations:
 
 
 def until_next_event(loads: Loads, time: float, dt: float) -> float:
-    """``dt``, or the time left from ``time`` to the next excavation or installation of a bolt: a step does not pass one."""
+    """``dt``, or the time left from ``time`` to the next excavation or installation of a bolt: a step does not pass
+    one."""
     coming = [e.time for e in loads.excavations] + [b.installation for b in loads.bolts]
     left = [t - time for t in coming if t > time + _SAME * max(abs(time), abs(t))]
     return min([dt, *left])

@@ -5,23 +5,25 @@ cannot pull presses by −kₙ g where g < 0, on the part c of the face's length
 
     N = −kₙ ∫ g ds,    M = −kₙ ∫ g s ds    over that part; c = ℓ or c = 3 (ℓ/2 − e), e = M/N (a triangle of pressure).
 
-Two springs kₙ c/2 at the Gauss points of the part give both exactly; at the ends of the face they would resist rotation by
-kₙ ℓ³/4 instead of kₙ ℓ³/12. Where the part ends follows from the gap at the end of the step: a step whose faces end elsewhere than
-was taken is done again (Newton's method; the pressure is zero there, so that N changes with the square of what is missed).
+Two springs kₙ c/2 at the Gauss points of the part give both exactly; at the ends of the face they would resist rotation
+by kₙ ℓ³/4 instead of kₙ ℓ³/12. Where the part ends follows from the gap at the end of the step: a step whose faces end
+elsewhere than was taken is done again (Newton's method; the pressure is zero there, so that N changes with the square
+of what is missed).
 
-Bonds of blocks that have no stiffness of their own, and hold at their extreme fibre too, are held in the mean by the solver's
-springs. At the corners these would hold every rotation as well; but a block of one strain cannot bend, and what it would give
-under the moment on its face has to be given at the face. Half of a block of the depth d behind a face that spans it turns by
+Bonds of blocks that have no stiffness of their own, and hold at their extreme fibre too, are held in the mean by the
+solver's springs. At the corners these would hold every rotation as well; but a block of one strain cannot bend, and
+what it would give under the moment on its face has to be given at the face. Half of a block of the depth d behind a
+face that spans it turns by
 
     θ = M (d/2) / (E' ℓ³/12)        (its share of a beam; Kawai 1978 has rigid blocks give so throughout),
 
 and so far inside their corners stand the two springs that give it. Otherwise rectangles glued together lock: between
 displacements that agree at four corners and are linear, none bends. A triangle's three do not lock. Bricks laid in bond
-hold each other's ends besides, which this does not mend: in two and four courses they sag 0.78 and 0.91 of what a beam of their rock
-does, twice as long as high 0.40 and 0.60.
+hold each other's ends besides, which this does not mend: in two and four courses they sag 0.78 and 0.91 of what a beam
+of their rock does, twice as long as high 0.40 and 0.60.
 
-Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and moment, and bring
-the same stress. (What a state carries over of shear is that of the springs.)
+Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and
+moment, and bring the same stress. (What a state carries over of shear is that of the springs.)
 """
 
 from __future__ import annotations
@@ -38,8 +40,8 @@ from .contact_springs import Springs
 
 #: Distance of the two Gauss points of an interval, in parts of it.
 _GAUSS = 1 / np.sqrt(3.0)
-#: A part in contact that is known but for this much of its length is known: forces but for its square. The next step begins
-#: from the geometry, so that statics go on to the end.
+#: A part in contact that is known but for this much of its length is known: forces but for its square. The next step
+#: begins from the geometry, so that statics go on to the end.
 _KNOWN = 1e-2
 #: Springs that are this much of their face apart are at its corners.
 _AT_CORNERS = 0.99
@@ -57,7 +59,8 @@ class FacePoints:
     shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
     apart     (m,)    distance of the two springs, in parts of the part
     went      (m, 2)  how far its ends have gone with the last iteration of the step
-    stride    (m,)    the part of the way to where they seem to be that they go: half the last one's, or less, after turning about
+    stride    (m,)    the part of the way to where they seem to be that they go: half the last one's, or less, after
+              turning about
     """
 
     ends: np.ndarray
@@ -83,9 +86,9 @@ class FacePoints:
         least: np.ndarray,
         bends: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> FacePoints | None:
-        """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its blocks, 0 for
-        neither, last known to press by ``normal`` N, ``holds`` a bond that may pull, ``least`` m of face that the stiffness is at
-        least that of; ``bends(ends, length)`` the ``apart`` of bonds. None without any."""
+        """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
+        blocks, 0 for neither, last known to press by ``normal`` N, ``holds`` a bond that may pull, ``least`` m of face
+        that the stiffness is at least that of; ``bends(ends, length)`` the ``apart`` of bonds. None without any."""
         some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
         if len(some) < 2:
             return None
@@ -132,7 +135,8 @@ class FacePoints:
         out = self.corners.copy()
         near, far = self.ends, self.ends[:, ::-1]
         vertex, across = self.corners[near, 5:7], self.corners[near, 1:3]
-        # The far end of the own face: the far vertex, or its foot on the own edge where that belongs to the other block.
+        # The far end of the own face: the far vertex, or its foot on the own edge where that belongs to the other
+        # block.
         beyond = self.corners[far, 3]
         along = vertex[:, 1] - vertex[:, 0]
         same = np.einsum("mi,mi->m", across[:, 0], across[:, 1]) > 0
@@ -145,8 +149,8 @@ class FacePoints:
         return out
 
     def springs(self, lumped: Springs, stiff_in_shear: np.ndarray) -> Springs:
-        """The springs ``lumped`` at the corners, by the lengths that they have where they stand; ``stiff_in_shear`` (n,) those
-        whose law has a shear stiffness."""
+        """The springs ``lumped`` at the corners, by the lengths that they have where they stand; ``stiff_in_shear``
+        (n,) those whose law has a shear stiffness."""
         ratio = np.ones(len(self.corners))
         lengths = 0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length
         ratio[self.ends] = lengths[:, None] / self.corners[self.ends, 4]
@@ -175,8 +179,8 @@ class FacePoints:
         return out
 
     def at_corners(self, force: np.ndarray) -> np.ndarray:
-        """(n,) N at the corners: what has the resultant and the moment of the springs' normal ``force``; of their shear, whose arms,
-        the gaps, are linear along the face too, what stretches the blocks as much besides."""
+        """(n,) N at the corners: what has the resultant and the moment of the springs' normal ``force``; of their
+        shear, whose arms, the gaps, are linear along the face too, what stretches the blocks as much besides."""
         out, (first, second) = force.copy(), self.place.T
         on_first, on_second = force[self.ends].T
         out[self.ends[:, 0]] = on_first * (1 - first) + on_second * (1 - second)
@@ -199,13 +203,13 @@ class FacePoints:
         return out
 
     def better(self, gap: np.ndarray, state: np.ndarray, holds: np.ndarray) -> FacePoints | None:
-        """The faces with the parts that a step has left in contact, ``gap`` (n,) m and ``state`` (n,) of the springs, ``holds`` (n,)
-        bonds that may pull; None where these are the parts taken.
+        """The faces with the parts that a step has left in contact, ``gap`` (n,) m and ``state`` (n,) of the springs,
+        ``holds`` (n,) bonds that may pull; None where these are the parts taken.
 
-        A part of which one spring has parted bears no moment, and its gaps tell nothing: the resultant acts beyond the other, so
-        that the part grows that way, or where it ends with the face is halved. None grows by more than its length at
-        either end, for on one that is too short the block turns too far. (A spring may be open and yet not parted: its dashpot
-        lets it go before.)
+        A part of which one spring has parted bears no moment, and its gaps tell nothing: the resultant acts beyond the
+        other, so that the part grows that way, or where it ends with the face is halved. None grows by more than its
+        length at either end, for on one that is too short the block turns too far. (A spring may be open and yet not
+        parted: its dashpot lets it go before.)
         """
         held = holds[self.ends].all(axis=1)
         part = _touching(self.gap_at_corners(gap)[self.ends], held, self.shortest, self.part)
@@ -234,9 +238,9 @@ class FacePoints:
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def give_by_bending(owner, across, vertices, start, area, modulus, bends):
-    """(m,) rad/(N m): what half of the block ``owner`` (m,) turns by behind a face across the normal ``across`` (m, 2) that spans
-    it, 6 d/(E' w³), d = area over the width w along the face; 0 for blocks that do not bend. A face that is shorter than the
-    block is wide turns the whole of that width."""
+    """(m,) rad/(N m): what half of the block ``owner`` (m,) turns by behind a face across the normal ``across`` (m, 2)
+    that spans it, 6 d/(E' w³), d = area over the width w along the face; 0 for blocks that do not bend. A face that is
+    shorter than the block is wide turns the whole of that width."""
     out = np.zeros(owner.shape[0])
     for f in range(owner.shape[0]):
         b = owner[f]
@@ -252,7 +256,8 @@ def give_by_bending(owner, across, vertices, start, area, modulus, bends):
 
 
 def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """(m, 2) the part of each face in contact, by the ``gap`` (m, 2) at its ends; faces that are all open keep that ``before``."""
+    """(m, 2) the part of each face in contact, by the ``gap`` (m, 2) at its ends; faces that are all open keep that
+    ``before``."""
     first, second = gap.T
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = first / (first - second)
@@ -264,7 +269,8 @@ def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: n
 
 
 def _pressed(normal: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
-    """(m, 2) the part of each face that the forces ``normal`` (m, 2) at its ends press on: c/ℓ = 3 (1/2 − e/ℓ), at most 1."""
+    """(m, 2) the part of each face that the forces ``normal`` (m, 2) at its ends press on: c/ℓ = 3 (1/2 − e/ℓ), at most
+    1."""
     total = normal.sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where((total > 0) & ~held, np.clip(normal[:, 1] / total, 0.0, 1.0), 0.5)

@@ -11,8 +11,8 @@ _BALANCE = 1e-2
 
 
 def balanced(load: np.ndarray, points: np.ndarray, edges: np.ndarray, weight: np.ndarray, moments: np.ndarray) -> bool:
-    """Whether a lone block's loads are in balance: generalised ``load`` (6,), POINT_FORCE and EDGE_FORCE rows, ``weight``
-    (2,) N, a row of `block_moments`.
+    """Whether a lone block's loads are in balance: generalised ``load`` (6,), POINT_FORCE and EDGE_FORCE rows,
+    ``weight`` (2,) N, a row of `block_moments`.
 
     Such a block has no support, and pressed by forces that keep their direction it is not even stable: in statics its
     rigid motion, which carries no force, is held.

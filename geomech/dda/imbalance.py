@@ -27,9 +27,9 @@ def imbalance(
     """(residual, unbalanced force ratio).
 
     The residual is the largest of the equations of motion, contact forces as reported, over the largest force in them:
-    round-off. The unbalanced force ratio is the part of the forces on a block that goes into moving it, |m a| over the sum
-    of the sizes of its weight, loads and contact forces (for its rotation moments over √area), at the block where it is
-    largest: 0 at rest, 1 in free flight.
+    round-off. The unbalanced force ratio is the part of the forces on a block that goes into moving it, |m a| over the
+    sum of the sizes of its weight, loads and contact forces (for its rotation moments over √area), at the block where
+    it is largest: 0 at rest, 1 in free flight.
 
     ``matrix`` (n, 6, 6), ``right`` (n, 6), ``unknowns`` (n, 6) as solved; ``vectors`` (n_contacts, 2, 12);
     ``acceleration`` and ``load`` (n_blocks, 6); ``largest`` N of the forces in ``right`` that may cancel there.

@@ -1,9 +1,9 @@
 """Motion that is given in a step, of blocks, of points and of the base: what is known of the unknowns before they are
 solved for, exactly, and what it takes to impose it.
 
-A block whose motion is given in part, C d = δ with C (m, 6), changes to the unknowns z of d = Q z, where C = (Rᵀ 0) Qᵀ (the QR
-factors of Cᵀ): the first m of them are known, z₁ = R⁻ᵀ δ, and leave the equations as any prescribed unknown does. A fixed block
-has no unknowns: its contacts see it move as a shift of their gaps.
+A block whose motion is given in part, C d = δ with C (m, 6), changes to the unknowns z of d = Q z, where C = (Rᵀ 0) Qᵀ
+(the QR factors of Cᵀ): the first m of them are known, z₁ = R⁻ᵀ δ, and leave the equations as any prescribed unknown
+does. A fixed block has no unknowns: its contacts see it move as a shift of their gaps.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ _DEPENDENT = 1e-10
 
 @dataclass(eq=False)
 class _Given:
-    """What is given of one moving block: rows of C, their increments and rates at the end of the step, and which point motion
-    each comes from (−1: the block's own)."""
+    """What is given of one moving block: rows of C, their increments and rates at the end of the step, and which point
+    motion each comes from (−1: the block's own)."""
 
     rows: list[np.ndarray]
     increment: list[float]
@@ -49,8 +49,9 @@ class _Changed:
 @dataclass(eq=False)
 class Pairs:
     """Two blocks each that feel one another, contacts or bolts: ``vectors`` (n, 2, 12) of their relative motion in two
-    directions, ``points`` (n, 2, 2) where it is that of the first and of the second block, ``axes`` (n, 2, 2) the directions;
-    the motion counts as that of the first less that of the second block, times ``sense``. ``shift`` (n, 2) is what given motion adds to it."""
+    directions, ``points`` (n, 2, 2) where it is that of the first and of the second block, ``axes`` (n, 2, 2) the
+    directions; the motion counts as that of the first less that of the second block, times ``sense``. ``shift`` (n, 2)
+    is what given motion adds to it."""
 
     block: np.ndarray
     other: np.ndarray
@@ -64,9 +65,10 @@ class Pairs:
 class ImposedMotion:
     """The motion that ``loads`` give from ``start`` to ``end`` (s), on the geometry at the start of the step.
 
-    ``totals`` (k,) is what they have imposed at ``end``, ``before`` the same at the start as an earlier step has left it (else
-    taken at ``start``): statics may seek equilibrium at one time in many steps. ``increment`` and ``rate`` (n_blocks, 6): of fixed blocks, zero elsewhere. Raises ValueError naming the block whose given
-    motions contradict or repeat one another, a fixed one whose point is moved, and one that is to be strained though fixed.
+    ``totals`` (k,) is what they have imposed at ``end``, ``before`` the same at the start as an earlier step has left
+    it (else taken at ``start``): statics may seek equilibrium at one time in many steps. ``increment`` and ``rate``
+    (n_blocks, 6): of fixed blocks, zero elsewhere. Raises ValueError naming the block whose given motions contradict or
+    repeat one another, a fixed one whose point is moved, and one that is to be strained though fixed.
     """
 
     def __init__(
@@ -166,8 +168,8 @@ class ImposedMotion:
     # -- before the step is solved -------------------------------------------------------------------------------------
 
     def impose(self, matrix: np.ndarray, right: np.ndarray, sets: list[Pairs], order: np.ndarray) -> None:
-        """Take what is given out of the equations, in place (`assembly`'s arrays): matrix, right side, and the vectors of the
-        pairs in ``sets``, whose shift is what the given motion alone makes of them."""
+        """Take what is given out of the equations, in place (`assembly`'s arrays): matrix, right side, and the vectors
+        of the pairs in ``sets``, whose shift is what the given motion alone makes of them."""
         for number, b, rows, by in self._springs:
             rows, k = rows / self._scale(b), self._points[number].stiffness
             matrix[order[b]] += k * rows.T @ rows
@@ -235,7 +237,8 @@ class ImposedMotion:
         return unknowns
 
     def correct_velocity(self, velocity: np.ndarray) -> None:
-        """Make the rates at the end of the step those that are given, in place: the integration's own swing about them."""
+        """Make the rates at the end of the step those that are given, in place: the integration's own swing about
+        them."""
         velocity[self.fixed] = self.rate[self.fixed]
         for c in self._changed:
             scale = self._scale(c.block)
@@ -246,9 +249,9 @@ class ImposedMotion:
     def reactions(
         self, unknowns: np.ndarray, pushes: list[np.ndarray], order: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What it takes: (n_blocks, 6) generalised forces (N, N m) of the blocks' given unknowns, about their centroids, and
-        POINT_FORCE rows of the points that are moved. ``unknowns`` as `recover` gives them; ``pushes`` (n, 2) N the forces
-        of each set of pairs."""
+        """What it takes: (n_blocks, 6) generalised forces (N, N m) of the blocks' given unknowns, about their
+        centroids, and POINT_FORCE rows of the points that are moved. ``unknowns`` as `recover` gives them; ``pushes``
+        (n, 2) N the forces of each set of pairs."""
         of_blocks = np.zeros((self.blocks.n_blocks, 6))
         at_points = np.zeros((len(self._points), 2))
         for number, b, rows, by in self._springs:

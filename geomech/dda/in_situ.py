@@ -1,9 +1,10 @@
 """Blocks under in-situ stress and at rest: stress and contact forces that fit one another before anything moves.
 
-A first-order block carries the mean of a linear stress field, its value at the centroid, and the contact forces that go with
-it are found by statics: from blocks that have the stress and contacts that have no force yet the blocks relax, closing their
-contacts by what the penalty lets in and losing as much of their stress; given it back, they relax again, by that part of that
-part, and so on. The positions that are reached become the reference: displacements count from there.
+A first-order block carries the mean of a linear stress field, its value at the centroid, and the contact forces that go
+with it are found by statics: from blocks that have the stress and contacts that have no force yet the blocks relax,
+closing their contacts by what the penalty lets in and losing as much of their stress; given it back, they relax again,
+by that part of that part, and so on. The positions that are reached become the reference: displacements count from
+there.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ class InSituState:
     blocks      with the positions at rest as their reference
     state       at time 0, without velocity and displacement, with stress and contact forces
     settled     m, the largest displacement from the blocks as drawn
-    deviation   largest difference of a free block's stress from the in-situ one, over the largest in-situ stress: what the
-                supports and weights do not let the blocks keep
+    deviation   largest difference of a free block's stress from the in-situ one, over the largest in-situ stress: what
+                the supports and weights do not let the blocks keep
     """
 
     blocks: Blocks
@@ -50,10 +51,10 @@ def in_situ_state(
 ) -> InSituState:
     """The blocks of ``system`` at rest under ``stress`` and the ``loads`` of time 0 (gravity, tractions, water …).
 
-    ``tolerance`` of the unbalanced force as in `equilibrium`; the stress is given back until that changes it by less than
-    ``stress_tolerance`` of itself. Where weight and supports ask for another stress than ``stress``, that one is what the
-    blocks end with, and ``deviation`` says by how much; the part that nothing contradicts (as the horizontal one between walls)
-    stays. Raises `NoInSituEquilibrium` when the blocks do not come to rest.
+    ``tolerance`` of the unbalanced force as in `equilibrium`; the stress is given back until that changes it by less
+    than ``stress_tolerance`` of itself. Where weight and supports ask for another stress than ``stress``, that one is
+    what the blocks end with, and ``deviation`` says by how much; the part that nothing contradicts (as the horizontal
+    one between walls) stays. Raises `NoInSituEquilibrium` when the blocks do not come to rest.
     """
     blocks = system.blocks
     centres = np.array([blocks.area_moments(b)[1] for b in range(blocks.n_blocks)])

@@ -1,14 +1,14 @@
 """Contact states by lagged friction: what to try where neither switching nor the central path comes to an end.
 
-With the strength of every contact taken from the normal forces of the round before, c = μN + cℓ (Tresca's friction), a step
-is the minimum of a convex function,
+With the strength of every contact taken from the normal forces of the round before, c = μN + cℓ (Tresca's friction), a
+step is the minimum of a convex function,
 
     ½ dᵀM d − fᵀd + Σ ½ kₙ ⟨−g⟩² + Σ ∫ min(kₛ|s|, c) d|s|,
 
-which Newton's method with a line search finds from anywhere. The rounds are a fixed-point iteration on N (Panagiotopoulos
-1975; Nečas, Jarušek & Haslinger 1980), taken half way each time: undamped, shear and normal forces feed each other and two
-rounds may alternate. It takes a hundred solutions where it is needed, and it is slow and sure: a step of a jointed slope under
-its sudden weight that eight halvings of the time step did not settle otherwise.
+which Newton's method with a line search finds from anywhere. The rounds are a fixed-point iteration on N
+(Panagiotopoulos 1975; Nečas, Jarušek & Haslinger 1980), taken half way each time: undamped, shear and normal forces
+feed each other and two rounds may alternate. It takes a hundred solutions where it is needed, and it is slow and sure:
+a step of a jointed slope under its sudden weight that eight halvings of the time step did not settle otherwise.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _SOLUTIONS, _HALVINGS = 30, 14
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _pushes(contact, gap, bonded, partner, rounding):
-    """Whether a contact pushes (or, bonded, pulls) at the gaps of all, ``gap`` (n,): of two corners' lines the one less deep in,
-    where both are crossed. ``partner`` (n, k), −1 for none."""
+    """Whether a contact pushes (or, bonded, pulls) at the gaps of all, ``gap`` (n,): of two corners' lines the one less
+    deep in, where both are crossed. ``partner`` (n, k), −1 for none."""
     own = gap[contact]
     if not (own < 0.0 or bonded[contact]):
         return False

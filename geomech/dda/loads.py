@@ -16,8 +16,9 @@ from .water import pressed_edges, wet_pieces
 
 @dataclass(frozen=True, eq=False)
 class Inertia:
-    """What makes weight and inertia a body force: ``density`` (n_blocks,), ``gravity`` (2,), ``acceleration`` (n_blocks, 6)
-    of the unknowns, ``spin`` (n_blocks,) the angular velocity ω of the centrifugal ρω²x, ``fixed`` (n_blocks,)."""
+    """What makes weight and inertia a body force: ``density`` (n_blocks,), ``gravity`` (2,), ``acceleration``
+    (n_blocks, 6) of the unknowns, ``spin`` (n_blocks,) the angular velocity ω of the centrifugal ρω²x, ``fixed``
+    (n_blocks,)."""
 
     density: np.ndarray
     gravity: np.ndarray
@@ -26,8 +27,8 @@ class Inertia:
     fixed: np.ndarray
 
     def body_forces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Weight minus inertia as a linear field: (n_blocks, 2) at the centroid and its gradient (n_blocks, 2, 2), N/m³,
-        N/m⁴."""
+        """Weight minus inertia as a linear field: (n_blocks, 2) at the centroid and its gradient (n_blocks, 2, 2),
+        N/m³, N/m⁴."""
         rho, a = self.density, np.where(self.fixed[:, None], 0.0, self.acceleration)
         gradient = np.empty((len(rho), 2, 2))
         centrifugal = np.where(self.fixed, 0.0, self.spin) ** 2
@@ -49,9 +50,11 @@ class AppliedForces:
     body_force            (n_blocks, 2)     ρ(g − a) at the centroid, N/m³
     body_force_gradient   (n_blocks, 2, 2)  ∂b/∂x: the rest of −ρ times the block's acceleration field, centrifugal
                                             part included; b(x) = body_force + body_force_gradient (x − centroid)
-    reaction              (n_blocks, 6)     N, N m: what it takes to give moving blocks the motion that is imposed on their
+    reaction              (n_blocks, 6)     N, N m: what it takes to give moving blocks the motion that is imposed on
+                          their
                                             unknowns, about their centroids; None where none is
-    overstress            (n_blocks, 3)     Pa, current axes: what the forces balance beyond the stress of the step's end
+    overstress            (n_blocks, 3)     Pa, current axes: what the forces balance beyond the stress of the step's
+                          end
                                             (`TimeScheme.overstress`); None at rest
     """
 
@@ -88,12 +91,13 @@ class LoadMap:
         self._drained: np.ndarray | None = None
 
     def take_out(self, removed: np.ndarray | None, drained: np.ndarray | None) -> None:
-        """Load the blocks ``removed`` (n_blocks,) no more; where ``drained`` ones lay against others, there is no water."""
+        """Load the blocks ``removed`` (n_blocks,) no more; where ``drained`` ones lay against others, there is no
+        water."""
         self._removed, self._drained, self._wet = removed, drained, None
 
     def edges(self, load: EdgeTraction) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges that ``load`` acts on, (n, 2) reference lengths times its profile at their two ends, and EDGE_FORCE rows for
-        them that know no more than block and edge. Raises ValueError when there are none."""
+        """Edges that ``load`` acts on, (n, 2) reference lengths times its profile at their two ends, and EDGE_FORCE
+        rows for them that know no more than block and edge. Raises ValueError when there are none."""
         name, key = load.edge_name, (load.edge_name, load.profile)
         if key not in self._edges:
             edges = self.blocks.edges_named(name)
@@ -119,8 +123,8 @@ class LoadMap:
     def rows(
         self, loads: Loads, time: float, vertices: np.ndarray, rotation: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """POINT_FORCE and EDGE_FORCE rows of ``loads`` at ``time`` on the current ``vertices`` of blocks that have turned by
-        ``rotation`` (n_blocks,) rad."""
+        """POINT_FORCE and EDGE_FORCE rows of ``loads`` at ``time`` on the current ``vertices`` of blocks that have
+        turned by ``rotation`` (n_blocks,) rad."""
         points = np.zeros(len(loads.point_loads), POINT_FORCE)
         for row, load in zip(points, loads.point_loads, strict=True):
             force = load.history.at(time)
@@ -192,8 +196,8 @@ def _add(row, x, y, fx, fy):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _gather(out, centroid, point_block, point, force, edge_block, start, end, traction):
-    """Add to ``out`` (n_blocks, 6) the generalised forces about ``centroid`` (n_blocks, 2) of forces at points, and of linear
-    tractions: ∫ t and ∫ x ⊗ t are those of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at the ends."""
+    """Add to ``out`` (n_blocks, 6) the generalised forces about ``centroid`` (n_blocks, 2) of forces at points, and of
+    linear tractions: ∫ t and ∫ x ⊗ t are those of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at the ends."""
     for i in range(len(point_block)):
         b = point_block[i]
         _add(out[b], point[i, 0] - centroid[b, 0], point[i, 1] - centroid[b, 1], force[i, 0], force[i, 1])

@@ -1,7 +1,7 @@
 """Elimination of 6×6-block systems in dense fronts, in double or single precision.
 
-A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel of
-three blocks at a time,
+A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel
+of three blocks at a time,
 
     Z = F_kk⁻¹,   U = Z F_k·,   F_ij ← F_ij − F_ik U_j,
 
@@ -43,8 +43,8 @@ _gemm = types.ExternalFunction(
 
 @_jit
 def _product(a, x):
-    """Σ a x. Where a factor streams from memory, one row after the other runs at twice the speed of BLAS, which reads four at a
-    time."""
+    """Σ a x. Where a factor streams from memory, one row after the other runs at twice the speed of BLAS, which reads
+    four at a time."""
     total = a.dtype.type(0)
     for j in range(len(a)):
         total += a[j] * x[j]
@@ -117,8 +117,8 @@ def _eliminate(
     factors,
     units,
 ):
-    """Eliminate ``fronts``, ascending; False if one is singular. ``child`` and ``sibling`` chain the children of a front;
-    ``units`` are 1, −1, 0."""
+    """Eliminate ``fronts``, ascending; False if one is singular. ``child`` and ``sibling`` chain the children of a
+    front; ``units`` are 1, −1, 0."""
     one, minus, none = units[0:1], units[1:2], units[2:3]
     swapped = np.empty(PANEL, np.int64)
     longest = 0
@@ -151,7 +151,8 @@ def _eliminate(
         g = child[f]
         while g >= 0:
             first, n = reach[g], reach[g + 1] - reach[g]
-            # Neighbours in the child's boundary mostly stand side by side in the parent too: long rows are added at once.
+            # Neighbours in the child's boundary mostly stand side by side in the parent too: long rows are added at
+            # once.
             runs = 0
             for v in range(n):
                 j = seat[first + v]
@@ -169,7 +170,8 @@ def _eliminate(
                         own_row, far_row = lower[6 * (i - own) + a], rest[6 * (i - own) + a]
                     for r in range(runs):
                         j, v, w = 6 * seat[first + begins[r]], 6 * begins[r], 6 * begins[r + 1]
-                        # Slices, for their indices need no check for a negative sign, which would keep loops from vectors.
+                        # Slices, for their indices need no check for a negative sign, which would keep loops from
+                        # vectors.
                         here = own_row[j : j + w - v] if j < p else far_row[j - p : j - p + w - v]
                         added = line[v:w]
                         for c in range(w - v):
@@ -201,7 +203,8 @@ def _mark_above(touched, parent):
 
 @_jit
 def _forward(fronts, out, pivots, reach, seat, at, child, sibling, factors, passed):
-    """Forward substitution in ``out`` (6n,), in the order of elimination; ``passed`` holds what each front passes on."""
+    """Forward substitution in ``out`` (6n,), in the order of elimination; ``passed`` holds what each front passes
+    on."""
     part = np.empty(PANEL, factors.dtype)
     for f in fronts:
         own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
@@ -260,9 +263,9 @@ def _cores() -> ThreadPoolExecutor:
 class Factors:
     """The factors of one pattern of 6×6 blocks, in ``dtype`` float64 or float32.
 
-    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both triangles
-    and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree`` already planned for
-    the same pattern.
+    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
+    triangles and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree``
+    already planned for the same pattern.
     """
 
     def __init__(
@@ -296,8 +299,8 @@ class Factors:
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> float:
         """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row; the share of it that was done.
 
-        Where only rows and columns of the blocks ``changed`` (n,) differ from the matrix factored before, only their fronts
-        and those above are eliminated again. Raises numpy.linalg.LinAlgError when the matrix is singular.
+        Where only rows and columns of the blocks ``changed`` (n,) differ from the matrix factored before, only their
+        fronts and those above are eliminated again. Raises numpy.linalg.LinAlgError when the matrix is singular.
         """
         t = self.tree
         touched = np.ones(len(t.parent), np.bool_)
@@ -338,8 +341,8 @@ class Factors:
         return size * x
 
     def _climb(self, work: Callable, least: int, down: bool = False) -> list:
-        """What ``work`` gives for all fronts in pieces, children before parents or the other way; from ``least`` blocks on,
-        pieces that are independent share the cores, for ``work`` lets go of the interpreter's lock."""
+        """What ``work`` gives for all fronts in pieces, children before parents or the other way; from ``least`` blocks
+        on, pieces that are independent share the cores, for ``work`` lets go of the interpreter's lock."""
         t = self.tree
         with blas_threads(1):
             if len(t.rank) < least:

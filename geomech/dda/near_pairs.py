@@ -18,8 +18,8 @@ _REACH = 2.0
 def _sweep_strips(box, fixed, reach, order, first, last, start, members, pairs):
     """Number of pairs whose boxes are nearer than ``reach``, written to ``pairs`` as far as it has room.
 
-    ``first`` and ``last`` are the strips of each block, ``members[start[s]:start[s + 1]]`` the blocks of strip s, filled
-    here in the ``order`` of their least x. A pair counts in the lowest strip that both share.
+    ``first`` and ``last`` are the strips of each block, ``members[start[s]:start[s + 1]]`` the blocks of strip s,
+    filled here in the ``order`` of their least x. A pair counts in the lowest strip that both share.
     """
     n = box.shape[0]
     fill = start.copy()
@@ -47,8 +47,8 @@ def _sweep_strips(box, fixed, reach, order, first, last, start, members, pairs):
 
 
 def near_pairs(box: np.ndarray, fixed: np.ndarray, reach: float) -> np.ndarray:
-    """(k, 2) blocks, the lower number first, ascending, whose boxes (n, 4) (least x, y, greatest x, y; m) are nearer than
-    ``reach`` m; none of two ``fixed`` ones."""
+    """(k, 2) blocks, the lower number first, ascending, whose boxes (n, 4) (least x, y, greatest x, y; m) are nearer
+    than ``reach`` m; none of two ``fixed`` ones."""
     n = len(box)
     height = 2.0 * float(np.median(box[:, 3] - box[:, 1])) + reach
     low = float(box[:, 1].min())
@@ -85,8 +85,8 @@ class NearPairs:
         self.searches = 0
 
     def of(self, vertices: np.ndarray, window: float) -> np.ndarray:
-        """All pairs that may be nearer than ``window`` m on ``vertices`` (n_vertices, 2), and some that are not; of one block
-        none is looked for."""
+        """All pairs that may be nearer than ``window`` m on ``vertices`` (n_vertices, 2), and some that are not; of one
+        block none is looked for."""
         if len(self._first) < 2:
             return np.zeros((0, 2), np.int64)
         if self._vertices is None or not window + 2.0 * np.abs(vertices - self._vertices).max() <= self._reach:

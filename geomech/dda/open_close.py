@@ -1,15 +1,16 @@
 """Open–close iterations: contact states that agree with the motion they produce.
 
-A set of states makes the step linear; its solution is checked against them (`contact_states`). Every contact that fails is
-switched and the step solved again: Newton's method, which ends in two or three iterations where few contacts change. Bonds,
-lost for good, break only when all else is right.
+A set of states makes the step linear; its solution is checked against them (`contact_states`). Every contact that fails
+is switched and the step solved again: Newton's method, which ends in two or three iterations where few contacts change.
+Bonds, lost for good, break only when all else is right.
 
-Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states returns,
-the `CentralPath` proposes states to go on from, unless contacts are few. If it is blocked, `RoundedLaws` do (for more blocks than
-a dense matrix holds), and if they fail too, rounds of `LaggedFriction`, slowly and surely. If these end without, the sliding contacts stick
-again and only the worst contact of each block is switched, and if a combination still returns, only the first (the
-least-index rule, which cannot cycle where the problem has one solution; Murty 1974).
-Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
+Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states
+returns, the `CentralPath` proposes states to go on from, unless contacts are few. If it is blocked, `RoundedLaws` do
+(for more blocks than a dense matrix holds), and if they fail too, rounds of `LaggedFriction`, slowly and surely. If
+these end without, the sliding contacts stick again and only the worst contact of each block is switched, and if a
+combination still returns, only the first (the least-index rule, which cannot cycle where the problem has one solution;
+Murty 1974). Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on
+the forces.
 """
 
 from __future__ import annotations
@@ -37,18 +38,19 @@ _ALL, _SOME, _WORST, _FIRST = 0, 1, 2, 3
 _FEWER = 0.55
 #: … or for so many iterations although it does not.
 _TRIES = 1
-#: If no more than this many contacts are still wrong then, only some are switched, while that helps or for so many iterations.
+#: If no more than this many contacts are still wrong then, only some are switched, while that helps or for so many
+#: iterations.
 _LITTLE, _MORE = 12, 5
-#: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path takes
-#: fifteen; it is asked after so many iterations.
+#: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path
+#: takes fifteen; it is asked after so many iterations.
 _FEW, _CAUTIOUS = 40, 12
-#: The central path proposes states when no more than this part of the contacts are undecided, nor more than so many or so small
-#: a part (a wall of 10 000 bricks takes half the iterations that it takes without this second bound), and no more than this
-#: part of the forces on blocks is out of balance. At its end, where ε is round-off, the first of these suffices: a wall of
-#: 100 000 bricks leaves twenty that hardly touch.
+#: The central path proposes states when no more than this part of the contacts are undecided, nor more than so many or
+#: so small a part (a wall of 10 000 bricks takes half the iterations that it takes without this second bound), and no
+#: more than this part of the forces on blocks is out of balance. At its end, where ε is round-off, the first of these
+#: suffices: a wall of 100 000 bricks leaves twenty that hardly touch.
 _DECIDED, _LEFT, _LEFT_PART, _BALANCED = 0.006, 12, 2e-4, 1e-3
-#: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces change
-#: by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
+#: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces
+#: change by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
 _PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
 #: Iterations to go from such states to the end.
 _FINISH = 8
@@ -58,9 +60,9 @@ _FINISH = 8
 class Settled:
     """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`.
 
-    ``gap`` is counted from where the faces meet, ``slip`` is what the shear spring did not take up of the motion along the
-    edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration; ``stretch`` what multipliers have
-    left of the motion of sticking contacts.
+    ``gap`` is counted from where the faces meet, ``slip`` is what the shear spring did not take up of the motion along
+    the edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration; ``stretch`` what
+    multipliers have left of the motion of sticking contacts.
     """
 
     unknowns: np.ndarray
@@ -93,7 +95,8 @@ def _plastic(forces: np.ndarray, state: np.ndarray, shear_force: np.ndarray, spr
 def _worst_of_their_blocks(
     violation: np.ndarray, block: np.ndarray, other: np.ndarray, order: np.ndarray, share: float
 ) -> np.ndarray:
-    """(n,) True for contacts at least ``share`` times as violated as any other contact of either of their free blocks."""
+    """(n,) True for contacts at least ``share`` times as violated as any other contact of either of their free
+    blocks."""
     worst = np.zeros(len(order))
     np.maximum.at(worst, block, violation)
     np.maximum.at(worst, other, violation)
@@ -126,8 +129,8 @@ class _States:
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """The motion (6 n,) and forces (n, 4) that states make, the states they call for, by how much each is wrong (N), whether
-    the lines agree with curved laws, and the lines."""
+    """The motion (6 n,) and forces (n, 4) that states make, the states they call for, by how much each is wrong (N),
+    whether the lines agree with curved laws, and the lines."""
 
     unknowns: np.ndarray
     forces: np.ndarray
@@ -158,7 +161,8 @@ class _Equations:
         self._side = np.empty(6 * self.pattern.n)
 
     def answer(self, states: _States, normal_force: np.ndarray, slip: np.ndarray) -> _Answer:
-        """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises `Unsettled`."""
+        """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises
+        `Unsettled`."""
         pattern, found, springs, gap = self.pattern, self.found, self.springs, self.gap
         state, direction, bonded = states.state, states.direction, states.bonded
         if self.curved is not None:
@@ -224,8 +228,9 @@ def _settled(equations: _Equations, states: _States, answer: _Answer, iterations
 def _proposed(
     path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int, patient: bool
 ) -> tuple[_States | None, int]:
-    """States that the ``path`` proposes once nearly all contacts are decided, none of those ``offered`` already, or None if
-    it ends, takes more than ``budget`` iterations or, unless ``patient``, is blocked; and the iterations spent. Raises `Unsettled`."""
+    """States that the ``path`` proposes once nearly all contacts are decided, none of those ``offered`` already, or
+    None if it ends, takes more than ``budget`` iterations or, unless ``patient``, is blocked; and the iterations spent.
+    Raises `Unsettled`."""
     for spent in range(1, budget + 1):
         try:
             undecided = path.advance()
@@ -249,8 +254,8 @@ def _proposed(
 def _lagged(
     equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
-    """States that rounds of lagged friction propose once their normal forces hardly change, and the solutions spent since the
-    last; at most ``budget`` in all. Raises `Unsettled`."""
+    """States that rounds of lagged friction propose once their normal forces hardly change, and the solutions spent
+    since the last; at most ``budget`` in all. Raises `Unsettled`."""
     of = equations
     friction = LaggedFriction(
         of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded
@@ -273,9 +278,9 @@ def _lagged(
 def _slower(
     equations: _Equations, answer: _Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
-    """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (which knows of no
-    lift), and the solutions spent since the last. Where the matrix is dense a hundred solutions cost little, and blocks
-    that topple one by one go the surer way at once. Raises `Unsettled`."""
+    """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (which knows
+    of no lift), and the solutions spent since the last. Where the matrix is dense a hundred solutions cost little, and
+    blocks that topple one by one go the surer way at once. Raises `Unsettled`."""
     of, told = equations, 0
     if of.pattern.solver is not None:
         laws = RoundedLaws(
@@ -310,9 +315,9 @@ def settle(
     max_iterations: int,
     curved: CurvedJoints | None = None,
 ) -> Settled:
-    """Iterate from the states of ``found`` to consistent ones; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the blocks' own
-    part, ``springs`` and ``gap`` those of this step (dashpots included). ``curved`` joints bend them from iteration to
-    iteration. An iteration is a solution of the step's equations, those along the central path included.
+    """Iterate from the states of ``found`` to consistent ones; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the
+    blocks' own part, ``springs`` and ``gap`` those of this step (dashpots included). ``curved`` joints bend them from
+    iteration to iteration. An iteration is a solution of the step's equations, those along the central path included.
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
@@ -326,7 +331,8 @@ def settle(
     caution, fewest, tries = _ALL, np.inf, 0
     few, small = len(found) <= _FEW, pattern.solver is None
     iteration, most = 0, max_iterations
-    # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states fits.
+    # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states
+    # fits.
     closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
     while True:
         iteration += 1
@@ -346,7 +352,8 @@ def settle(
             # Bonds are lost for good: none breaks before all else is right, and the most strained break first.
             wrong = bonds & _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 0.5)
             states, caution, fewest, tries = states.switched(wrong, answer.called), _ALL, np.inf, 0
-            # What was tried knew of bonds that are gone, and what is left has time of its own: there are fewer bonds each time.
+            # What was tried knew of bonds that are gone, and what is left has time of its own: there are fewer bonds
+            # each time.
             slower, max_iterations = None, max(max_iterations, iteration + most)
             continue
         wrong &= ~bonds

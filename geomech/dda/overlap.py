@@ -58,7 +58,8 @@ def _depth_crossing(vertices, next_vertex, e, f):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _worst_pair(vertices, next_vertex, start, box, order, centroid, size):
-    """(block, other, depth) of the overlap that is deepest relative to the smaller block's size; (−1, −1, 0) for none."""
+    """(block, other, depth) of the overlap that is deepest relative to the smaller block's size; (−1, −1, 0) for
+    none."""
     worst_a, worst_b, worst, worst_share = -1, -1, 0.0, 0.0
     n = start.shape[0] - 1
     for p in range(n):
@@ -95,8 +96,8 @@ def _worst_pair(vertices, next_vertex, start, box, order, centroid, size):
 
 
 def deepest_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> tuple[int, int, float, float]:
-    """The two blocks that overlap most at ``vertices`` (−1, −1 for none), by how much, m, and over the smaller one's size, √area;
-    ``moments`` (n_blocks, ≥ 3) with area and centroid first."""
+    """The two blocks that overlap most at ``vertices`` (−1, −1 for none), by how much, m, and over the smaller one's
+    size, √area; ``moments`` (n_blocks, ≥ 3) with area and centroid first."""
     start = np.ascontiguousarray(blocks.vertex_start, np.int64)
     first = start[:-1]
     box = np.hstack([np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)])
@@ -111,8 +112,8 @@ def deepest_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -
 def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> None:
     """Look for blocks that overlap at ``vertices``; ``moments`` as in `deepest_overlap`.
 
-    Raises ValueError naming the worst two when they overlap by more than `REFUSED` of the smaller one's size; what exceeds
-    `REPORTED` is logged.
+    Raises ValueError naming the worst two when they overlap by more than `REFUSED` of the smaller one's size; what
+    exceeds `REPORTED` is logged.
     """
     a, b, depth, share = deepest_overlap(blocks, vertices, moments)
     if share <= REPORTED:

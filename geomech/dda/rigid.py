@@ -1,8 +1,8 @@
 """Blocks that do not strain: three unknowns, and the mean stress that the forces on them make.
 
-The strains of a rigid block are held at zero exactly. What its rows of the equations would have to carry for that is its
-mean stress, the virial of all forces on it: A σ̄ = Σ sym(F ⊗ x) + ∫ sym(b ⊗ x) dA about its centroid, with its inertia and
-the centrifugal force of its spin in b (Love 1927, §120).
+The strains of a rigid block are held at zero exactly. What its rows of the equations would have to carry for that is
+its mean stress, the virial of all forces on it: A σ̄ = Σ sym(F ⊗ x) + ∫ sym(b ⊗ x) dA about its centroid, with its
+inertia and the centrifugal force of its spin in b (Love 1927, §120).
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ def mean_stress(
     turn: np.ndarray,
 ) -> np.ndarray:
     """(n, 3) Pa mean stress of ``blocks`` (n,) on axes turned by ``turn`` (n_blocks,) rad, from the forces of a step:
-    CONTACT rows, generalised ``load`` (n_blocks, 6) N m, ``acceleration`` (n_blocks, 6) and ``spin`` (n_blocks,) rad/s."""
+    CONTACT rows, generalised ``load`` (n_blocks, 6) N m, ``acceleration`` (n_blocks, 6) and ``spin`` (n_blocks,)
+    rad/s."""
     n = contacts["normal"]
     force = contacts["normal_force"][:, None] * n
     force += contacts["shear_force"][:, None] * np.stack([-n[:, 1], n[:, 0]], axis=1)

@@ -1,16 +1,16 @@
 """Contact states by laws whose corners are rounded off: what to try where the central path is blocked.
 
-The forces of a contact are functions of the step's motion alone, with corners where it opens and where it begins to slide.
-Rounded off over a force f (N), they are
+The forces of a contact are functions of the step's motion alone, with corners where it opens and where it begins to
+slide. Rounded off over a force f (N), they are
 
     N = ½ (√(kₙ²g² + 4f²) − kₙg),   S = ½ (√((T + c)² + 4f²) − √((T − c)² + 4f²)),   T = S₀ − kₛs,   c = μN + firm,
 
-(Chen & Harker 1993; Kanzow 1996), and Newton's method finds the motion in which all blocks are in balance, each step cut to
-where the next one, solved with the same factors, is the shorter (Deuflhard 1974: a test that no scaling of the equations
-changes, where the residual of springs ten thousand times as stiff as the inertia behind them says nothing). Then f is taken
-down by stages until the states are those of the laws themselves. A stage that does not end is begun again with a larger f.
-It takes a hundred solutions where they are needed: more than a central path that is not blocked, a few times less than rounds
-of lagged friction.
+(Chen & Harker 1993; Kanzow 1996), and Newton's method finds the motion in which all blocks are in balance, each step
+cut to where the next one, solved with the same factors, is the shorter (Deuflhard 1974: a test that no scaling of the
+equations changes, where the residual of springs ten thousand times as stiff as the inertia behind them says nothing).
+Then f is taken down by stages until the states are those of the laws themselves. A stage that does not end is begun
+again with a larger f. It takes a hundred solutions where they are needed: more than a central path that is not blocked,
+a few times less than rounds of lagged friction.
 """
 
 from __future__ import annotations
@@ -30,17 +30,20 @@ from .contact_states import moved
 _STEPS, _LEAST = 15, 1e-4
 #: A stage ends when the imbalance is below this part of f (or of the largest load).
 _BALANCED = 0.1
-#: From stage to stage f falls to this part, to half of it after stages of fewer than so many steps, never below the last.
+#: From stage to stage f falls to this part, to half of it after stages of fewer than so many steps, never below the
+#: last.
 _SHRINK, _QUICK, _LEAST_SHRINK = 0.2, 5, 1e-3
-#: A first stage that does not end is tried again so often with so much larger f. Later ones give up when f would hardly fall.
+#: A first stage that does not end is tried again so often with so much larger f. Later ones give up when f would hardly
+#: fall.
 _AGAIN, _LARGER, _HARDLY = 6, 4.0, 0.9
 #: States are proposed once f is below this part of the loads, and f goes down to the last.
 _DECIDED, _END = 3e-3, 1e-6
 
 
 class RoundedLaws:
-    """Stages of one step's contacts from ``unknowns`` (6 n,) on; other arguments as for `settle`, ``bonded`` (n,) the bonds,
-    which hold. ``force`` is f at the start, in units of the load on a contact's blocks. ``solutions`` counts factorisations.
+    """Stages of one step's contacts from ``unknowns`` (6 n,) on; other arguments as for `settle`, ``bonded`` (n,) the
+    bonds, which hold. ``force`` is f at the start, in units of the load on a contact's blocks. ``solutions`` counts
+    factorisations.
 
     Corners that meet are stood for by one of their lines, as on the central path.
     """
@@ -102,7 +105,8 @@ class RoundedLaws:
             force = shrink * last
 
     def _stage(self, force: float) -> np.ndarray | None:
-        """The motion in balance with laws rounded off over ``force``, from the motion at hand; None if it is not found."""
+        """The motion in balance with laws rounded off over ``force``, from the motion at hand; None if it is not
+        found."""
         unknowns = self._unknowns
         motion = self._motion(unknowns)
         forces = self._laws(motion, force)

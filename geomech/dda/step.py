@@ -47,7 +47,8 @@ class StepResult:
     reserve        (n_contacts,) N, how far each of ``contacts`` is from leaving its state (`contact_states.reserves`)
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
                    worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
-                   motion over the largest force in them), unbalanced_ratio (0 at rest, 1 in free flight: see `imbalance`)
+                   motion over the largest force in them), unbalanced_ratio (0 at rest, 1 in free flight: see
+                   `imbalance`)
     """
 
     state: State

@@ -21,8 +21,8 @@ SHORTEST = 1e-4
 
 @dataclass(eq=False)
 class StepLength:
-    """How long the next step of a run is to be, s: ``settings.time_step``, or with ``settings.automatic_time_step`` between
-    that and a ten thousandth of it, by the last step's open–close iterations, cuts and displacement."""
+    """How long the next step of a run is to be, s: ``settings.time_step``, or with ``settings.automatic_time_step``
+    between that and a ten thousandth of it, by the last step's open–close iterations, cuts and displacement."""
 
     settings: DdaSettings
 

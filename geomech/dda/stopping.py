@@ -1,13 +1,13 @@
 """Sliding that friction stops within a step: what is left of its speed is taken away.
 
-A step weighs its forces over its whole length: friction that stops a block half way goes on pulling until the end, and leaves
-it with a speed of the order of a dt, often backwards, which no spring damps that is stiff beside m/dt² (there 2 d/dt − v
-only turns it about from step to step). What was missed is an impulse: over the rest r = dt − t* of the step, t* by the line
-from the sliding speed u₀ at the start to the one that friction all along would have left at the end, friction may have had any
-value |S| ≤ μN + c instead (Coulomb). Of these that is taken which leaves no sliding, or the one nearest to it (Moreau
-1988: Coulomb's law between velocities and impulses). Blocks answer as in the step: 2M/dt² Δd + (springs) Δd = impulse/dt,
-Δv = 2 Δd/dt, with all contacts that stay closed; so momentum is passed on between blocks, not lost, and a spring that the step
-does resolve keeps its vibration. Kinetic energy never grows.
+A step weighs its forces over its whole length: friction that stops a block half way goes on pulling until the end, and
+leaves it with a speed of the order of a dt, often backwards, which no spring damps that is stiff beside m/dt² (there 2
+d/dt − v only turns it about from step to step). What was missed is an impulse: over the rest r = dt − t* of the step,
+t* by the line from the sliding speed u₀ at the start to the one that friction all along would have left at the end,
+friction may have had any value |S| ≤ μN + c instead (Coulomb). Of these that is taken which leaves no sliding, or the
+one nearest to it (Moreau 1988: Coulomb's law between velocities and impulses). Blocks answer as in the step: 2M/dt² Δd
++ (springs) Δd = impulse/dt, Δv = 2 Δd/dt, with all contacts that stay closed; so momentum is passed on between blocks,
+not lost, and a spring that the step does resolve keeps its vibration. Kinetic energy never grows.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _TURNS_ABOUT = 16.0
 
 @dataclass(frozen=True, eq=False)
 class Stopped:
-    """Contacts ``rows`` whose sliding is to end: those that ``stops`` marks have come to a stop in the step, the others stuck
-    all along. ``sense`` ±1 along the edge is that of the sliding that stops; speeds (m/s) in that sense ``before`` and
-    ``after`` the step."""
+    """Contacts ``rows`` whose sliding is to end: those that ``stops`` marks have come to a stop in the step, the others
+    stuck all along. ``sense`` ±1 along the edge is that of the sliding that stops; speeds (m/s) in that sense
+    ``before`` and ``after`` the step."""
 
     rows: np.ndarray
     stops: np.ndarray
@@ -44,8 +44,9 @@ class Stopped:
         cls, found: ContactSet, settled: Settled, slid: np.ndarray, velocity: np.ndarray, centroid: np.ndarray,
         mass: np.ndarray, dt: float, slack: float,
     ) -> Stopped | None:  # fmt: skip
-        """None where nothing stops. ``slid`` (n,) m along the edge in the step; ``velocity`` (n_blocks, 6), ``centroid``
-        (n_blocks, 2), ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry less than ``slack`` (m) in a step are none."""
+        """None where nothing stops. ``slid`` (n,) m along the edge in the step; ``velocity`` (n_blocks, 6),
+        ``centroid`` (n_blocks, 2), ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry less than ``slack``
+        (m) in a step are none."""
         stuck = (found.state == SLIP) & (settled.state == STICK) & (found.direction != 0.0)
         rows = np.flatnonzero(stuck | ((settled.state == SLIP) & (settled.direction != 0.0)))
         if not len(rows):
@@ -61,7 +62,8 @@ class Stopped:
         stops[rows[keep]] = True
         senses = np.ones(len(found))
         senses[rows[keep]] = sense[keep]
-        # What sticks on a spring that is not resolved is turned about from step to step, and would turn with it what stops.
+        # What sticks on a spring that is not resolved is turned about from step to step, and would turn with it what
+        # stops.
         lighter = np.minimum(mass[found.block], mass[found.other])
         stiff = (settled.state == STICK) & (settled.springs.shear * dt * dt > _TURNS_ABOUT * lighter)
         rows = np.flatnonzero(stops | stiff)
@@ -85,8 +87,8 @@ def stop(
     stopped: Stopped, pattern: assembly.Pattern, matrix: np.ndarray, vectors: np.ndarray, found: ContactSet,
     settled: Settled, dt: float,
 ) -> np.ndarray:  # fmt: skip
-    """(n_free, 6) m: Δd by whose rate 2 Δd/dt the velocities change, in the unknowns of `assembly`. ``matrix`` (n, 6, 6) and
-    ``vectors`` (n_contacts, 2, 12) as solved with. Raises numpy.linalg.LinAlgError."""
+    """(n_free, 6) m: Δd by whose rate 2 Δd/dt the velocities change, in the unknowns of `assembly`. ``matrix`` (n, 6,
+    6) and ``vectors`` (n_contacts, 2, 12) as solved with. Raises numpy.linalg.LinAlgError."""
     springs, rows, sense = settled.springs, stopped.rows, stopped.sense
     u0, u1 = stopped.before, stopped.after
     n = len(found)
@@ -107,7 +109,8 @@ def stop(
         state[rows] = np.where(given, SLIP, STICK)
         push[rows] = np.where(given, -sense * (bound - resisted), 0.0)
         pull[rows] = np.where(given, 0.0, -springs.shear[rows] * sense * u1 * 0.5 * dt)
-        # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their friction.
+        # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their
+        # friction.
         assembly.assemble_contacts(
             data, side, matrix, np.zeros((pattern.n, 6)), pattern.stride, pattern.diagonal, pattern.upper, pattern.lower,
             found.block, found.other, pattern.order, vectors, state, np.ones(n), nothing, springs.normal, springs.shear,
@@ -160,8 +163,8 @@ def _product(u: np.ndarray, w: np.ndarray, moments: np.ndarray) -> np.ndarray:
 def dissipating(
     change: np.ndarray, velocity: np.ndarray, moments: np.ndarray, density: np.ndarray, fixed: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """The part of ``change`` (n_blocks, 6) of ``velocity`` that does not raise the kinetic energy of the blocks that are not
-    ``fixed``, and what it takes of it, J/m."""
+    """The part of ``change`` (n_blocks, 6) of ``velocity`` that does not raise the kinetic energy of the blocks that
+    are not ``fixed``, and what it takes of it, J/m."""
     mass = np.where(fixed, 0.0, density)
     first = float((mass * _product(velocity, change, moments)).sum())
     second = float((mass * _product(change, change, moments)).sum())

@@ -1,10 +1,11 @@
 """Factor of safety by strength reduction: how much weaker the joints may be before the blocks go.
 
-tan φ, cohesion and tensile strength of the joints are divided by F (Zienkiewicz, Humpheson & Lewis 1975; Matsui & San 1992),
-and the blocks are asked for a static equilibrium, each trial beginning where the last one that held came to rest. The
-criterion is a force, not a displacement: a static step of length dt leaves out of balance what moves the blocks by a dt²/2.
-In a stable trial the unbalanced force falls to round-off within a few steps; in an unstable one it stays, however often the step is
-repeated, and for sliding it grows as A − B/F. Two unstable trials thus point at the factor between them, and few more close in.
+tan φ, cohesion and tensile strength of the joints are divided by F (Zienkiewicz, Humpheson & Lewis 1975; Matsui & San
+1992), and the blocks are asked for a static equilibrium, each trial beginning where the last one that held came to
+rest. The criterion is a force, not a displacement: a static step of length dt leaves out of balance what moves the
+blocks by a dt²/2. In a stable trial the unbalanced force falls to round-off within a few steps; in an unstable one it
+stays, however often the step is repeated, and for sliding it grows as A − B/F. Two unstable trials thus point at the
+factor between them, and few more close in.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ _FALL = 0.01
 _FALLING, _STEPS = 0.8, 6
 #: No trial is called unstable before it has made so many steps.
 _LEAST_STEPS = 10
-#: So many blocks of a mechanism are described; one that turns by more than this (rad) as it goes its own size is said to.
+#: So many blocks of a mechanism are described; one that turns by more than this (rad) as it goes its own size is said
+#: to.
 _TOLD, _TURNS = 8, 0.05
 #: So many steps of relaxation may go before the first trial.
 _RELAXING = 100
@@ -38,14 +40,15 @@ _FARTHEST = 64.0
 
 
 class NothingToReduce(ValueError):
-    """What was asked for has no factor of safety: no such strength, nothing that could fail, a load that statics do not know."""
+    """What was asked for has no factor of safety: no such strength, nothing that could fail, a load that statics do not
+    know."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One reduced strength. ``factor`` F; ``stable``; static ``steps`` made; ``unbalanced`` the part of the forces on a block that is
-    left to move it, where it is largest; ``drift`` m/s², that block's acceleration; ``displacement`` (n_blocks, 2) m and ``rotation``
-    (n_blocks,) rad of the last step; ``reason`` in words."""
+    """One reduced strength. ``factor`` F; ``stable``; static ``steps`` made; ``unbalanced`` the part of the forces on a
+    block that is left to move it, where it is largest; ``drift`` m/s², that block's acceleration; ``displacement``
+    (n_blocks, 2) m and ``rotation`` (n_blocks,) rad of the last step; ``reason`` in words."""
 
     factor: float
     stable: bool
@@ -59,9 +62,9 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class FactorOfSafety:
-    """``factor`` lies between ``lower``, the largest F with an equilibrium that was found, and ``upper``, the smallest without
-    (inf: none up to 64); ``trials`` in the order made; ``mechanism``: what moves just above the factor, in words, a line a
-    block; ``moving`` those blocks, the fastest first; ``state`` the equilibrium at ``lower``."""
+    """``factor`` lies between ``lower``, the largest F with an equilibrium that was found, and ``upper``, the smallest
+    without (inf: none up to 64); ``trials`` in the order made; ``mechanism``: what moves just above the factor, in
+    words, a line a block; ``moving`` those blocks, the fastest first; ``state`` the equilibrium at ``lower``."""
 
     factor: float
     lower: float
@@ -122,16 +125,18 @@ def factor_of_safety(
 ) -> FactorOfSafety:
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
-    Loads are those of ``load_time`` s, after excavations up to then. ``state`` is where the first trial begins (default: blocks at rest). ``reduce`` names
-    the joint laws that are weakened (default: all). The answer is bracketed to ``tolerance`` (relative); a trial stands when
-    no block has more than the part ``unbalanced`` of the forces on it left to move it. Static steps are ``time_step`` s long
-    (default: free fall over it is a hundredth of the smallest block). ``watch`` sees every trial.
+    Loads are those of ``load_time`` s, after excavations up to then. ``state`` is where the first trial begins
+    (default: blocks at rest). ``reduce`` names the joint laws that are weakened (default: all). The answer is bracketed
+    to ``tolerance`` (relative); a trial stands when no block has more than the part ``unbalanced`` of the forces on it
+    left to move it. Static steps are ``time_step`` s long (default: free fall over it is a hundredth of the smallest
+    block). ``watch`` sees every trial.
 
-    Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what stands,
-    and another way there may find a factor that differs by some thousandths where contacts slide and stick again.
+    Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what
+    stands, and another way there may find a factor that differs by some thousandths where contacts slide and stick
+    again.
 
-    Raises `NothingToReduce` when there is no strength to reduce, nothing that moves, or a ground that does, `NotConverged` when the blocks do not stand
-    even with joints 64 times as strong.
+    Raises `NothingToReduce` when there is no strength to reduce, nothing that moves, or a ground that does,
+    `NotConverged` when the blocks do not stand even with joints 64 times as strong.
     """
     names = [law.name for law in joints]
     unknown = [name for name in reduce or () if name not in names]
@@ -198,16 +203,16 @@ def factor_of_safety(
 
 
 def _relaxed(blocks, materials, joints, loads, settings, joint_index, state: State, load_time: float) -> State:
-    """Where the blocks come to rest from ``state``, at ``load_time``: what is dug out or bolted by then is so in the step
-    that follows. ``state`` itself if they do not."""
+    """Where the blocks come to rest from ``state``, at ``load_time``: what is dug out or bolted by then is so in the
+    step that follows. ``state`` itself if they do not."""
     system = BlockSystem(blocks, materials, joints, joint_index, settings)
     found = equilibrium(system, state, loads, load_time=load_time, max_steps=_RELAXING)
     return replace(found.state, time=max(state.time, load_time)) if found.converged else state
 
 
 def reduced(law: JointLaw, factor: float) -> JointLaw:
-    """``law`` with tan φ, cohesion and tensile strength (their residuals too) divided by ``factor``; an angle of dilation is
-    kept as long as it is below that of friction."""
+    """``law`` with tan φ, cohesion and tensile strength (their residuals too) divided by ``factor``; an angle of
+    dilation is kept as long as it is below that of friction."""
     if law.roughness is not None:
         rough = replace(law.roughness, reduction=law.roughness.reduction * factor)
         return replace(law, roughness=rough)
@@ -257,7 +262,8 @@ def _trial(
             reason = f"no consistent contacts: {failure}"
             break
         state = result.state
-        # A step that was cut took less of the forces' time: go on with its length, and back to the full one by doubling.
+        # A step that was cut took less of the forces' time: go on with its length, and back to the full one by
+        # doubling.
         dt = result.dt if result.statistics["step_cuts"] else min(longest, 2.0 * result.dt)
         ratios.append(result.statistics["unbalanced_ratio"])
         travelled = float(np.hypot(*(state.vertices - begin).T).max())
@@ -292,7 +298,8 @@ def _pointed_at(trials: Sequence[Trial], lower: float, upper: float) -> float:
 
 
 def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance: float) -> float:
-    """The F to try: just beside where the drift points, on the side that is farther off; the middle when it does not point."""
+    """The F to try: just beside where the drift points, on the side that is farther off; the middle when it does not
+    point."""
     middle = 2.0 * lower * upper / (lower + upper)
     failed = [t for t in trials if not t.stable and math.isfinite(t.drift)]
     if len(failed) < 2:

@@ -48,8 +48,8 @@ class BlockSystem:
     ``compliance`` (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
     contacts and the ``load_map``; and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
     (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
-    ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``slack`` (m) is the rounding of coordinates: less is
-    no motion.
+    ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``slack`` (m) is the rounding of coordinates:
+    less is no motion.
 
     Raises ValueError when materials or joints are missing or a block has no area.
     """
@@ -225,7 +225,8 @@ class BlockSystem:
         return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit, lumped=True)
 
     def told(self, found: ContactSet, forces: ToldContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, as ``forces`` say where they tell of one: for a `State` whose next step begins so."""
+        """CONTACT rows of ``found``, as ``forces`` say where they tell of one: for a `State` whose next step begins
+        so."""
         if self.allowed_penetration:
             on_multiplier = self.finder.on_penalty(found)[0]
         else:

@@ -6,17 +6,17 @@ d is the displacement over the step (Newmark 1959, with d = v dt + ā dt²/2 and
     2M/dt² d = 2M v/dt + F(t₀ + θ dt) − A σ₀ − θ A C Δε − D d/dt + contacts
     v₁ = 2 d/dt − v₀ + κ dt (a₀ − ā),   κ = (θ − γ)/θ,   a₁ = (ā − (1−θ) a₀)/θ
 
-β = ½, γ = 1 is Shi's (1988) scheme, β = ¼, γ = ½ the trapezoidal rule. Where γ = 2β, between the two, no acceleration has
-to be kept, and the energy of a step with constant loads changes by −(θ−½) dᵀK d − dᵀD d/dt exactly (K: all linear springs,
-blocks' own included): it never grows. A contact counts at the start of a step only if it was closed there, and not at all
-if its weighted force would pull; met or left within a step it loses energy besides, after the idea of Kane, Repetto, Ortiz
-& Marsden (1999), that what comes and goes must act implicitly.
+β = ½, γ = 1 is Shi's (1988) scheme, β = ¼, γ = ½ the trapezoidal rule. Where γ = 2β, between the two, no acceleration
+has to be kept, and the energy of a step with constant loads changes by −(θ−½) dᵀK d − dᵀD d/dt exactly (K: all linear
+springs, blocks' own included): it never grows. A contact counts at the start of a step only if it was closed there, and
+not at all if its weighted force would pull; met or left within a step it loses energy besides, after the idea of Kane,
+Repetto, Ortiz & Marsden (1999), that what comes and goes must act implicitly.
 
-The α-scheme of Wood, Bossak & Zienkiewicz (1981), (1−α) a₁ + α a₀ = M⁻¹ f₁ with all forces f₁ at the end of the step, damps
-what the step does not resolve and leaves the rest alone: with the constants of Chung & Hulbert (1993), α = (ϱ−1)/(ϱ+1),
-γ = ½−α, β = ¼(1−α)², it is of second order and every |λ| falls to the spectral radius ϱ as ω dt → ∞. It is the step above with
-(ā − c a₀)/w in place of ā and θ = 1, w = 1/(1+ϱ), c = 1−w. Contact forces are in a₀ too: a bounce may gain some energy.
-Damping forces follow the mean velocity d/dt of the step: they take dᵀD d/dt > 0 at any step.
+The α-scheme of Wood, Bossak & Zienkiewicz (1981), (1−α) a₁ + α a₀ = M⁻¹ f₁ with all forces f₁ at the end of the step,
+damps what the step does not resolve and leaves the rest alone: with the constants of Chung & Hulbert (1993), α =
+(ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)², it is of second order and every |λ| falls to the spectral radius ϱ as ω dt → ∞. It is
+the step above with (ā − c a₀)/w in place of ā and θ = 1, w = 1/(1+ϱ), c = 1−w. Contact forces are in a₀ too: a bounce
+may gain some energy. Damping forces follow the mean velocity d/dt of the step: they take dᵀD d/dt > 0 at any step.
 """
 
 from __future__ import annotations
@@ -35,10 +35,11 @@ GROUND_RATIO = 1e-11
 
 @dataclass(frozen=True)
 class TimeScheme:
-    """Newmark's (1959) β and γ, as ``weight`` θ = 2β of the forces at the end of a step and ``memory`` κ = (2β−γ)/(2β) of
-    the acceleration at its start; ``end`` is 2β too, also in the α-scheme, where θ = 1 and ``recall`` is c. ``static``: nothing is carried from step to step, and all forces stand at its end.
-    ``mass_damping`` 1/s and ``stiffness_damping`` s are Rayleigh's, ``block_damping`` the fraction of critical damping of
-    each block's own vibration (and of its contacts'). Raises ValueError for what is not unconditionally stable."""
+    """Newmark's (1959) β and γ, as ``weight`` θ = 2β of the forces at the end of a step and ``memory`` κ = (2β−γ)/(2β)
+    of the acceleration at its start; ``end`` is 2β too, also in the α-scheme, where θ = 1 and ``recall`` is c.
+    ``static``: nothing is carried from step to step, and all forces stand at its end. ``mass_damping`` 1/s and
+    ``stiffness_damping`` s are Rayleigh's, ``block_damping`` the fraction of critical damping of each block's own
+    vibration (and of its contacts'). Raises ValueError for what is not unconditionally stable."""
 
     weight: float = 1.0
     memory: float = 0.0
@@ -83,30 +84,30 @@ class TimeScheme:
     def overstress(
         self, strain: np.ndarray, tangent: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, dt: float
     ) -> np.ndarray:
-        """(n_blocks, 3) Pa by which the stress that the forces over a step balance is more than that of its end: viscosity's, less
-        what they weigh of its start. ``strain`` (n_blocks, 3) of the step, ``tangent`` and ``stiffness`` (n_blocks, 3, 3), ``mass``
-        (n_blocks,)."""
+        """(n_blocks, 3) Pa by which the stress that the forces over a step balance is more than that of its end:
+        viscosity's, less what they weigh of its start. ``strain`` (n_blocks, 3) of the step, ``tangent`` and
+        ``stiffness`` (n_blocks, 3, 3), ``mass`` (n_blocks,)."""
         drag = self.stiffness_damping + 2.0 * self.block_damping * np.sqrt(mass / (12.0 * stiffness[:, 0, 0]))
         return (self.weight - 1.0 + drag / dt)[:, None] * (tangent @ strain[..., None])[..., 0]
 
     def begun(self, carried: np.ndarray, before: np.ndarray | None, dt: float) -> tuple[np.ndarray, float]:
-        """Velocity (n_blocks, 6) that a step begins with, and by how much inertia counts more, 1/w; with no acceleration from
-        ``before`` it is a step of Shi's."""
+        """Velocity (n_blocks, 6) that a step begins with, and by how much inertia counts more, 1/w; with no
+        acceleration from ``before`` it is a step of Shi's."""
         if self.recall == 0.0 or before is None:
             return carried, 1.0
         return carried + 0.5 * self.recall * dt * before, 1.0 / (1.0 - self.recall)
 
     def ahead(self, before: np.ndarray | None, dt: float) -> float:
-        """s by which forces that are taken as a mean over a time ``dt`` must be later than the step: the α-scheme's are those of
-        the step's end, about which the mean is then taken; arguments as for `begun`."""
+        """s by which forces that are taken as a mean over a time ``dt`` must be later than the step: the α-scheme's are
+        those of the step's end, about which the mean is then taken; arguments as for `begun`."""
         return 0.0 if self.recall == 0.0 or before is None else 0.5 * dt
 
     def corrected(
         self, velocity: np.ndarray, before: np.ndarray | None, mean: np.ndarray, turn: np.ndarray, dt: float
     ) -> tuple[np.ndarray, np.ndarray | None]:
-        """Velocity with what the acceleration ``before`` the step (None: that of the step) has to say, and the acceleration
-        after it; None where the scheme keeps none. All (n_blocks, 6); ``mean`` ā on the axes before the step, ``turn``
-        (n_blocks,) rad the rotation over it, which ``velocity`` has made already."""
+        """Velocity with what the acceleration ``before`` the step (None: that of the step) has to say, and the
+        acceleration after it; None where the scheme keeps none. All (n_blocks, 6); ``mean`` ā on the axes before the
+        step, ``turn`` (n_blocks,) rad the rotation over it, which ``velocity`` has made already."""
         if self.memory == 0.0 and self.recall == 0.0:
             return velocity, None
         before = mean if before is None else before
@@ -159,12 +160,14 @@ def assemble_blocks(
     stiffness_damping,
     n,
 ):
-    """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0 (n_blocks, 3)).
+    """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0
+    (n_blocks, 3)).
 
-    Inertia and elasticity as in the head of this file, with velocity ``carried``, ``heavier`` 1/w, ``weight`` θ and σ₁ = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack
-    strain); ∫ Tᵀρg; the strain rows' share ρω²∫xx, ∫yy, ∫xy of a spinning block; the generalised forces ``load`` (n_blocks, 6)
-    of whatever else acts; and damping: a viscous stress ∝ C Δε/dt that gives a block's own vibration (taken as that of a
-    square, ω² = 12 C₁₁/(ρ h²)) the part ``block_damping`` of critical damping, and Rayleigh's two.
+    Inertia and elasticity as in the head of this file, with velocity ``carried``, ``heavier`` 1/w, ``weight`` θ and σ₁
+    = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain); ∫ Tᵀρg; the strain rows' share ρω²∫xx, ∫yy, ∫xy of a spinning
+    block; the generalised forces ``load`` (n_blocks, 6) of whatever else acts; and damping: a viscous stress ∝ C Δε/dt
+    that gives a block's own vibration (taken as that of a square, ω² = 12 C₁₁/(ρ h²)) the part ``block_damping`` of
+    critical damping, and Rayleigh's two.
     """
     inertia = 2.0 * heavier / (dt * dt) + mass_damping / dt
     n_blocks = order.shape[0]
@@ -252,9 +255,9 @@ def advance(
     """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids.
 
     Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so a spinning block does not swell;
-    stress, strain rates and crack strain are turned by the same R. Stress before turning is ``tangent`` Δε + ``stress0``.
-    Velocity is 2d/dt − v, or the mean rate d/dt in a ``static`` step, which carries none. A block that stretches as it
-    spins turns faster or slower: what ``turns`` (n_blocks,) keeps its angular momentum.
+    stress, strain rates and crack strain are turned by the same R. Stress before turning is ``tangent`` Δε +
+    ``stress0``. Velocity is 2d/dt − v, or the mean rate d/dt in a ``static`` step, which carries none. A block that
+    stretches as it spins turns faster or slower: what ``turns`` (n_blocks,) keeps its angular momentum.
     Returns vertices, velocity, stress, crack strain, largest vertex displacement.
     """
     n_blocks = increment.shape[0]

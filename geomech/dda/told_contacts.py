@@ -1,7 +1,8 @@
-"""Contacts that begin a step with forces, gaps and slip told from elsewhere: faces that another model has held till now.
+"""Contacts that begin a step with forces, gaps and slip told from elsewhere: faces that another model has held till
+now.
 
-A contact's normal force is that of its spring, N = kₙ (lift − gap), so a force at a given geometry is a lift, and a gap that the
-geometry does not show (faces that do not fit each other) a negative one.
+A contact's normal force is that of its spring, N = kₙ (lift − gap), so a force at a given geometry is a lift, and a gap
+that the geometry does not show (faces that do not fit each other) a negative one.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from ..model import CONTACT, OPEN, SLIP, STICK
 if TYPE_CHECKING:
     from .contact_set import ContactSet
 
-#: A shear force nearer to its strength than this part of it is tried as sliding: edges have turned by strains since it was known.
+#: A shear force nearer to its strength than this part of it is tried as sliding: edges have turned by strains since it
+#: was known.
 _AT_STRENGTH = 1e-3
 
 
@@ -38,8 +40,9 @@ class ToldContacts:
 
 
 def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_multiplier: np.ndarray) -> np.ndarray:
-    """CONTACT rows of ``found``, those that are ``told`` of with these forces on the geometry as it is; ``closure`` (n_laws,) m that
-    each law tends to (infinite: straight), ``on_multiplier`` (n,) contacts whose normal force no spring keeps."""
+    """CONTACT rows of ``found``, those that are ``told`` of with these forces on the geometry as it is; ``closure``
+    (n_laws,) m that each law tends to (infinite: straight), ``on_multiplier`` (n,) contacts whose normal force no
+    spring keeps."""
     rows = np.zeros(len(found), CONTACT)
     for name in (
         "vertex", "edge", "block", "other", "law", "state", "bonded", "slip", "wear", "lift", "stretch", "inset",

@@ -1,9 +1,10 @@
 """Edges that let waves out: dashpots of the rock's own wave impedance all along them.
 
-A plane wave that travels with particle velocity v across an edge leaves the traction −ρ(c_p n⊗n + c_s s⊗s) v on it: dashpots
-of that strength take it up without an echo when it arrives straight on (Lysmer & Kuhlemeyer 1969), almost without at up to
-60° from that. A wave that comes in with the particle velocity w is driven by twice its own stress, 2ρ(c_p n⊗n + c_s s⊗s) w,
-one half for the wave and one against the dashpots (Joyner & Chen 1975). Velocity is the mean of the step, d/dt.
+A plane wave that travels with particle velocity v across an edge leaves the traction −ρ(c_p n⊗n + c_s s⊗s) v on it:
+dashpots of that strength take it up without an echo when it arrives straight on (Lysmer & Kuhlemeyer 1969), almost
+without at up to 60° from that. A wave that comes in with the particle velocity w is driven by twice its own stress,
+2ρ(c_p n⊗n + c_s s⊗s) w, one half for the wave and one against the dashpots (Joyner & Chen 1975). Velocity is the mean
+of the step, d/dt.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ _GAUSS = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
 
 @dataclass(frozen=True, eq=False)
 class QuietEdges:
-    """Dashpots on edges of moving blocks: ``edge`` and ``block`` (n,), ``ends`` (n, 2, 2) m, ``drag`` (n, 2, 2) Pa s/m with
-    traction = ``drag`` (2 ``incoming`` − velocity), ``incoming`` (n, 2) m/s."""
+    """Dashpots on edges of moving blocks: ``edge`` and ``block`` (n,), ``ends`` (n, 2, 2) m, ``drag`` (n, 2, 2) Pa s/m
+    with traction = ``drag`` (2 ``incoming`` − velocity), ``incoming`` (n, 2) m/s."""
 
     edge: np.ndarray
     block: np.ndarray
@@ -44,7 +45,8 @@ class QuietEdges:
         fixed: np.ndarray,
     ) -> QuietEdges:
         """Those that ``boundaries`` name, at ``time`` on the current ``vertices``; ``density`` (n_blocks,) kg/m³ and
-        ``stiffness`` (n_blocks, 3, 3) Pa; not those of ``fixed`` (n_blocks,) blocks. Raises ValueError for a name that no edge has."""
+        ``stiffness`` (n_blocks, 3, 3) Pa; not those of ``fixed`` (n_blocks,) blocks. Raises ValueError for a name that
+        no edge has."""
         edge, incoming = [], []
         for boundary in boundaries:
             named = blocks.edges_named(boundary.edge_name)

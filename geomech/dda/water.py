@@ -12,8 +12,8 @@ _AGAINST = 1e-6
 
 
 def wet_pieces(blocks: Blocks, edges: np.ndarray, drained: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """(edges (n,), spans (n, 2) from 0 to 1 along them) of ``edges`` without what lies against ``drained`` (n_blocks,) blocks,
-    in reference positions."""
+    """(edges (n,), spans (n, 2) from 0 to 1 along them) of ``edges`` without what lies against ``drained`` (n_blocks,)
+    blocks, in reference positions."""
     whole = np.tile([0.0, 1.0], (len(edges), 1))
     if drained is None or not drained.any():
         return edges, whole
@@ -52,11 +52,11 @@ def pressed_edges(
     vertices: np.ndarray,
     next_vertex: np.ndarray,
 ) -> np.ndarray:
-    """EDGE_FORCE rows of the water's pressure on the ``pieces`` (as from `wet_pieces`) of edges of the current ``vertices``;
-    ``owner`` (n_vertices,) and ``next_vertex`` as in `Blocks`.
+    """EDGE_FORCE rows of the water's pressure on the ``pieces`` (as from `wet_pieces`) of edges of the current
+    ``vertices``; ``owner`` (n_vertices,) and ``next_vertex`` as in `Blocks`.
 
-    p = γw · depth below the line, linear along every piece of an edge that lies wet and between two of the line's points.
-    Around a block under a level table the pieces add up to γw times its wet area (Archimedes) to round-off.
+    p = γw · depth below the line, linear along every piece of an edge that lies wet and between two of the line's
+    points. Around a block under a level table the pieces add up to γw times its wet area (Archimedes) to round-off.
     """
     line_x, line_y = np.asarray(water.points, dtype=float).T
     line_y = line_y + (0.0 if water.level is None else float(water.level.at(time)[0]))

@@ -1,8 +1,8 @@
 """Held holes: what ties them to the rest of the body.
 
-The plane inside a hole is free of traction for any rigid motion of its own, so where a support holds the hole's boundary
-that motion has to be put to zero: equations in displacement. By reciprocity the displacement at a point is the work that
-Kelvin's field of a unit force there does on line forces, and its tractions on displacement jumps.
+The plane inside a hole is free of traction for any rigid motion of its own, so where a support holds the hole's
+boundary that motion has to be put to zero: equations in displacement. By reciprocity the displacement at a point is the
+work that Kelvin's field of a unit force there does on line forces, and its tractions on displacement jumps.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ class Anchors:
 
     rows  (n, r) what each of them is in the boundary's rows: where traction is short of equations
 
-    Linear functionals of sources, times 2μ: `of_jumps`, `of_forces`, `of_points` give the r motions that these impart to
-    the holes' inside.
+    Linear functionals of sources, times 2μ: `of_jumps`, `of_forces`, `of_points` give the r motions that these impart
+    to the holes' inside.
     """
 
     def __init__(self, nu: float, extent: float):
@@ -35,8 +35,8 @@ class Anchors:
     def add(
         self, rows: np.ndarray, combinations: np.ndarray, middle: np.ndarray, radius: float, loop: np.ndarray
     ) -> None:
-        """The ``combinations`` (3, k) of x, y and turn (that moves points at ``radius`` from ``middle`` by one) of a hole
-        ``loop`` (m, 2); ``rows`` (n, k) of them."""
+        """The ``combinations`` (3, k) of x, y and turn (that moves points at ``radius`` from ``middle`` by one) of a
+        hole ``loop`` (m, 2); ``rows`` (n, k) of them."""
         self.rows = rows if not self.rows.size else np.hstack([self.rows, rows])
         centre, room = _roomiest(loop)
         arm = middle - centre

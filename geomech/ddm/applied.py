@@ -57,8 +57,8 @@ class Applied:
     def on(
         self, targets: ElementSet, on_boundary: bool, nu: float, tol: float, anchors: Anchors | None = None
     ) -> np.ndarray:
-        """(n_unknowns,) traction at the collocation nodes of ``targets`` from what is not `plain`; ``anchors`` of the boundary's
-        held holes."""
+        """(n_unknowns,) traction at the collocation nodes of ``targets`` from what is not `plain`; ``anchors`` of the
+        boundary's held holes."""
         out = np.zeros(targets.n_unknowns)
         points = targets.nodes.reshape(-1, 2)
         # On the boundary, the wedges' own traction is what its line forces stand for.
@@ -236,8 +236,8 @@ def _left_over(wedge: WedgeLoad, body: Body) -> LineForces:
 
 
 def check_equilibrium(applied: Applied, body: Body, tolerance: float) -> None:
-    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size; with supports, as far
-    as no support resists them."""
+    """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size; with supports, as
+    far as no support resists them."""
     force, gradient = applied.particular.force, applied.particular.gradient
     total, moment, size = np.zeros(2), 0.0, 0.0
 

@@ -1,9 +1,9 @@
 """From the error that is asked for to order, elements and grading.
 
-More elements of one order do not make K more accurate, a higher order does: by a factor of ten to a hundred from one even
-order to the next (odd ones are hardly better than the even one below). So a straight crack is one element as long as
-nothing is near (`proximity` halves what is), a side of a body two, and the order follows the target. The orders are those
-whose median error over the problems of `tests/validation/test_automatic.py` is below half the target.
+More elements of one order do not make K more accurate, a higher order does: by a factor of ten to a hundred from one
+even order to the next (odd ones are hardly better than the even one below). So a straight crack is one element as long
+as nothing is near (`proximity` halves what is), a side of a body two, and the order follows the target. The orders are
+those whose median error over the problems of `tests/validation/test_automatic.py` is below half the target.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ _PER_SIDE = 2
 
 
 def for_target(settings: DdmSettings) -> DdmSettings:
-    """``settings`` with the mesh that their ``target_error`` asks for; as they are without one. ValueError when it is not
-    between 0 and 1."""
+    """``settings`` with the mesh that their ``target_error`` asks for; as they are without one. ValueError when it is
+    not between 0 and 1."""
     target = settings.target_error
     if target is None:
         return settings
@@ -67,8 +67,8 @@ def _of_order(settings: DdmSettings, order: int, target: float) -> DdmSettings:
 
 
 def finer(settings: DdmSettings) -> DdmSettings:
-    """The next even order, graded one step deeper; at the highest order the even one below instead, as what differs from
-    it is known then as well."""
+    """The next even order, graded one step deeper; at the highest order the even one below instead, as what differs
+    from it is known then as well."""
     up = settings.order < shapes.MAX_ORDER
     error = settings.grading_error
     return replace(
@@ -90,10 +90,10 @@ def solve_to(
 ) -> Solution:
     """The body under ``load`` with stress intensity factors to ``target_error``, relative to the largest K.
 
-    Meshes of two orders, and of further ones while their K differ by more than the target. ``tip_errors`` of the solution,
-    which is that of the last mesh, is what it differs by from the one before: a bound of the error, ten times as large as a
-    rule. If the highest order does not reach the target a warning is logged and the estimate says how far off it is.
-    ``body``: further arguments of `Body`.
+    Meshes of two orders, and of further ones while their K differ by more than the target. ``tip_errors`` of the
+    solution, which is that of the last mesh, is what it differs by from the one before: a bound of the error, ten times
+    as large as a rule. If the highest order does not reach the target a warning is logged and the estimate says how far
+    off it is. ``body``: further arguments of `Body`.
     """
     from .body import Body
     from .estimate import factors, floor, largest, warn

@@ -7,14 +7,14 @@ import numpy as np
 from . import shapes
 from .influence import ElementSet
 
-#: Where a field is asked for at an inner end of an element it is taken this part of the element's length away: the small
-#: jump of density from element to element acts like a dislocation there. Where the elements go straight on, it is the mean
-#: of two points as far ahead and behind, in which that cancels, and with it what the field changes in between.
+#: Where a field is asked for at an inner end of an element it is taken this part of the element's length away: the
+#: small jump of density from element to element acts like a dislocation there. Where the elements go straight on, it is
+#: the mean of two points as far ahead and behind, in which that cancels, and with it what the field changes in between.
 _NUDGE = 0.02
 _NUDGE_STRAIGHT = 0.005
-#: Nearer to an end than this part of that distance a point is the end itself; from farther off it is moved on the way it
-#: stands, so that of two faces that meet at a kink each is looked at from its own side. A crack tip's own square root is
-#: in the elements: there only the tip itself, to round-off, is moved.
+#: Nearer to an end than this part of that distance a point is the end itself; from farther off it is moved on the way
+#: it stands, so that of two faces that meet at a kink each is looked at from its own side. A crack tip's own square
+#: root is in the elements: there only the tip itself, to round-off, is moved.
 _AT_END = 1e-6
 _AT_TIP = 1e-12
 
@@ -53,8 +53,8 @@ class ElementEnds:
         self.near = np.where(self.tip, _AT_TIP / _NUDGE, _AT_END) * self.reach
 
     def aside(self, points: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-        """The ``points`` (n, 2), those too near moved off, from the very end to ``side`` of the elements, and, behind them,
-        the second ones of the k that have two; which those are (k,)."""
+        """The ``points`` (n, 2), those too near moved off, from the very end to ``side`` of the elements, and, behind
+        them, the second ones of the k that have two; which those are (k,)."""
         who, at, distance = within(points, self.points, np.where(self.tip, self.near, self.reach))
         if not len(who):
             return points, who
@@ -88,7 +88,8 @@ _TIPS = ((shapes.TIP_START, shapes.TIP_BOTH), (shapes.TIP_END, shapes.TIP_BOTH))
 
 
 def within(points: np.ndarray, centres: np.ndarray, reach: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All pairs of a point (n, 2) and a centre (m, 2) no farther apart than its ``reach`` (m,): their numbers and distance."""
+    """All pairs of a point (n, 2) and a centre (m, 2) no farther apart than its ``reach`` (m,): their numbers and
+    distance."""
     sweep = np.argsort(points[:, 0], kind="stable")
     x = points[sweep, 0]
     first = np.searchsorted(x, centres[:, 0] - reach, side="left")

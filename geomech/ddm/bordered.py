@@ -1,19 +1,20 @@
 """The crack unknowns' matrix while cracks grow: factored once, then bordered with what is new.
 
-Unknowns are kept in the order in which they came, in panels: the first is the matrix that was factored as a whole, every
-other one what has come since between two bodies. With C and B the rows and columns of a panel against all before it and D its
-own block, elimination panel by panel,
+Unknowns are kept in the order in which they came, in panels: the first is the matrix that was factored as a whole,
+every other one what has come since between two bodies. With C and B the rows and columns of a panel against all before
+it and D its own block, elimination panel by panel,
 
     L = C U⁻¹,    U_B = B − L' B,    T = D − L U_B
 
 (block LU; L', U what panels before have), touches nothing that is there. So a body that grows shares all factors of the
-one before, which stays what it was, and pays for rows and columns of new elements alone. Elements at tips are replaced in the
-next increment: they are a last, loose panel, that is dropped. Their rows outlast them, as a tip's element that becomes an
-ordinary one has other shape functions and the same collocation points. An element that goes from another panel stays, with
-its equation given up for w = 0 by one more unknown in it (Woodbury's formula). Neighbouring panels of like size become one.
+one before, which stays what it was, and pays for rows and columns of new elements alone. Elements at tips are replaced
+in the next increment: they are a last, loose panel, that is dropped. Their rows outlast them, as a tip's element that
+becomes an ordinary one has other shape functions and the same collocation points. An element that goes from another
+panel stays, with its equation given up for w = 0 by one more unknown in it (Woodbury's formula). Neighbouring panels of
+like size become one.
 
-Elimination in the order of arrival pivots inside panels only and loses ‖L‖ ‖U‖ / ‖S‖ in accuracy over one that pivots freely
-(Higham 2002, §13.2). S is factored anew where that would be felt, and when much of it is gone.
+Elimination in the order of arrival pivots inside panels only and loses ‖L‖ ‖U‖ / ‖S‖ in accuracy over one that pivots
+freely (Higham 2002, §13.2). S is factored anew where that would be felt, and when much of it is gone.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ from .influence import ElementSet, copy_blocks, unknowns_of
 GONE = 0.25
 #: All is factored anew as well when there are so many times the unknowns of the first panel.
 MOST = 2.0
-#: Panels are joined while the last but one is less than so many times as large as the last: there are few of them, and no
-#: unknown is joined often.
+#: Panels are joined while the last but one is less than so many times as large as the last: there are few of them, and
+#: no unknown is joined often.
 ALIKE = 2.0
 #: Fewer unknowns are factored in less time than panels take.
 SMALLEST = 200
@@ -46,7 +47,8 @@ SINGULAR = "cracks cut a part of the body off"
 
 
 class Known(NamedTuple):
-    """Of a panel's ``rows`` (numbers) the first columns of L, ``lower``; of its ``columns`` the first rows of U, ``upper``."""
+    """Of a panel's ``rows`` (numbers) the first columns of L, ``lower``; of its ``columns`` the first rows of U,
+    ``upper``."""
 
     rows: np.ndarray
     columns: np.ndarray
@@ -55,8 +57,8 @@ class Known(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Of S what unknowns that came together, n of them after others, have with these and among themselves: rows ``down``
-    (n, first), columns ``right`` (first, n) and own block ``corner`` (n, n)."""
+    """Of S what unknowns that came together, n of them after others, have with these and among themselves: rows
+    ``down`` (n, first), columns ``right`` (first, n) and own block ``corner`` (n, n)."""
 
     down: np.ndarray
     right: np.ndarray
@@ -78,8 +80,9 @@ class Piece(NamedTuple):
 
 @dataclass(eq=False)
 class Panel:
-    """Unknowns that are eliminated together: their ``pieces`` of S, the ``weight`` (n,) that brings tractions on a row to the
-    size of jumps, and what is ``known`` before elimination; then their ``lower`` (n, first) of L, ``upper`` (first, n) of U, ``t`` (n, n) and its ``factor``."""
+    """Unknowns that are eliminated together: their ``pieces`` of S, the ``weight`` (n,) that brings tractions on a row
+    to the size of jumps, and what is ``known`` before elimination; then their ``lower`` (n, first) of L, ``upper``
+    (first, n) of U, ``t`` (n, n) and its ``factor``."""
 
     pieces: tuple[Piece, ...]
     weight: np.ndarray
@@ -170,8 +173,9 @@ def _upper(before: Sequence[Panel], columns: np.ndarray, known: np.ndarray | Non
 
 
 class Bordered:
-    """S between crack ``elements``, as ``panels``, of which the last may be ``loose``. ``at`` (n_places,) are the numbers of
-    the elements in the order of the panels, −1 for one that is gone and for the giving up of its equation."""
+    """S between crack ``elements``, as ``panels``, of which the last may be ``loose``. ``at`` (n_places,) are the
+    numbers of the elements in the order of the panels, −1 for one that is gone and for the giving up of its
+    equation."""
 
     def __init__(self, elements: ElementSet, panels: tuple[Panel, ...], at: np.ndarray, loose: bool):
         self.elements, self.panels, self.at, self.loose = elements, panels, at, loose
@@ -202,7 +206,8 @@ class Bordered:
         compute: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> Bordered:
         """S between ``elements``, of which ``was`` (n,) are the numbers here, −1 where new, and ``seen`` (n,) those of
-        elements in their place, whose rows are theirs; ``compute(rows, columns)`` makes blocks of it between elements."""
+        elements in their place, whose rows are theirs; ``compute(rows, columns)`` makes blocks of it between
+        elements."""
         if np.array_equal(was, np.arange(self.elements.n)):
             return self
         out = self._joined()._changed(elements, was, seen, compute)
@@ -299,8 +304,9 @@ class Bordered:
         return Bordered(elements, tuple(panels), at, m < n)
 
     def _giving_up(self, places: np.ndarray, n_first: int, n_between: int) -> Panel:
-        """The panel of the unknowns that stand for the equations of the elements at ``places``, and of w = 0 there, after
-        ``n_between`` others; with tractions of the size of the equations, so that these unknowns are of the size of jumps."""
+        """The panel of the unknowns that stand for the equations of the elements at ``places``, and of w = 0 there,
+        after ``n_between`` others; with tractions of the size of the equations, so that these unknowns are of the size
+        of jumps."""
         width = 2 * self.elements.per
         at = unknowns_of(places, width)
         n = len(at)
@@ -362,8 +368,8 @@ class Bordered:
 
 
 class BorderedFactor:
-    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worst one of the T, ``growth`` the loss of accuracy,
-    as the module has it."""
+    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worst one of the T, ``growth`` the loss
+    of accuracy, as the module has it."""
 
     def __init__(self, of: Bordered):
         self.n, self._places, self._panels = of.n, of.places, of.panels

@@ -1,7 +1,7 @@
 """The boundary's side of a body's equations: A_ΓΓ with its rigid motions lifted, and its factors.
 
-Unknown is the boundary's displacement, or, where a support holds it, the reaction (see `supports`). What the supports of
-a loop leave free of its rigid motions is without stress and spans the null space of A_ΓΓ. With R these motions and Q
+Unknown is the boundary's displacement, or, where a support holds it, the reaction (see `supports`). What the supports
+of a loop leave free of its rigid motions is without stress and spans the null space of A_ΓΓ. With R these motions and Q
 their mean over the loop, A_ΓΓ + R Qᵀ/extent is regular and Qᵀu = 0 follows for loads in equilibrium.
 """
 
@@ -36,8 +36,8 @@ class BoundarySystem:
     factor        of ``matrix`` with the rigid motions lifted
     unchanged     whether all is ``previous``'s; ``at_old`` (n_elements,) the elements' numbers there, −1 where new
 
-    ``iterated``: not to be factored (`boundary_iteration.is_iterated`). Raises numpy.linalg.LinAlgError when the equations are
-    singular.
+    ``iterated``: not to be factored (`boundary_iteration.is_iterated`). Raises numpy.linalg.LinAlgError when the
+    equations are singular.
     """
 
     def __init__(
@@ -111,7 +111,8 @@ class BoundarySystem:
         modes, means, anchors = [], [], Anchors(self._nu, self.extent)
         for k in range(int(mesh.edge_loop.max()) + 1):
             motions, weights = self.rigid[:, 3 * k : 3 * k + 3], self.weights[3 * k : 3 * k + 3]
-            # The outline goes where the whole body goes; a hole's own boundary is free as far as nothing holds that hole.
+            # The outline goes where the whole body goes; a hole's own boundary is free as far as nothing holds that
+            # hole.
             free = self.free_motions.combinations if k == 0 else holds.free_motions(motions)
             modes.append(motions @ free)
             means.append(holds.turned((free.T @ weights).T).T * keep)
@@ -124,8 +125,8 @@ class BoundarySystem:
         self.anchors = anchors if anchors.number else None
 
     def anchored(self, rows: np.ndarray, motions: np.ndarray) -> np.ndarray:
-        """``rows`` (n_elements' rows, k) of the boundary with what sources that give held holes ``motions`` (r, k) add, in
-        place."""
+        """``rows`` (n_elements' rows, k) of the boundary with what sources that give held holes ``motions`` (r, k) add,
+        in place."""
         rows += self.anchors.rows @ motions
         return rows
 
@@ -174,8 +175,9 @@ def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
 def rigid_motions(
     g: ElementSet, edge_loop: np.ndarray, about: tuple[np.ndarray, float] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3L) rigid motions of every loop in nodal unknowns and (3L, n) their mean over the loop; ``edge_loop`` (m,) the
-    loop of every edge. The turn is ``about`` a centre and moves points at a radius by one; those of the loop if left out."""
+    """(n, 3L) rigid motions of every loop in nodal unknowns and (3L, n) their mean over the loop; ``edge_loop`` (m,)
+    the loop of every edge. The turn is ``about`` a centre and moves points at a radius by one; those of the loop if
+    left out."""
     n_loops = int(edge_loop.max()) + 1 if len(edge_loop) else 0
     modes = np.zeros((g.n, 2, g.per, 3 * n_loops))
     weights = np.zeros_like(modes)

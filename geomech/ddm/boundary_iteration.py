@@ -1,9 +1,10 @@
 """The boundary's equations where they are too many to factor: multipoles, GMRES, neighbourhoods factored.
 
 Unknown are displacements that enter as jumps, so A_ΓΓ is of the kind that cracks have and the same neighbourhoods
-(`iterative.Patches`) make GMRES converge: 38 products at 10 000 unknowns, 53 at 20 000, on a square as on a rough ellipse.
-The lifted rigid motions are in the neighbourhoods too; one that holds a whole small hole would be singular without them.
-Where supports hold the boundary the unknowns are reactions, line forces; these are few beside the boundary and stay dense.
+(`iterative.Patches`) make GMRES converge: 38 products at 10 000 unknowns, 53 at 20 000, on a square as on a rough
+ellipse. The lifted rigid motions are in the neighbourhoods too; one that holds a whole small hole would be singular
+without them. Where supports hold the boundary the unknowns are reactions, line forces; these are few beside the
+boundary and stay dense.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from .influence import ElementSet, line_influence
 from .iterative import Patches, gmres, scales
 from .supports import Holds
 
-#: Boundary unknowns from which "auto" and "compressed" iterate on them. Matrices and one load take 0.8 s at 4100 (factored
-#: 2.7 s) and 1.5 s at 6100 (7.1 s), processor time; another load 0.3 and 0.4 s (0.01 s), so that factors are the better for
-#: some fifteen loads at this number.
+#: Boundary unknowns from which "auto" and "compressed" iterate on them. Matrices and one load take 0.8 s at 4100
+#: (factored 2.7 s) and 1.5 s at 6100 (7.1 s), processor time; another load 0.3 and 0.4 s (0.01 s), so that factors are
+#: the better for some fifteen loads at this number.
 CROSSOVER = 6000
 #: Entries of the reactions' dense columns up to which a held boundary is iterated on (a gigabyte).
 MOST_REACTIONS = 128_000_000
 
 
 def is_iterated(solver: str, n_unknowns: int, holds: Holds | None = None, holes_held: bool = False) -> bool:
-    """Whether ``solver`` iterates on so many boundary unknowns, of which supports have those of ``holds``; where they hold a
-    hole (`anchors`) the boundary is factored."""
+    """Whether ``solver`` iterates on so many boundary unknowns, of which supports have those of ``holds``; where they
+    hold a hole (`anchors`) the boundary is factored."""
     if solver == "dense" or n_unknowns < CROSSOVER or holes_held:
         return False
     return holds is None or n_unknowns * holds.sources.n_unknowns <= MOST_REACTIONS
@@ -66,9 +67,9 @@ class HeldJumps:
 
 
 class IteratedBoundary:
-    """What stands for a `Factor` of ``matrix``, A_ΓΓ of the ``elements``, with ``rigid`` (n, k) and ``weights`` (k, n) lifted
-    as `boundary` has it; ``between(elements)`` is the matrix between some of them. ``products`` counts those with the
-    matrix."""
+    """What stands for a `Factor` of ``matrix``, A_ΓΓ of the ``elements``, with ``rigid`` (n, k) and ``weights`` (k, n)
+    lifted as `boundary` has it; ``between(elements)`` is the matrix between some of them. ``products`` counts those
+    with the matrix."""
 
     def __init__(
         self,

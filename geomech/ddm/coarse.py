@@ -1,9 +1,9 @@
 """A coarse level for long cracks: what the patches of one crack have to tell each other, in a few elements.
 
-Neighbourhoods solved by themselves (`iterative.Patches`) carry news along a crack by one patch an iteration. Here runs of
-a long crack's elements are replaced by one straight element each, of moderate order, and its equations are factored. A
-residual r is split by R, the polynomial on every such element that fits it best: the smooth part R r is solved for on the
-coarse elements, which is right as far as their density is; the patches get what is left of r.
+Neighbourhoods solved by themselves (`iterative.Patches`) carry news along a crack by one patch an iteration. Here runs
+of a long crack's elements are replaced by one straight element each, of moderate order, and its equations are factored.
+A residual r is split by R, the polynomial on every such element that fits it best: the smooth part R r is solved for on
+the coarse elements, which is right as far as their density is; the patches get what is left of r.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from .influence import ElementSet, influence
 LONG = 180
 #: Elements that one coarse element stands for, at most, and its order.
 RUN, ORDER = 25, 5
-#: A run ends where the crack has turned by more than this since it began, rad. Straight elements for what is not straight
-#: (22° to either side) misled the patches: 500 products instead of 120.
+#: A run ends where the crack has turned by more than this since it began, rad. Straight elements for what is not
+#: straight (22° to either side) misled the patches: 500 products instead of 120.
 STRAIGHT = np.radians(8.0)
 #: Cracks that turn too often for runs of so many elements have no coarse level.
 SHORTEST = 8
 
 
 class CoarseLevel:
-    """The coarse elements of the long cracks among ``elements``, if there are any; ``crack`` (n,) is the crack of each."""
+    """The coarse elements of the long cracks among ``elements``, if there are any; ``crack`` (n,) is the crack of
+    each."""
 
     def __init__(self, elements: ElementSet, crack: np.ndarray, nu: float, tol: float):
         runs = [run for chain in _chains(elements, crack) for run in _long_runs(elements, chain)]
@@ -56,7 +57,8 @@ class CoarseLevel:
         self._factor = Factor(self._matrix[np.ix_(self._free, self._free)], "coarse elements leave a part without hold")
 
     def split(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Roughly S⁻¹ of the smooth part of ``right`` (n,), and what is left of ``right``; zero where unknowns are held."""
+        """Roughly S⁻¹ of the smooth part of ``right`` (n,), and what is left of ``right``; zero where unknowns are
+        held."""
         if not self.n:
             return np.zeros_like(right), right
         smooth = np.concatenate([(right[part.unknowns] @ part.fit.T).ravel() for part in self._parts])
@@ -87,8 +89,8 @@ class CoarseLevel:
 
 
 class _Part:
-    """One coarse element: ``unknowns`` (2, m) of the fine elements it stands for, by component; ``fit`` (p+1, m) from values
-    at their nodes to its own nodes, ``at_nodes`` (m, p+1) back, ``density`` (m, p+1) its density at theirs."""
+    """One coarse element: ``unknowns`` (2, m) of the fine elements it stands for, by component; ``fit`` (p+1, m) from
+    values at their nodes to its own nodes, ``at_nodes`` (m, p+1) back, ``density`` (m, p+1) its density at theirs."""
 
     def __init__(self, elements: ElementSet, run: np.ndarray, kind: int):
         per, length = elements.per, elements.length[run]

@@ -1,7 +1,7 @@
 """Kernels that are kept between runs, and compiled anew when anything that they call has changed, in whatever file.
 
-Numba keeps compiled code with a digest of the one file that a kernel stands in. What the kernel calls is part of its code, so
-that after an upgrade in which only that has changed the old code would be taken.
+Numba keeps compiled code with a digest of the one file that a kernel stands in. What the kernel calls is part of its
+code, so that after an upgrade in which only that has changed the old code would be taken.
 """
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ from numba.core.dispatcher import Dispatcher
 
 
 def kept(**options) -> Callable:
-    """``njit(cache=True, **options)`` whose compiled code goes with the sources of all that the kernel calls within its package."""
+    """``njit(cache=True, **options)`` whose compiled code goes with the sources of all that the kernel calls within its
+    package."""
 
     def compiled(function: Callable) -> Dispatcher:
-        # Only while this one is declared: other packages' kernels are theirs. Where nothing can be written Numba has its own ways.
+        # Only while this one is declared: other packages' kernels are theirs. Where nothing can be written Numba has
+        # its own ways.
         before = getattr(config, "CACHE_LOCATOR_CLASSES", "")
         places = f"{__name__}.WithCalled,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator"
         config.CACHE_LOCATOR_CLASSES = places
@@ -36,8 +38,8 @@ def kept(**options) -> Callable:
 
 
 class WithCalled(UserProvidedCacheLocator):
-    """The user's folder of kernels; a kernel's stamp is of its own file, of those that it calls into, and of the constants that it
-    takes from anywhere."""
+    """The user's folder of kernels; a kernel's stamp is of its own file, of those that it calls into, and of the
+    constants that it takes from anywhere."""
 
     def __init__(self, function: Callable, file: str) -> None:
         super().__init__(function, file)
@@ -50,8 +52,8 @@ class WithCalled(UserProvidedCacheLocator):
 
 
 def compiled_in(function: Callable) -> tuple[set[str], dict[str, object]]:
-    """What ``function``'s compiled code is made of: the files of its package in which what it calls is defined, and so on down, and
-    the numbers and arrays that it and they take by name (module.name → value, or an array's bytes)."""
+    """What ``function``'s compiled code is made of: the files of its package in which what it calls is defined, and so
+    on down, and the numbers and arrays that it and they take by name (module.name → value, or an array's bytes)."""
     package, files, constants, seen, rest = function.__module__.partition(".")[0], set(), {}, set(), [function]
     while rest:
         this = rest.pop()

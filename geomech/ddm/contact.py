@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from .body import Body
     from .solution import Solution
 
-#: Faces that no state of contact satisfies may be this part of their crack: what happens at the end of a blade of rock is not felt
-#: by a tip that is far away.
+#: Faces that no state of contact satisfies may be this part of their crack: what happens at the end of a blade of rock
+#: is not felt by a tip that is far away.
 UNDECIDED = 0.03
 #: Rock between a tip and a side, over the body's extent, that is worth a word when faces do not settle.
 BY_A_THREAD = 1e-2
@@ -28,8 +28,8 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class FaceAnswer:
-    """``jumps`` slip and opening (times 2μ) and ``traction`` on the faces, (n_unknowns,); ``closed`` (n_unknowns,) bool,
-    the openings that are used up; ``solves`` it took; of faces that have one, ``memory``
+    """``jumps`` slip and opening (times 2μ) and ``traction`` on the faces, (n_unknowns,); ``closed`` (n_unknowns,)
+    bool, the openings that are used up; ``solves`` it took; of faces that have one, ``memory``
     after this load, and ``began`` before."""
 
     jumps: np.ndarray
@@ -112,8 +112,8 @@ def _whereabouts(body: Body, node: int | None) -> str:
 
 
 def _judge(body: Body, settled: Settled) -> None:
-    """Log where the nodes are of which no state of contact was found. Raises NotConverged, which names the crack, when they
-    are more than a crack's last bit at a mouth or junction: then they matter."""
+    """Log where the nodes are of which no state of contact was found. Raises NotConverged, which names the crack, when
+    they are more than a crack's last bit at a mouth or junction: then they matter."""
     c, cracks = body.faces, body.cracks
     at = np.flatnonzero(settled.undecided.reshape(c.n, -1).any(axis=1))
     crack = cracks.crack[c.source]

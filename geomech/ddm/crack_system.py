@@ -1,8 +1,8 @@
 """The crack unknowns' own equations S w = right, some of them held: all that contact, compliance and adjoints need.
 
 S is the Schur complement of slip and opening (`body`). One factorisation of it serves all contact states: holding k
-unknowns is a k × k system in columns of S⁻¹. Where cracks cut a part off that only closed faces hold, S is singular, and
-the equations of the free unknowns are factored instead.
+unknowns is a k × k system in columns of S⁻¹. Where cracks cut a part off that only closed faces hold, S is singular,
+and the equations of the free unknowns are factored instead.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ _KEPT = 8
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """How contact changes the equations S w = right. Unknowns that are ``held`` (n,) bool are zero and have no equation;
-    ``mixed`` (n,) times the equation across a node is added to that along it, ``per`` places before; ``spring`` (n,) is
-    taken off the diagonal."""
+    """How contact changes the equations S w = right. Unknowns that are ``held`` (n,) bool are zero and have no
+    equation; ``mixed`` (n,) times the equation across a node is added to that along it, ``per`` places before;
+    ``spring`` (n,) is taken off the diagonal."""
 
     held: np.ndarray
     mixed: np.ndarray

@@ -3,7 +3,8 @@
 Each criterion takes K_I and K_II of many tips, (n,) Pa √m, and the material, and returns ``(angle, k_eq)``: the growth
 angle from the crack's own direction (rad, counter-clockwise, so that a positive K_II gives a negative angle) and the
 equivalent stress intensity factor that is held against K_Ic. A tip that no tensile kink can leave has k_eq = 0 and
-angle 0 (the F-criterion knows kinks that shear besides). K_I may be negative: a slot that cannot close carries a compressive K_I and still kinks in tension to the side.
+angle 0 (the F-criterion knows kinks that shear besides). K_I may be negative: a slot that cannot close carries a
+compressive K_I and still kinks in tension to the side.
 """
 
 from __future__ import annotations
@@ -90,8 +91,9 @@ def largest_relative_release_rate(
 
     So F = (k_1/K_Ic)² + (k_2/K_IIc)² with the factors k_1, k_2 of an infinitesimal kink (`kink_factors`); a kink that
     closes (k_1 < 0) has only its second part. K_IIc = K_Ic makes it the energy criterion, an infinite K_IIc that of
-    the largest k_1. What presses on the faces of a closed kink (friction, stress along the crack) does not come in: for a
-    kink of no length it vanishes beside k_1 and k_2 (`trial_kinks` are of some length). Kinks beyond 126° are not considered.
+    the largest k_1. What presses on the faces of a closed kink (friction, stress along the crack) does not come in: for
+    a kink of no length it vanishes beside k_1 and k_2 (`trial_kinks` are of some length). Kinks beyond 126° are not
+    considered.
     """
     k_i, k_ii = _tips(k_i, k_ii)
     share = material.k_ic / material.k_iic if np.isfinite(material.k_iic) else 0.0
@@ -227,7 +229,8 @@ def _tips(k_i: np.ndarray, k_ii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _turning_points(slope: Callable, n_tips: int, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All (tip, θ) at which ``slope(tip, θ)`` falls through zero: brackets from the grid, then bisection to round-off."""
+    """All (tip, θ) at which ``slope(tip, θ)`` falls through zero: brackets from the grid, then bisection to
+    round-off."""
     tips = np.arange(n_tips)
     values = slope(tips[:, None], grid[None, :])
     tip, at = np.nonzero((values[:, :-1] > 0) & (values[:, 1:] <= 0))

@@ -64,7 +64,8 @@ class LineForces:
 
 
 def pieces(boundary: ElementSet, edge: int, segment: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """(k, 2), (k, 2) starts and ends of the parts of the boundary's elements on ``edge`` that lie on ``segment`` (2, 2)."""
+    """(k, 2), (k, 2) starts and ends of the parts of the boundary's elements on ``edge`` that lie on ``segment`` (2,
+    2)."""
     here = np.flatnonzero(boundary.source == edge)
     start, end = boundary.start[here], boundary.end[here]
     if segment is None:

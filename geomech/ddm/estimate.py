@@ -1,8 +1,8 @@
 """How far a stress intensity factor is to be trusted: a solution against a finer one.
 
 Estimates from one solution alone (decay of its coefficients, order p against p−1) follow the error of K only within
-factors of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ. One
-order more, graded one step deeper, sees what is there.
+factors of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ.
+One order more, graded one step deeper, sees what is there.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-#: The estimate is so many times the difference to the finer solution. Over the battery of `tests/validation/test_automatic.py`
-#: the difference alone is 0.35 to 1.3 times the error.
+#: The estimate is so many times the difference to the finer solution. Over the battery of
+#: `tests/validation/test_automatic.py` the difference alone is 0.35 to 1.3 times the error.
 SAFETY = 2.0
 #: An estimated error above this part of the largest K is told to the log.
 WORTH_A_WARNING = 0.01
@@ -66,8 +66,8 @@ def warn(errors: np.ndarray, k: np.ndarray) -> None:
 
 
 def floor(body: Body) -> float:
-    """Relative error of K that grading leaves where it ends for round-off's sake (`grading.Grading.finest`), which a finer
-    solution shares and cannot show. Only meshes made for a target error go that far."""
+    """Relative error of K that grading leaves where it ends for round-off's sake (`grading.Grading.finest`), which a
+    finer solution shares and cannot show. Only meshes made for a target error go that far."""
     grading = Grading.of(body.settings)
     if grading.target is None:
         return 0.0
@@ -85,7 +85,8 @@ def floor(body: Body) -> float:
 
 
 def _left_at(body: Body, point: np.ndarray, part: float) -> float:
-    """What an element of ``part`` of its side or segment that ends at ``point`` leaves, if that is a node of the geometry."""
+    """What an element of ``part`` of its side or segment that ends at ``point`` leaves, if that is a node of the
+    geometry."""
     network, left = body.cracks, 0.0
     for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)):
         where = "mouth" if network.surface[node] else "crack"

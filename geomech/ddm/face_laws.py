@@ -1,11 +1,12 @@
 """What crack faces do to each other: laws node by node, the states they can be in, and what they remember.
 
 A law is a `JointLaw`. Faces press when the opening has used up the aperture (gap w_n + a = 0), rigidly, or through a
-filling of stiffness k_n: λ = −k_n (w_n + a)/2μ. Closed faces carry shear up to c + λ tan φ, and until then stick, rigidly
-or through k_s. Faces with tensile strength are cemented: they hold together, without aperture, until the normal traction
-passes the strength at a node; there cement and cohesion are lost for good. Cohesion otherwise is not used up by slip.
-Stiffness does not act across open faces.
-What grows is torn from whole rock: fresh faces have the friction of their crack's law, but no cohesion, cement or filling.
+filling of stiffness k_n: λ = −k_n (w_n + a)/2μ. Closed faces carry shear up to c + λ tan φ, and until then stick,
+rigidly or through k_s. Faces with tensile strength are cemented: they hold together, without aperture, until the normal
+traction passes the strength at a node; there cement and cohesion are lost for good. Cohesion otherwise is not used up
+by slip. Stiffness does not act across open faces.
+What grows is torn from whole rock: fresh faces have the friction of their crack's law, but no cohesion, cement or
+filling.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ class FaceStates:
 @dataclass(frozen=True, eq=False)
 class FaceMemory:
     """What the faces of crack ``elements`` keep from load to load: ``rest`` (n,) the slip (times 2μ) at which they are
-    without shear, ``broken`` (n,) lost cement, ``work`` J/m done against friction since the beginning, ``states`` as they
-    were, ``pressure`` (n,) Pa between them."""
+    without shear, ``broken`` (n,) lost cement, ``work`` J/m done against friction since the beginning, ``states`` as
+    they were, ``pressure`` (n,) Pa between them."""
 
     elements: ElementSet
     rest: np.ndarray
@@ -67,7 +68,8 @@ class FaceMemory:
 
 
 def all_smooth(laws: Sequence[JointLaw]) -> bool:
-    """Whether faces under these laws do no more than open and close. Raises ValueError for laws that faces cannot follow."""
+    """Whether faces under these laws do no more than open and close. Raises ValueError for laws that faces cannot
+    follow."""
     for one in laws:
         if not one.straight:
             raise ValueError(

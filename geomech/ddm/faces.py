@@ -9,10 +9,10 @@ It is solved by block principal pivoting (Júdice & Pires 1994): all violated no
 method would; when that turns in a round, one at a time in a fixed order of nodes (Murty 1974), which cannot for a
 P-matrix.
 
-Where rock runs out in a blade, between a crack and the side that it meets at a few degrees, discrete compliance is no P-matrix (a point
-of the blade's end, pressed upon, moves the wrong way), and no state of the nodes there may satisfy them all. Where single
-exchanges lead to nothing, the nodes of which block exchanges made their round are left undecided, in that of its
-states with the least violation, and the others settle without them.
+Where rock runs out in a blade, between a crack and the side that it meets at a few degrees, discrete compliance is no
+P-matrix (a point of the blade's end, pressed upon, moves the wrong way), and no state of the nodes there may satisfy
+them all. Where single exchanges lead to nothing, the nodes of which block exchanges made their round are left
+undecided, in that of its states with the least violation, and the others settle without them.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class NotConverged(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """``closed`` (n,) bool after so many ``solves``; ``undecided`` (n,) bool, nodes that no state satisfies, and their worst
-    ``violation``, of the scale of gaps and pressures."""
+    """``closed`` (n,) bool after so many ``solves``; ``undecided`` (n,) bool, nodes that no state satisfies, and their
+    worst ``violation``, of the scale of gaps and pressures."""
 
     closed: np.ndarray
     solves: int
@@ -52,8 +52,8 @@ def settle(
     """Which nodes are closed.
 
     ``respond(closed)`` (n,) bool solves with these nodes closed and returns the gap w_n + a and the pressure λ of all
-    nodes, each scaled to order one; what it was called with last is what is returned. ``can_close`` (n,) bool; ``closed`` (n,)
-    the first guess. Raises NotConverged.
+    nodes, each scaled to order one; what it was called with last is what is returned. ``can_close`` (n,) bool;
+    ``closed`` (n,) the first guess. Raises NotConverged.
     """
     closed = closed & can_close
     undecided = np.zeros(len(closed), bool)

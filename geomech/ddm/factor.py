@@ -9,8 +9,8 @@ class Factor:
     """LU of a square ``matrix`` (left as it is), its rows brought to one size. Raises LinAlgError, with
     ``what``, when it is singular.
 
-    Tractions on an element go with one over its length: unscaled, elements of very different lengths would look singular.
-    Scales are powers of two, so that no bit of the solution depends on them.
+    Tractions on an element go with one over its length: unscaled, elements of very different lengths would look
+    singular. Scales are powers of two, so that no bit of the solution depends on them.
     """
 
     def __init__(self, matrix: np.ndarray, what: str):

@@ -1,19 +1,19 @@
 """Crack faces with friction, cement or a filling: which nodes are open, stick or slip, and the jumps that go with it.
 
-With λ = right − S w the pressure and shear that the faces exert (`crack_system`; the traction on them is −λ), every node
-obeys one linear equation in each direction, chosen by its state:
+With λ = right − S w the pressure and shear that the faces exert (`crack_system`; the traction on them is −λ), every
+node obeys one linear equation in each direction, chosen by its state:
 
     open         λ_n = 0,  λ_t = 0
     closed       w_n = −a                     or, filled,  λ_n = −κ_n (w_n + a)
     stick        w_t = rest                   or, filled,  λ_t = −κ_s (w_t − rest)
     slip (±)     λ_t = ∓(c + λ_n tan φ)
 
-and inequalities: gap ≥ 0, λ_n ≥ 0 (cemented: ≥ −strength), |λ_t| ≤ c + λ_n tan φ, slip against the shear that resists it.
-All nodes that break one change state at once, which is Newton's method for the semismooth equations (Alart & Curnier
-1991) and needs a handful of solves however many cracks interact. Should it run in a circle, the shear limits are frozen
-(Tresca's friction, which nodes solve one at a time if need be) and brought up to date in turn (Panagiotopoulos 1975), and
-Newton's method begins again from there. What is returned obeys all inequalities to the tolerance, or NotConverged says
-by how much not.
+and inequalities: gap ≥ 0, λ_n ≥ 0 (cemented: ≥ −strength), |λ_t| ≤ c + λ_n tan φ, slip against the shear that resists
+it. All nodes that break one change state at once, which is Newton's method for the semismooth equations (Alart &
+Curnier 1991) and needs a handful of solves however many cracks interact. Should it run in a circle, the shear limits
+are frozen (Tresca's friction, which nodes solve one at a time if need be) and brought up to date in turn
+(Panagiotopoulos 1975), and Newton's method begins again from there. What is returned obeys all inequalities to the
+tolerance, or NotConverged says by how much not.
 
 `rest` is where the last load left the faces: the answer is one step, implicit in time, of a process with memory.
 """
@@ -274,8 +274,8 @@ def settle_rough(
 ) -> tuple[np.ndarray, np.ndarray, FaceMemory, int]:
     """Slip and opening (times 2μ), λ = right − S w, what the faces remember afterwards and the number of solves.
 
-    ``right`` (n,) traction that fluid in the cracks exerts less that of the loads on closed faces; ``memory`` of the load
-    before; ``guess`` the states to begin with, rather than those of one crack by itself. Raises NotConverged.
+    ``right`` (n,) traction that fluid in the cracks exerts less that of the loads on closed faces; ``memory`` of the
+    load before; ``guess`` the states to begin with, rather than those of one crack by itself. Raises NotConverged.
     """
     laws = equations.laws
     contact = _Contact(equations, right, memory)
@@ -296,8 +296,8 @@ def settle_rough(
     rest = np.where(holds, slip - contact._offset(states, reaction), slip)
     sticks = holds & (states.way == 0)
     rest[sticks] = memory.rest[sticks]
-    # The limit between the loads is the mean of those before and after (0 before faces have met), as where both rise together:
-    # of second order in the load step, and exact while the limit stays what it is.
+    # The limit between the loads is the mean of those before and after (0 before faces have met), as where both rise
+    # together: of second order in the load step, and exact while the limit stays what it is.
     pressure = np.where(states.closed, reaction[laws.across], 0.0)
     slides = states.way != 0  # what cannot has an infinite limit
     before = np.where(slides, laws.limit(memory.pressure, contact.broken), 0.0)

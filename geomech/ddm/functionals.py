@@ -1,12 +1,13 @@
 """Stress intensity factors as linear functionals of the loads, while crack faces stay as they are.
 
-K is a weighted sum of jumps, K = lᵀw, and the jumps follow linearly from the traction g that loads exert on the boundary, r
-on the cracks and p of the fluid in them: with M the equations of the faces (`friction`), M w = N (p n − r + A_CΓ A_ΓΓ⁻¹ g) + …,
+K is a weighted sum of jumps, K = lᵀw, and the jumps follow linearly from the traction g that loads exert on the
+boundary, r on the cracks and p of the fluid in them: with M the equations of the faces (`friction`), M w = N (p n − r +
+A_CΓ A_ΓΓ⁻¹ g) + …,
 
     K = yᵀ (p n − r) + hᵀ g + K₀,     Mᵀ z = l,  y = Nᵀ z,  A_ΓΓᵀ h = A_CΓᵀ y.
 
-So one transposed solve a factor, with equations that are there, replaces a solve for every load. K₀ is what slip, springs
-and cohesion leave behind without any load.
+So one transposed solve a factor, with equations that are there, replaces a solve for every load. K₀ is what slip,
+springs and cohesion leave behind without any load.
 """
 
 from __future__ import annotations
@@ -76,8 +77,9 @@ class TipFunctionals:
         return np.stack([np.where(self._shut | (self._touching & (k_i < 0)), 0.0, k_i), k_ii], axis=1)
 
     def bound(self, load: BodyLoad, growth: float = 1.0) -> np.ndarray:
-        """(n_tips, 2) what |K_I| and |K_II| cannot exceed, Pa √m, under any load on the places where ``load`` acts whose
-        tractions and forces nowhere exceed ``growth`` times its largest, whatever their signs and distribution."""
+        """(n_tips, 2) what |K_I| and |K_II| cannot exceed, Pa √m, under any load on the places where ``load`` acts
+        whose tractions and forces nowhere exceed ``growth`` times its largest, whatever their signs and
+        distribution."""
         body = self.body
         _, units, rest, _ = body.lay_out(load)
         fluid = self._fluid(load)

@@ -1,9 +1,9 @@
 """How finely elements shrink into corners, kinks, junctions and mouths, where displacement is not smooth.
 
-Between two free faces that enclose an angle α of rock displacement goes like r^λ(α) (Williams 1952). Elements that shrink
-by ``ratio`` a layer leave an error of A ratio^(λ m) in the stress intensity factors after m layers. Either m is given, for
-every node alike, or it follows from the error that is asked for, with the A(α) that were measured on kinks of 7° to 150°,
-notches and slanted mouths (`tests/validation/test_automatic.py` holds what comes of it).
+Between two free faces that enclose an angle α of rock displacement goes like r^λ(α) (Williams 1952). Elements that
+shrink by ``ratio`` a layer leave an error of A ratio^(λ m) in the stress intensity factors after m layers. Either m is
+given, for every node alike, or it follows from the error that is asked for, with the A(α) that were measured on kinks
+of 7° to 150°, notches and slanted mouths (`tests/validation/test_automatic.py` holds what comes of it).
 """
 
 from __future__ import annotations
@@ -19,21 +19,23 @@ from ..model import DdmSettings
 KINK = math.radians(20) - 1e-9
 #: A turn by more than this is a sharp kink, graded for good.
 SHARP_KINK = math.radians(60)
-#: Relative error of K that two layers a kink are meant to leave; every layer more or less halves or doubles it. Kinks get as many
-#: beyond the two as their own exponent asks for: 5e-4 whatever the turn (two for all left 3e-3 at 60°), as K of a kink by
-#: 20°, the first that is graded, has without any.
+#: Relative error of K that two layers a kink are meant to leave; every layer more or less halves or doubles it. Kinks
+#: get as many beyond the two as their own exponent asks for: 5e-4 whatever the turn (two for all left 3e-3 at 60°), as
+#: K of a kink by 20°, the first that is graded, has without any.
 KINK_ERROR, KINK_LAYERS = 5e-4, 2
-#: Beyond this a crack folds back on itself and the faces that nearly meet take smaller elements still: by a factor of e for
-#: each of these angles (without: K of folds by 150° and 168° 2e-3 and 2e-2 off, with a target up to 0.5).
+#: Beyond this a crack folds back on itself and the faces that nearly meet take smaller elements still: by a factor of e
+#: for each of these angles (without: K of folds by 150° and 168° 2e-3 and 2e-2 off, with a target up to 0.5).
 FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
-#: Turns of closed cracks from this on are graded, however slight. What slips through a kink along one face would enter the
-#: other: slip goes like r to this power there whatever the turn (0.36 to 0.45 by the layers' effect on kinks by 2° to 45°,
-#: 1 to 0.01 of their crack), and ungraded ones leave this error of K, in proportion to the turn up to that beside it.
+#: Turns of closed cracks from this on are graded, however slight. What slips through a kink along one face would enter
+#: the other: slip goes like r to this power there whatever the turn (0.36 to 0.45 by the layers' effect on kinks by 2°
+#: to 45°, 1 to 0.01 of their crack), and ungraded ones leave this error of K, in proportion to the turn up to that
+#: beside it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
 #: Layers that any node gets; the smallest element stays above `Grading.finest` anyhow.
 MOST_LAYERS = 16
-#: An element of length h at a distance r from the origin loses 1e-13 r/h of K, since its collocation points are rounded;
-#: what grading leaves at a sharp kink of a segment L falls like √(h/L). Their sum is least near h = 1e-7 r^⅔ L^⅓.
+#: An element of length h at a distance r from the origin loses 1e-13 r/h of K, since its collocation points are
+#: rounded; what grading leaves at a sharp kink of a segment L falls like √(h/L). Their sum is least near h = 1e-7 r^⅔
+#: L^⅓.
 _FINEST = 1e-7
 #: No element is shorter than this part of the extent, whatever number of layers is asked for.
 _SHORTEST = 1e-12
@@ -48,8 +50,8 @@ _EXPONENTS = np.array(
 
 
 def exponent(angle: float) -> float:
-    """Real part of the least exponent λ, but rigid motions and λ = 1, of a wedge of rock of ``angle`` (rad) between free
-    faces: roots of sin λα = ± λ sin α (Williams 1952), interpolated."""
+    """Real part of the least exponent λ, but rigid motions and λ = 1, of a wedge of rock of ``angle`` (rad) between
+    free faces: roots of sin λα = ± λ sin α (Williams 1952), interpolated."""
     return float(np.interp(angle, _ANGLES, _EXPONENTS))
 
 
@@ -72,8 +74,9 @@ def ungraded(angle: float, where: str) -> tuple[float, float]:
 
 
 def at_graded_kink(turn: float) -> float:
-    """A of the error A ratio^(λ m) that m layers at a kink by ``turn`` (rad) leave in K of a kink a tenth as long as its crack,
-    the worst of those measured (20° to 120°: within 30 %). Layers begin to tell from the second: `ungraded` is less."""
+    """A of the error A ratio^(λ m) that m layers at a kink by ``turn`` (rad) leave in K of a kink a tenth as long as
+    its crack, the worst of those measured (20° to 120°: within 30 %). Layers begin to tell from the second: `ungraded`
+    is less."""
     return 2.4e-2 * (turn / (math.pi / 2)) ** 1.6
 
 
@@ -139,8 +142,8 @@ class Grading:
         return max((self.needed(float(angle), where) for angle in wedges), default=0)
 
     def finest(self, point: np.ndarray, length: float, extent: float) -> float:
-        """Length, m, of the shortest element at ``point`` (2,) on a side or segment of ``length`` in a body of ``extent``.
-        Farther from the origin than its extent the body is graded as at its extent."""
+        """Length, m, of the shortest element at ``point`` (2,) on a side or segment of ``length`` in a body of
+        ``extent``. Farther from the origin than its extent the body is graded as at its extent."""
         if self.target is None:
             return _SHORTEST * extent
         reach = min(max(abs(point[0]), abs(point[1])), extent)

@@ -4,7 +4,8 @@ A step is straight, from the tip by its increment along its growth angle. In ord
 
 1. meets another driven tip that comes towards it half way (both end at one common node);
 2. is trimmed where it would cross a crack face or a boundary, and joins it there;
-3. otherwise, when its end comes near a crack or a boundary, nearer than its start, that lies ahead of it and can be reached
+3. otherwise, when its end comes near a crack or a boundary, nearer than its start, that lies ahead of it and can be
+  reached
    without crossing anything, goes there instead;
 4. otherwise ends in the rock, a tip again.
 
@@ -35,9 +36,9 @@ SNAP_TO_TIP, SNAP_TO_NODE = 0.5, 0.1
 AHEAD = math.cos(math.radians(60.0))
 #: Two tips meet half way when each lies within this of the other's direction of growth.
 FACING = math.cos(math.radians(45.0))
-#: A way that would meet a boundary or a crack at a smaller angle goes straight across to it instead: the mouth, now or once a
-#: block parts along the crack, would be too sharp to be resolved (a body is refused below 3°), and the rock between is as good as
-#: gone.
+#: A way that would meet a boundary or a crack at a smaller angle goes straight across to it instead: the mouth, now or
+#: once a block parts along the crack, would be too sharp to be resolved (a body is refused below 3°), and the rock
+#: between is as good as gone.
 GRAZES = math.sin(math.radians(5.0))
 #: A tip that would turn back along its own crack more sharply than this stands still.
 TURN_BACK = math.radians(170.0)
@@ -98,12 +99,12 @@ def advance(
 ) -> Growth:
     """Advance every tip whose ``k_eq`` has reached ``k_ic`` by one segment.
 
-    ``loops_of(block)`` gives the block's outline and holes in reference coordinates ([] for an infinite plane); ``tips``
-    are TIP rows with ``k_eq`` and ``angle`` filled; ``k_ic`` (n_tips,) Pa √m; ``cycle`` is the birth cycle of new
-    segments. The increment is settings.increment times (K_eq/K_Ic) over its largest value, but no less than
-    settings.min_increment, and no more than ``longest`` (n_tips,) m; where that is 0 the tip stands. New segments carry aperture 0 and continue their crack's direction and place in the
-    list. Tips are served in the order given. Raises ValueError for a tip row that is no tip of the network, or whose
-    angle is not finite.
+    ``loops_of(block)`` gives the block's outline and holes in reference coordinates ([] for an infinite plane);
+    ``tips`` are TIP rows with ``k_eq`` and ``angle`` filled; ``k_ic`` (n_tips,) Pa √m; ``cycle`` is the birth cycle of
+    new segments. The increment is settings.increment times (K_eq/K_Ic) over its largest value, but no less than
+    settings.min_increment, and no more than ``longest`` (n_tips,) m; where that is 0 the tip stands. New segments carry
+    aperture 0 and continue their crack's direction and place in the list. Tips are served in the order given. Raises
+    ValueError for a tip row that is no tip of the network, or whose angle is not finite.
     """
     k_ic = np.broadcast_to(np.asarray(k_ic, dtype=float), (len(tips),))
     grown = np.zeros(len(tips))

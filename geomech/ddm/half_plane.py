@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 #: A stress that a load brings to the surface is no load it bears when it is larger than this part of the load.
 _BORNE = 1e-9
-#: Where the surface has to have ends they are this many extents of what stands in the rock to either side of it; for a path
-#: that is to meet the surface, so many.
+#: Where the surface has to have ends they are this many extents of what stands in the rock to either side of it; for a
+#: path that is to meet the surface, so many.
 _NEAR, _FAR = 2.0, 100.0
 #: What stands out of the rock by no more than this part of its extent stands on the surface.
 ON_SURFACE = 1e-7
@@ -26,8 +26,8 @@ ON_SURFACE = 1e-7
 class HalfPlane:
     """The rock below a free surface.
 
-    ``point`` (x, y) of the surface, m; ``outward`` the direction out of the rock, of any length. Raises ValueError when they
-    are not finite, or the direction has none.
+    ``point`` (x, y) of the surface, m; ``outward`` the direction out of the rock, of any length. Raises ValueError when
+    they are not finite, or the direction has none.
     """
 
     point: tuple[float, float] = (0.0, 0.0)
@@ -62,7 +62,8 @@ class HalfPlane:
         return points - np.where(np.abs(height) <= on_surface, 0.0, 2 * height) * np.asarray(self.outward)
 
     def edge(self, points: np.ndarray, extents: float = _NEAR) -> np.ndarray:
-        """(1, 2, 2) a piece of the surface, rock on its left, that reaches so many ``extents`` beyond ``points`` (n, 2)."""
+        """(1, 2, 2) a piece of the surface, rock on its left, that reaches so many ``extents`` beyond ``points`` (n,
+        2)."""
         if not len(points):
             points = np.array([self.point])
         along = self.frame(points)[:, 0]

@@ -7,12 +7,14 @@ The stress of displacement jumps derives from two analytic functions (Kolosov–
 Ψ belonging to the centre z0. An element of half length c, tangent e and middle z0 with jumps p along and q across it,
 times 2μ and with A_k the Cauchy moments of `kernels`, has
 
-    Φ = f/c Σ (q_k − i p_k) A_k'(ζ),   Ψ = e⁻² [½ (z − z0) Φ' − i f/c Σ p_k A_k'(ζ)],   f = 1/(4π(1−ν)), ζ = (z − z0)/(c e),
+    Φ = f/c Σ (q_k − i p_k) A_k'(ζ),   Ψ = e⁻² [½ (z − z0) Φ' − i f/c Σ p_k A_k'(ζ)],   f = 1/(4π(1−ν)), ζ = (z − z0)/(c
+                                       e),
 
-and both have Laurent series in c/(z − z0) whose coefficients are the moments of the shape functions, exactly. So the fast
-multipole method (Greengard & Rokhlin 1987; for plane elasticity Greengard, Kropinski & Mayo 1996) needs no compression
-of blocks and no sampling: series of clusters are moved up a tree, between well separated clusters and down again, all in
-batches. Translations between clusters are D B D' with one matrix B of binomials, so a product is mostly matrix products.
+and both have Laurent series in c/(z − z0) whose coefficients are the moments of the shape functions, exactly. So the
+fast multipole method (Greengard & Rokhlin 1987; for plane elasticity Greengard, Kropinski & Mayo 1996) needs no
+compression of blocks and no sampling: series of clusters are moved up a tree, between well separated clusters and down
+again, all in batches. Translations between clusters are D B D' with one matrix B of binomials, so a product is mostly
+matrix products.
 """
 
 from __future__ import annotations
@@ -136,15 +138,16 @@ def _spread(base: np.ndarray, n: int, coefficients: np.ndarray) -> np.ndarray:
 
 
 def _outer_shift(delta: np.ndarray, ratio: np.ndarray, n: int) -> np.ndarray:
-    """(m, n, n) Laurent series about a centre into that about another: ``delta`` how far the old stands from the new and
-    ``ratio`` the old radius, both in new radii."""
+    """(m, n, n) Laurent series about a centre into that about another: ``delta`` how far the old stands from the new
+    and ``ratio`` the old radius, both in new radii."""
     choose = _binomials(n + 1)
     k, j = np.arange(n)[:, None], np.arange(n)[None, :]
     return _spread(delta, n, choose[k + 1, np.maximum(k - j, 0)]) * (ratio[:, None] ** (np.arange(n) + 2))[:, None, :]
 
 
 class Compressed:
-    """`influence` of ``sources`` on ``targets`` as an operator; see there for ``nu``, ``tol`` and the order of unknowns.
+    """`influence` of ``sources`` on ``targets`` as an operator; see there for ``nu``, ``tol`` and the order of
+    unknowns.
 
     ``error``: of a traction, relative to the largest of the far field. ``stored`` bytes are kept, near blocks for most.
     """

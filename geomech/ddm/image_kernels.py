@@ -1,7 +1,7 @@
 """What a free surface adds to the influence of straight elements: compiled, in closed form near and by series far.
 
-The rock lies below y = 0, which bears no traction. With φ₀, ψ₀ the Kolosov potentials of a source in the infinite plane,
-Muskhelishvili's continuation (1953, §§ 92–93) gives those of what the surface adds,
+The rock lies below y = 0, which bears no traction. With φ₀, ψ₀ the Kolosov potentials of a source in the infinite
+plane, Muskhelishvili's continuation (1953, §§ 92–93) gives those of what the surface adds,
 
     φ₁(z) = −z φ̄₀'(z) − ψ̄₀(z),   ψ₁(z) = −φ̄₀(z) − z φ₁'(z),   φ̄(z) = conj φ(conj z),
 
@@ -9,17 +9,19 @@ Muskhelishvili's continuation (1953, §§ 92–93) gives those of what the surfa
     (σyy − σxx)/2 + i σxy     −2i y φ₁'' − φ₁' − φ̄₀'
     2μ (u_x + i u_y)          κ φ₁ − 2i y conj φ₁' + φ₀(conj z),   κ = 3 − 4ν.
 
-Points of the rock see the element's mirror image, so that all follows from the moments A_k of `kernels` at ζ, the mirror
-image of the point in the element's frame. Depths y of the source are a polynomial on it, which asks for one order more, and a
-jump's stress for A'''. With E the conjugate of the element's tangent, s its slope, η the depth of its middle in half lengths c
-and W = η A_k + s A_{k+1},
+Points of the rock see the element's mirror image, so that all follows from the moments A_k of `kernels` at ζ, the
+mirror image of the point in the element's frame. Depths y of the source are a polynomial on it, which asks for one
+order more, and a jump's stress for A'''. With E the conjugate of the element's tangent, s its slope, η the depth of its
+middle in half lengths c and W = η A_k + s A_{k+1},
 
-    slip       conj φ₁' = f/c (i/2 A' + E W''),            conj φ₁'' = f/c² (i/2 E A'' + E² W'''),   conj φ̄₀' = i f/2c A'
+    slip       conj φ₁' = f/c (i/2 A' + E W''),            conj φ₁'' = f/c² (i/2 E A'' + E² W'''),   conj φ̄₀' = i f/2c
+               A'
     opening    i times that, + f/c E² A',                  the same + f/c² E³ A'',                   i times that
     force      f/2 (2i E W' − κ E² A)                      f/2c (2i E² W'' − κ E³ A')                −f/2 A
 
-along the element, and (iκE²A − 2EW') f/2, (iκE³A' − 2E²W'') f/2c, −i A f/2 across it; f = 1/4π(1−ν). No term is larger than
-the whole by more than the point is nearer to the image than to the source, so digits are those of the infinite plane.
+along the element, and (iκE²A − 2EW') f/2, (iκE³A' − 2E²W'') f/2c, −i A f/2 across it; f = 1/4π(1−ν). No term is larger
+than the whole by more than the point is nearer to the image than to the source, so digits are those of the infinite
+plane.
 """
 
 from __future__ import annotations
@@ -71,7 +73,8 @@ def _third(kind, zp, zm, b, d):
 
 @_jit
 def _moments(kind, distance, zp, zm, highest, table, w):
-    """A_k and three derivatives for k = 0 … highest, eight points of one class, into ``w``, ``_STEP`` numbers an order."""
+    """A_k and three derivatives for k = 0 … highest, eight points of one class, into ``w``, ``_STEP`` numbers an
+    order."""
     z = 0.5 * (zp + zm)
     if distance == 0 or (distance == 1 and highest <= 5):
         a, b, d = _first_moment(kind, zp, zm)
@@ -128,8 +131,9 @@ def _moments(kind, distance, zp, zm, highest, table, w):
 def tractions(points, tangents, per, first, last, start, end, kind, order, nu, tol, force, table, nodal, out):
     """Add to ``out`` what the free surface y = 0 adds to `kernels.tractions`.
 
-    ``points`` are the mirror images of the rock's, all else as there; everything in the frame of the surface. An element that
-    lies on the surface, as forces may, has the rock on its left and the images of points on it on its right.
+    ``points`` are the mirror images of the rock's, all else as there; everything in the frame of the surface. An
+    element that lies on the surface, as forces may, has the rock on its left and the images of points on it on its
+    right.
     """
     n1 = order + 1
     w, parts = np.empty(_ROOM), np.empty(_ROOM)

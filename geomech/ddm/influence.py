@@ -114,8 +114,8 @@ class ElementSet:
         return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
 
     def seen_in(self, other: ElementSet | None, found: np.ndarray) -> np.ndarray:
-        """``found`` (n,), what `found_in` says, with the numbers of elements besides that stand in the same place in ``other``
-        and are only of another kind: tractions on them are collocated at the same points."""
+        """``found`` (n,), what `found_in` says, with the numbers of elements besides that stand in the same place in
+        ``other`` and are only of another kind: tractions on them are collocated at the same points."""
         out = found.copy()
         if other is not None and (other.order, other.family) == (self.order, self.family):
             for k in np.flatnonzero(found < 0).tolist():
@@ -124,8 +124,8 @@ class ElementSet:
 
     @cached_property
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n, p+3, 2) the ends and between them the collocation points of every element, and (n, p+1, p+3) what nodal values
-        have to be multiplied by (from the left) for the values there."""
+        """(n, p+3, 2) the ends and between them the collocation points of every element, and (n, p+1, p+3) what nodal
+        values have to be multiplied by (from the left) for the values there."""
         t = np.concatenate([[-1.0], shapes.nodes(self.family, self.order), [1.0]])
         table = np.array([shapes.at(self.family, self.order, kind, t).T for kind in range(4)])
         return self.at(t), table[self.kind]
@@ -278,9 +278,9 @@ def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, 
 def project_total(
     rows: np.ndarray, targets: ElementSet, start, end, density: np.ndarray, nu: float, tol: float, side: float
 ) -> None:
-    """The same for the traction ``rows`` (n_unknowns,) that line forces of monomial ``density`` (m, 2, p+1) add up to, in
-    place: where any of them ends inside an element, that element gets moments of the sum, in which singularities of pieces
-    that meet cancel."""
+    """The same for the traction ``rows`` (n_unknowns,) that line forces of monomial ``density`` (m, 2, p+1) add up to,
+    in place: where any of them ends inside an element, that element gets moments of the sum, in which singularities of
+    pieces that meet cancel."""
     values = rows.reshape(targets.n, 2, targets.per)
     clustered, q = _clustered()
     ends = np.unique(np.concatenate([start, end]), axis=0)

@@ -1,7 +1,7 @@
 """Cracks born where there was none: at a surface, a hole, the face of another crack, or inside the rock.
 
-Whole rock fails where its strength is reached. With principal stresses σ1 ≥ σ3 (in the plane, tension positive), tensile
-strength T, cohesion c and friction angle φ,
+Whole rock fails where its strength is reached. With principal stresses σ1 ≥ σ3 (in the plane, tension positive),
+tensile strength T, cohesion c and friction angle φ,
 
     in tension  σ1 / T                                        along the plane normal to σ1,
     in shear    [(σ1 − σ3) + (σ1 + σ3) sin φ] / (2 c cos φ)   along planes at ±(45° − φ/2) to the direction of σ3
@@ -53,8 +53,9 @@ _BESIDE = 1e-6
 
 @dataclass(frozen=True)
 class Birth:
-    """A crack that the rock asks for, from ``start`` to ``end``: ``kind`` "tension" or "shear", ``place`` "surface" (start
-    on an outline or hole), "face" (start on ``segment`` of another crack) or "rock"; ``overstress`` 1 at failure."""
+    """A crack that the rock asks for, from ``start`` to ``end``: ``kind`` "tension" or "shear", ``place`` "surface"
+    (start on an outline or hole), "face" (start on ``segment`` of another crack) or "rock"; ``overstress`` 1 at
+    failure."""
 
     kind: str
     place: str
@@ -65,7 +66,8 @@ class Birth:
 
 
 def material_length(material: Material) -> float:
-    """d = (2/π)(K_Ic/T)², m: the mean of K_Ic/√(2πr) over r < d is the tensile strength T (Novozhilov 1969; Seweryn 1994)."""
+    """d = (2/π)(K_Ic/T)², m: the mean of K_Ic/√(2πr) over r < d is the tensile strength T (Novozhilov 1969; Seweryn
+    1994)."""
     return 2 / math.pi * (material.k_ic / material.tensile_strength) ** 2
 
 
@@ -85,9 +87,10 @@ def overstress(stress: np.ndarray, material: Material) -> tuple[np.ndarray, np.n
 def births(solution: Solution, material: Material, settings: GrowthSettings, block: int = 0) -> list[Birth]:
     """The cracks that would come first under this load, most overstressed first, whether or not that is above one.
 
-    ``settings.initiation`` says where to look ("surface" counts crack faces in). Each is settings.increment long and has room: it
-    keeps settings.initiation_spacing from tips, mouths, junctions and its sisters and crosses nothing. Those within 0.1 % of
-    the first come with it. ``block`` is the one that the body's cracks say they lie in; [] when the rock has no strength to exceed, or no room. Raises ValueError on an unknown place.
+    ``settings.initiation`` says where to look ("surface" counts crack faces in). Each is settings.increment long and
+    has room: it keeps settings.initiation_spacing from tips, mouths, junctions and its sisters and crosses nothing.
+    Those within 0.1 % of the first come with it. ``block`` is the one that the body's cracks say they lie in; [] when
+    the rock has no strength to exceed, or no room. Raises ValueError on an unknown place.
     """
     if settings.initiation not in PLACES:
         raise ValueError(f"no place for cracks to be born {settings.initiation!r}; there are {PLACES[1:]}")
@@ -155,13 +158,13 @@ def _candidates(solution: Solution, material: Material, settings: GrowthSettings
     return sorted(found, key=lambda b: (-round(b.overstress, 9), b.place, b.start, b.end))
 
 
-# Points (n, 2) of surfaces, unit vectors into the rock, crack segments (−1 on outlines), and what gives the stress at those
-# of them that are asked for.
+# Points (n, 2) of surfaces, unit vectors into the rock, crack segments (−1 on outlines), and what gives the stress at
+# those of them that are asked for.
 
 
 def _on_curves(solution: Solution):
-    """The sides of polygons for curves, by their middles. At the vertices stress is the polygon's, and half-way it is less
-    than the curve's; its mean over the side is right to 0.4 % for a hole of 64 sides, 2.4 % for one of 24."""
+    """The sides of polygons for curves, by their middles. At the vertices stress is the polygon's, and half-way it is
+    less than the curve's; its mean over the side is right to 0.4 % for a hole of 64 sides, 2.4 % for one of 24."""
     body, g = solution.body, solution.body.boundary
     sides = np.flatnonzero(_sides_of_curves(body.loops))
     edge = body.mesh.edges[sides]
@@ -193,7 +196,8 @@ def _on_sides(solution: Solution):
 
 
 def _on_faces(solution: Solution):
-    """Both faces of the cracks. One divided near the end of an increment would leave a sliver of it: middle points only."""
+    """Both faces of the cracks. One divided near the end of an increment would leave a sliver of it: middle points
+    only."""
     c = solution.body.faces
     t = shapes.nodes(c.family, c.order)
     middle = np.flatnonzero(np.abs(t) <= max(0.5, np.abs(t).min()))
@@ -219,7 +223,8 @@ def _on_free_surface(solution: Solution, settings: GrowthSettings):
 
 
 def _at_corners(solution: Solution, distance: float):
-    """Re-entrant corners of outline and holes; stress has a value only away from them, so half-way along the ``distance``."""
+    """Re-entrant corners of outline and holes; stress has a value only away from them, so half-way along the
+    ``distance``."""
     corners, inward = [np.empty((0, 2))], [np.empty((0, 2))]
     for loop in solution.body.loops:
         heading, turn = _turns(loop)
@@ -251,8 +256,8 @@ def _turns(loop: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _away(cracks: Cracks, points: np.ndarray, own: np.ndarray, settings: GrowthSettings) -> np.ndarray:
-    """(n,) whether points keep their distance from tips, mouths, junctions and corners of cracks, where stress is a matter
-    of stress intensity, and, unless they lie on a face (``own`` ≥ 0), from cracks at all."""
+    """(n,) whether points keep their distance from tips, mouths, junctions and corners of cracks, where stress is a
+    matter of stress intensity, and, unless they lie on a face (``own`` ≥ 0), from cracks at all."""
     free = np.ones(len(points), bool)
     if not cracks.n_segments:
         return free
@@ -329,8 +334,9 @@ def _ways(stress: np.ndarray, material: Material, inward: np.ndarray) -> Iterato
 
 
 def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material) -> np.ndarray:
-    """Overstress (n,) of ``stress`` (n, 3) on the very planes of cracks along ``way`` (n, 2): σ_n/T, or (|τ| + σ_n tan φ)/c. At a
-    point these are the planes that `overstress` is of; a mean has other principal directions than the surface."""
+    """Overstress (n,) of ``stress`` (n, 3) on the very planes of cracks along ``way`` (n, 2): σ_n/T, or (|τ| + σ_n tan
+    φ)/c. At a point these are the planes that `overstress` is of; a mean has other principal directions than the
+    surface."""
     normal = normal_of(way)
     t = traction(stress, normal)
     pull = np.sum(t * normal, axis=1)

@@ -1,9 +1,11 @@
-"""The crack unknowns' equations where they are too many to factor: compressed influence, GMRES, neighbourhoods factored.
+"""The crack unknowns' equations where they are too many to factor: compressed influence, GMRES, neighbourhoods
+factored.
 
 Most of a crack network's stiffness lies within cracks and between neighbours. The elements are cut into patches; each,
-with the rest of the cracks that it cuts, is solved for exactly and its own unknowns are kept of that (restricted additive
-Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 15 to 40 products for networks of any size. Cracks
-that many patches cut have a few coarse elements besides (`coarse`), which carry their ends' news to one another.
+with the rest of the cracks that it cuts, is solved for exactly and its own unknowns are kept of that (restricted
+additive Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 15 to 40 products for networks of any
+size. Cracks that many patches cut have a few coarse elements besides (`coarse`), which carry their ends' news to one
+another.
 """
 
 from __future__ import annotations
@@ -59,8 +61,8 @@ def gmres(
     limit: int = 1000,
     scale: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """x with |right − A x| ≤ ``tolerance`` |right| and the number of products ``times``, from the guess ``first``; equations
-    count by their ``scale`` (n,), if it is given.
+    """x with |right − A x| ≤ ``tolerance`` |right| and the number of products ``times``, from the guess ``first``;
+    equations count by their ``scale`` (n,), if it is given.
 
     Preconditioned from the right (Saad & Schultz 1986), so that it is the true residual that falls. Raises NotSolved.
     """
@@ -137,14 +139,14 @@ def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, long
 
 
 def scales(elements: ElementSet) -> np.ndarray:
-    """(n_unknowns,) what equations have to be multiplied by where elements differ much in length: tractions go with one over
-    it, and those of the shortest alone would decide when a solution is good enough."""
+    """(n_unknowns,) what equations have to be multiplied by where elements differ much in length: tractions go with one
+    over it, and those of the shortest alone would decide when a solution is good enough."""
     return np.repeat(elements.length / elements.length.max(), 2 * elements.per) if elements.n else np.zeros(0)
 
 
 class Patches:
-    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element; ``between(elements)``
-    the matrix between some of them where it is not their influence alone."""
+    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element;
+    ``between(elements)`` the matrix between some of them where it is not their influence alone."""
 
     def __init__(
         self,
@@ -246,8 +248,8 @@ class Reduced:
 
 
 class Coupled:
-    """The equations of boundary and cracks together, boundary first, where both are iterated on: S by itself would take an
-    iteration on the boundary for each of its products."""
+    """The equations of boundary and cracks together, boundary first, where both are iterated on: S by itself would take
+    an iteration on the boundary for each of its products."""
 
     def __init__(self, reduced: Reduced, boundary: IteratedBoundary, on_boundary: np.ndarray, on_cracks: np.ndarray):
         self._reduced, self._boundary = reduced, boundary
@@ -266,7 +268,8 @@ class Coupled:
         return np.concatenate([own + self._on_boundary @ w, cracks + self._on_cracks @ u])
 
     def roughly(self, v: np.ndarray, of_cracks: Callable[[np.ndarray], np.ndarray], transposed: bool) -> np.ndarray:
-        """Neighbourhoods' answer: the boundary's, and the cracks' to what that leaves them (transposed: the other way)."""
+        """Neighbourhoods' answer: the boundary's, and the cracks' to what that leaves them (transposed: the other
+        way)."""
         u, w = v[: self.first], v[self.first :]
         if transposed:
             w = of_cracks(w)
@@ -276,8 +279,8 @@ class Coupled:
 
 
 class IterativeCrackSystem:
-    """`crack_system.CrackSystem` for many unknowns: ``matrix`` is S as an operator; see there. ``coupled``: the equations
-    together with those of a boundary that is iterated on too.
+    """`crack_system.CrackSystem` for many unknowns: ``matrix`` is S as an operator; see there. ``coupled``: the
+    equations together with those of a boundary that is iterated on too.
 
     ``products`` counts those with S. The last solution is the first guess of the next one.
     """

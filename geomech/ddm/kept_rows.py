@@ -15,8 +15,8 @@ ALIKE = 2.0
 
 
 class KeptRows:
-    """A matrix (n, m) of ``width`` rows an element: ``blocks`` of rows in the order in which they came, and ``at`` (n_elements,)
-    where the elements are in that order."""
+    """A matrix (n, m) of ``width`` rows an element: ``blocks`` of rows in the order in which they came, and ``at``
+    (n_elements,) where the elements are in that order."""
 
     def __init__(self, blocks: tuple[np.ndarray, ...], at: np.ndarray, width: int):
         self.blocks, self.at, self._width = blocks, at, width
@@ -29,7 +29,8 @@ class KeptRows:
         return cls((matrix,), np.arange(len(matrix) // width), width)
 
     def grown(self, was: np.ndarray, compute: Callable[[np.ndarray], np.ndarray]) -> KeptRows:
-        """The matrix of elements whose numbers were ``was`` (n_elements,), −1 where new; ``compute(elements)`` makes rows."""
+        """The matrix of elements whose numbers were ``was`` (n_elements,), −1 where new; ``compute(elements)`` makes
+        rows."""
         new, kept = np.flatnonzero(was < 0), np.flatnonzero(was >= 0)
         at = np.empty(len(was), int)
         at[kept], at[new] = self.at[was[kept]], self._total // self._width + np.arange(len(new))

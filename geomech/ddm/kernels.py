@@ -13,8 +13,8 @@ Densities are jumps u⁺ − u⁻ times 2μ (so a crack's slip and opening, a bo
 on the left) and line forces. A point on the element's line is seen from the side that the sign of y (±0.0 included)
 tells.
 
-Points are sorted by distance, element by element, and taken eight of a class at a time (`lanes`): a pair's value is that
-of its lane, whatever stands beside it, so it does not depend on what else is asked for, nor on threads.
+Points are sorted by distance, element by element, and taken eight of a class at a time (`lanes`): a pair's value is
+that of its lane, whatever stands beside it, so it does not depend on what else is asked for, nor on threads.
 """
 
 from __future__ import annotations
@@ -192,9 +192,9 @@ def moments(kind, xp, xm, y, order, table, a, b, d):
 def _sort(points, first, n, start, end, e, tol, side, tile, chosen, count):
     """Points ``first`` … + n in the frame of element ``e``, lengths in half lengths c, sorted by distance.
 
-    ``points`` x … y … flat, each padded to whole lanes; ``tile``: x + 1, x − 1, y (``_TILE`` each, a fourth is scratch);
-    ``chosen`` (_CLASSES rows of _ROW) the points of a class, ``count`` of them, the last repeated so that it fills lanes.
-    Returns (c, tx, ty).
+    ``points`` x … y … flat, each padded to whole lanes; ``tile``: x + 1, x − 1, y (``_TILE`` each, a fourth is
+    scratch); ``chosen`` (_CLASSES rows of _ROW) the points of a class, ``count`` of them, the last repeated so that it
+    fills lanes. Returns (c, tx, ty).
 
     A point within ``tol`` of the open element is put on it, on the given side; one that meets an end is moved off by
     1e-14 along the normal, so that what is infinite there stays finite.
@@ -244,9 +244,9 @@ def tractions(points, tangents, per, first, last, start, end, kind, order, nu, t
     """Traction (along the tangent, along the normal left of it) at points from unit densities.
 
     ``points``, ``tangents`` flat (`lanes_of`), ``per`` of the points an element; those from ``first`` to ``last`` are
-    done. Sources: ``start``, ``end`` (m, 2), ``kind`` (m,). ``nodal`` (4, p+1, p+1) turns the monomials of each kind into
-    unknowns. ``out`` flat, (2(p+1)m, 2n): rows run element, component (along, normal), unknown; columns element, component,
-    node. ``force``: line forces instead of jumps.
+    done. Sources: ``start``, ``end`` (m, 2), ``kind`` (m,). ``nodal`` (4, p+1, p+1) turns the monomials of each kind
+    into unknowns. ``out`` flat, (2(p+1)m, 2n): rows run element, component (along, normal), unknown; columns element,
+    component, node. ``force``: line forces instead of jumps.
     """
     n1 = order + 1
     w = np.empty((MAX_ORDER + 1) * _STEP)

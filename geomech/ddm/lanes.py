@@ -1,9 +1,9 @@
 """Eight numbers at a time: numba types whose every operation is a vector instruction or a few.
 
-Compilers find such instructions by themselves only in loops that they can see through. These types ask for them: + − × ÷
-of real or complex lanes with lanes or with a number, and the functions below. What comes out of a lane depends on what
-went into it and on nothing else, neither on its place nor on its neighbours. Products may be fused with sums where the
-processor can.
+Compilers find such instructions by themselves only in loops that they can see through. These types ask for them: + − ×
+÷ of real or complex lanes with lanes or with a number, and the functions below. What comes out of a lane depends on
+what went into it and on nothing else, neither on its place nor on its neighbours. Products may be fused with sums where
+the processor can.
 
     load(array, at)             real lanes at …, at + 7 of a flat array
     load_complex(array, at)     real parts first, imaginary parts behind them
@@ -215,8 +215,8 @@ def norm(typing, z):
 
 @intrinsic
 def term(typing, b, u, v, c):
-    """From (b_{j+1}, b_{j+2}) the next (b_j, b_{j+1}), b_j = c_j + u b_{j+1} − v b_{j+2}, u = 2 Re q, v = |q|² (Knuth 1981,
-    §4.6.4): half the work of a complex Horner scheme, and as stable for |q| < 1."""
+    """From (b_{j+1}, b_{j+2}) the next (b_j, b_{j+1}), b_j = c_j + u b_{j+1} − v b_{j+2}, u = 2 Re q, v = |q|² (Knuth
+    1981, §4.6.4): half the work of a complex Horner scheme, and as stable for |q| < 1."""
 
     def code(context, builder, sig, args):
         one, two = _split(builder, complex_lanes, args[0])

@@ -48,7 +48,8 @@ class BodyLoad:
 
     segments             (m, 2, 2)  straight pieces of the boundary, anywhere on it, directed along it
     tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear between
-    body_force           (2,)       N/m³ at ``about``; in a half-plane, where it makes stress grow with depth, everywhere
+    body_force           (2,)       N/m³ at ``about``; in a half-plane, where it makes stress grow with depth,
+                         everywhere
     body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
     about                (2,)       m; the centroid when left out
     k0                   in a half-plane, the stress along its surface that goes with the body force, per stress out of
@@ -56,11 +57,11 @@ class BodyLoad:
     remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
                                     that carry it act on the outline in addition to ``tractions``. Holes are free of it.
                                     In a half-plane it must be parallel to the surface
-    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a `Pressure`,
-                         or a function of points (n, 2) to (n,)
+    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a
+                         `Pressure`, or a function of points (n, 2) to (n,)
     hole_pressure        the same in all holes, or of each: a number, Pa, or a `Pressure`
-    displacements        for every support of the body what it imposes, m: None (zero), constant (2,), linear (2, 2) from
-                         its values at the support's ends, or a function of points (n, 2); components that the
+    displacements        for every support of the body what it imposes, m: None (zero), constant (2,), linear (2, 2)
+                         from its values at the support's ends, or a function of points (n, 2); components that the
                          support does not hold are ignored
     sides                {where: traction}: an edge's number or a straight piece ((x, y), (x, y)) to a traction (Pa, x
                          and y) that is constant (2,), linear (2, 2) from its values at the ends, or a function of
@@ -68,9 +69,9 @@ class BodyLoad:
     points, forces       (k, 2) m and N/m: point loads, inside the rock or on its boundary. They are singular, except
                          on holes and where the plane beyond the boundary holds rock: there a hundredth of the extent
                          carries them
-    kelvin               True: those on the boundary, too, are Kelvin's in the infinite plane. The rock beyond the boundary then
-                         keeps its share of them, about half on a side, three quarters at a right-angled corner: no element's
-                         displacement is singular enough to bring it back
+    kelvin               True: those on the boundary, too, are Kelvin's in the infinite plane. The rock beyond the
+                         boundary then keeps its share of them, about half on a side, three quarters at a right-angled
+                         corner: no element's displacement is singular enough to bring it back
 
     Raises ValueError naming the part that is not finite or of the wrong shape.
     """
@@ -301,8 +302,8 @@ def first_moments(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray
 
 
 def _arms_and_forces(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(m, 2, 2) twice, of which the products at all ends add up to those of arms and tractions along the segments: ∫ x t of two
-    functions linear along a length L is L/6 Σ x_i t_j, those of the same end counted twice."""
+    """(m, 2, 2) twice, of which the products at all ends add up to those of arms and tractions along the segments: ∫ x
+    t of two functions linear along a length L is L/6 Σ x_i t_j, those of the same end counted twice."""
     ends = segments - about
     along = ends[:, 1] - ends[:, 0]
     forces = (np.hypot(along[:, 0], along[:, 1]) / 6)[:, None, None] * tractions
@@ -311,8 +312,8 @@ def _arms_and_forces(segments: np.ndarray, tractions: np.ndarray, about: np.ndar
 
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
-    """Loads whose sizes are functions of time: ``parts`` are pairs of a `BodyLoad` and a factor, a number, a function of
-    time (s), or a `model.History` of one component."""
+    """Loads whose sizes are functions of time: ``parts`` are pairs of a `BodyLoad` and a factor, a number, a function
+    of time (s), or a `model.History` of one component."""
 
     parts: Sequence[tuple[BodyLoad, float | Callable[[float], float] | History]]
 

@@ -1,4 +1,5 @@
-"""From outlines and cracks to elements: a pure function of the geometry, so what has not changed is the same to the bit.
+"""From outlines and cracks to elements: a pure function of the geometry, so what has not changed is the same to the
+bit.
 
 Sides are cut to nearly equal elements, graded towards corners and crack mouths; a straight initial crack has
 ``elements_per_crack`` elements, every grown increment one. Density has weak singularities at kinks, junctions and
@@ -39,8 +40,8 @@ SLIVER = 0.08
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """``boundary`` elements (source: edge) and ``cracks`` elements (source: segment); ``edges`` (m, 2, 2) the outline
-    and ``edge_loop`` (m,) the loop of each. ``sides`` are what of the cracks the boundary's elements depend on, these before
-    any are halved, and which edges go straight on."""
+    and ``edge_loop`` (m,) the loop of each. ``sides`` are what of the cracks the boundary's elements depend on, these
+    before any are halved, and which edges go straight on."""
 
     boundary: ElementSet
     cracks: ElementSet
@@ -125,8 +126,8 @@ def mesh(
 
 
 def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: float):
-    """``ends`` (starts, ends and pieces, (n, 2) or (n, 2, 2)), kinds, sources and what touches, with the images that the free
-    surface makes of them behind: it is they that elements below it must not be long beside."""
+    """``ends`` (starts, ends and pieces, (n, 2) or (n, 2, 2)), kinds, sources and what touches, with the images that
+    the free surface makes of them behind: it is they that elements below it must not be long beside."""
     ends = tuple(np.concatenate([x, half_plane.images(x, near)]) for x in ends)
     n = len(touching)
     both = np.zeros((2 * n, 2 * n), bool)
@@ -202,8 +203,8 @@ def _side(edge, length: float, size: float, at_start: int, at_end: int, grading:
 def _evened(before: np.ndarray, after: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
     """The points (n, 2) of two sides that go straight on, with elements of one length where they meet.
 
-    Loads mostly end there. Their tractions jump, and what that leaves of singularities at nodes cancels between elements
-    that are mirror images (beside longer neighbours a short load lost 0.3 % of its force, so 1e-6).
+    Loads mostly end there. Their tractions jump, and what that leaves of singularities at nodes cancels between
+    elements that are mirror images (beside longer neighbours a short load lost 0.3 % of its force, so 1e-6).
     """
     ends = [np.hypot(*(before[-1] - before[-2])), np.hypot(*(after[1] - after[0]))]
     short, long = min(ends), max(ends)
@@ -347,7 +348,8 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
 
 
 def _straight_through(cracks: Cracks, heading: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """(n_nodes,) bool: nodes at which a crack of elements of like ``size`` (n_segments,) goes on without a kink, or nearly so."""
+    """(n_nodes,) bool: nodes at which a crack of elements of like ``size`` (n_segments,) goes on without a kink, or
+    nearly so."""
     out = np.zeros(len(cracks.nodes), bool)
     flat = cracks.segments.ravel()
     order = np.argsort(flat, kind="stable")

@@ -1,8 +1,8 @@
 """What a free surface adds to the influence of many elements on many others, without its matrix.
 
-Points of the rock see the mirror images of the sources (`image_kernels`), or, what is the same, their own images see the
-sources: so the series of `hierarchical` are brought to clusters of the targets' mirror images m = conj z, and only what is made of
-them there differs. With φ' = −Φ/2 and ψ' = Ψ + ½ conj(z₀) Φ' for Ψ about z₀,
+Points of the rock see the mirror images of the sources (`image_kernels`), or, what is the same, their own images see
+the sources: so the series of `hierarchical` are brought to clusters of the targets' mirror images m = conj z, and only
+what is made of them there differs. With φ' = −Φ/2 and ψ' = Ψ + ½ conj(z₀) Φ' for Ψ about z₀,
 
     conj φ₁' = K = ½ Φ + ½ (m − conj z₀) Φ' − Ψ,   conj φ₁'' = K',   conj φ̄₀' = −½ Φ.
 """
@@ -18,7 +18,8 @@ from .influence import ElementSet, image_influence
 
 
 class Mirrored(Compressed):
-    """What the surface of their half-plane adds to the influence of ``sources`` on ``targets``; else as `Compressed`."""
+    """What the surface of their half-plane adds to the influence of ``sources`` on ``targets``; else as
+    `Compressed`."""
 
     def __init__(self, targets: ElementSet, sources: ElementSet, nu: float, tol: float, error: float = 1e-10):
         self._whole_targets, self._whole_sources = targets, sources
@@ -35,7 +36,8 @@ class Mirrored(Compressed):
         return image_influence(self._whole_targets.take(rows), self._whole_sources.take(columns), nu, tol)
 
     def _incoming(self) -> np.ndarray:
-        """(n, 2(p+1), 4P) real: tractions at the nodes, in the rock, from the leaf's series of Φ and Ψ about their images."""
+        """(n, 2(p+1), 4P) real: tractions at the nodes, in the rock, from the leaf's series of Φ and Ψ about their
+        images."""
         n, tree, rock = self.terms, self.target_tree, self._rock_targets
         leaf = _leaf_of(tree)
         radius, centre = tree.radius[leaf][:, None], tree.centre[leaf][:, None]

@@ -44,7 +44,8 @@ class Obstacle:
         )
 
     def ends_at(self, nodes: set[int], at: Point) -> bool:
-        """Whether it may touch the end ``at`` of a path: a segment of one of ``nodes``, an edge that holds the point."""
+        """Whether it may touch the end ``at`` of a path: a segment of one of ``nodes``, an edge that holds the
+        point."""
         if self.row is not None:
             return self.row.start in nodes or self.row.end in nodes
         distance, _ = nearest_on(at, self.a, self.b)
@@ -52,7 +53,8 @@ class Obstacle:
 
 
 class Network:
-    """`Cracks` opened up for change: nodes and segments that can be added, split, moved and merged, then `freeze`\\ d."""
+    """`Cracks` opened up for change: nodes and segments that can be added, split, moved and merged, then `freeze`\\
+    d."""
 
     def __init__(self, cracks: Cracks, loops_of: Callable[[int], Sequence[np.ndarray]], cycle: int):
         self.names = cracks.names

@@ -60,8 +60,8 @@ class Particular:
 
 @dataclass(frozen=True, eq=False)
 class GrowingWithDepth:
-    """Stress that grows with depth below a free surface, as ``force`` (2,) N/m³ asks for: ``slopes`` (3,) Pa/m of the stress
-    along the surface, out of it, and of shear, out of the rock; ``uniform`` (3,) Pa added everywhere.
+    """Stress that grows with depth below a free surface, as ``force`` (2,) N/m³ asks for: ``slopes`` (3,) Pa/m of the
+    stress along the surface, out of it, and of shear, out of the rock; ``uniform`` (3,) Pa added everywhere.
 
     Balance ties the last two to the force; the first is the rock's history. A strain that is linear in one direction is
     compatible, so any will do: it bends the plane."""

@@ -13,11 +13,11 @@ solved, not corrected once, where the look ahead says that it is stiff.
 
 A chord that has half of the turn is the trapezoidal rule: stable for all κ, but what one step leaves over comes back in
 the next with the other sign, κ/(2 + κ) of it, and stiff paths zigzag for long. With the share s of the turn it is
-(1 − s) κ/(1 + s κ): s = 1 − 1/κ from κ = 2 on leaves 1/κ, and in the limit no shear at the end of a step (backward Euler).
-κ falls with √Δa, so that fine steps have half the turn, and second order.
+(1 − s) κ/(1 + s κ): s = 1 − 1/κ from κ = 2 on leaves 1/κ, and in the limit no shear at the end of a step (backward
+Euler). κ falls with √Δa, so that fine steps have half the turn, and second order.
 
-From step to step neither κ nor the turn from chord to chord changes much. So the first trial turns as the last chord did, and
-the κ found then says how far to correct it: mostly one look ahead is enough (`Remembered`).
+From step to step neither κ nor the turn from chord to chord changes much. So the first trial turns as the last chord
+did, and the κ found then says how far to correct it: mostly one look ahead is enough (`Remembered`).
 """
 
 from __future__ import annotations
@@ -37,18 +37,19 @@ SMOOTH_SHARE, KINK_SHARE = 1 / 2, 2 / 3
 TOLERANCE = np.radians(1.0)
 #: From this κ on, paths are stiff: below, a single correction falls off from step to step.
 STIFF = 2.0
-#: A correction onward by less than this that nothing says is stiff is taken as it is; of a larger one a second look tells
-#: whether it overshoots, which it does from the second figure for κ on. Steps of 1 mm along 140 MPa otherwise bend by 17°
-#: for 6°, then back, and miss the load that drives them by 14 %.
+#: A correction onward by less than this that nothing says is stiff is taken as it is; of a larger one a second look
+#: tells whether it overshoots, which it does from the second figure for κ on. Steps of 1 mm along 140 MPa otherwise
+#: bend by 17° for 6°, then back, and miss the load that drives them by 14 %.
 SMOOTH, GENTLE = np.radians(4.2), 1.0
 #: Looks ahead at most. Secants need two or three; what is left then is of the order of the tolerance.
 LOOKS = 5
-#: Bounds of the slope −1 − κ of the turn ahead over that of the chord. Beyond them two trials lie too close together to tell it.
+#: Bounds of the slope −1 − κ of the turn ahead over that of the chord. Beyond them two trials lie too close together to
+#: tell it.
 SLOPES = (-39.0, 0.0)
 #: The largest κ that a first look is believed.
 GUESSED = 8.0
-#: By this part the slope may have changed since the last step: a correction by it is taken unseen where what it may leave is within
-#: the tolerance.
+#: By this part the slope may have changed since the last step: a correction by it is taken unseen where what it may
+#: leave is within the tolerance.
 CHANGED = 0.3
 #: A chord that turned on from its last trial by more than this tells the slope there.
 TELLING = np.radians(0.5)
@@ -60,8 +61,8 @@ OUTSIDE = 0.2
 
 
 class Remembered(NamedTuple):
-    """Of a tip's last step: ``kappa`` (nan: not known), the ``angle`` of its chord, the angle last ``tried`` before and the one that
-    the criterion asked for at the end of that trial, ``ahead``."""
+    """Of a tip's last step: ``kappa`` (nan: not known), the ``angle`` of its chord, the angle last ``tried`` before and
+    the one that the criterion asked for at the end of that trial, ``ahead``."""
 
     kappa: float
     angle: float
@@ -83,7 +84,8 @@ class Chords:
     """The directions of one growth step's chords, looked for tip by tip: the steps of all tips are tried together.
 
     With θ the angle of the chord, θ₀ that of the criterion at its start, a(θ) the one that the criterion asks for at
-    its end and s the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀, and a falls by 1 + κ times what θ turns.
+    its end and s the share of the turn, the condition is s (θ − θ₀ + a) = θ − θ₀, and a falls by 1 + κ times what θ
+    turns.
     """
 
     def __init__(self, tips: np.ndarray, memory: Memory | None = None) -> None:
@@ -158,8 +160,8 @@ class Chords:
                 memory[tuple(growth.cracks.nodes[end].tolist())] = Remembered(*step)
 
     def _first_guess(self, turns: np.ndarray) -> np.ndarray:
-        """κ by the turn ahead of a trial along the tangent: on a smooth path, from half a turn before the tip, it is 2 + κ
-        times that; of a zigzag about a straight line −κ times. 0 where that is not stiff; kinks do not tell."""
+        """κ by the turn ahead of a trial along the tangent: on a smooth path, from half a turn before the tip, it is 2
+        + κ times that; of a zigzag about a straight line −κ times. 0 where that is not stiff; kinks do not tell."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = turns / self.start
         kappa = np.minimum(np.where(ratio > 0, ratio - 2, -ratio), GUESSED)
@@ -184,9 +186,10 @@ def corrected(
 ) -> Growth | None:
     """One growth step of all driven tips along chords; None when no tip moves. Sets the angles that were followed.
 
-    ``tips``: TIP rows with the criterion's ``angle`` and ``k_eq``; ``grow()`` advances them as they then stand, in segments
-    of birth ``cycle``; ``look_ahead(cracks)`` solves the tried network and returns its TIP rows with their angles. Without
-    ``correct`` the criterion's angles are followed as they are. ``memory``: of the last steps, brought up to date.
+    ``tips``: TIP rows with the criterion's ``angle`` and ``k_eq``; ``grow()`` advances them as they then stand, in
+    segments of birth ``cycle``; ``look_ahead(cracks)`` solves the tried network and returns its TIP rows with their
+    angles. Without ``correct`` the criterion's angles are followed as they are. ``memory``: of the last steps, brought
+    up to date.
     """
     chords = Chords(tips, memory)
     if correct:

@@ -14,7 +14,8 @@ OFF = 1e-6
 
 
 def sides_for(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """(m, 2, 2) the edges of ``mesh`` and, in a half-plane, a piece of its surface that goes beyond all of ``points`` (..., 2)."""
+    """(m, 2, 2) the edges of ``mesh`` and, in a half-plane, a piece of its surface that goes beyond all of ``points``
+    (..., 2)."""
     rock = mesh.cracks.half_plane
     if rock is None:
         return mesh.edges
@@ -23,7 +24,8 @@ def sides_for(mesh: Mesh, points: np.ndarray) -> np.ndarray:
 
 
 def onto_boundary(edges: np.ndarray, segment: np.ndarray, name: str, extent: float) -> tuple[np.ndarray, bool, int]:
-    """``segment`` (2, 2) put onto the one of ``edges`` (m, 2, 2) it lies on, whether it runs against that edge, and which.
+    """``segment`` (2, 2) put onto the one of ``edges`` (m, 2, 2) it lies on, whether it runs against that edge, and
+    which.
 
     Raises ValueError with ``name`` when it is off by more than `OFF` times ``extent``, or has no length.
     """

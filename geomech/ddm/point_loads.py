@@ -14,8 +14,8 @@ from .half_plane import HalfPlane
 class KelvinLoad:
     """A force (2,) N/m at ``point`` (2,) of the infinite plane (Kelvin 1848; Crouch & Starfield 1983, §4.2).
 
-    Logarithms in displacement are of distances in units of ``unit`` (m). Nearer than ``core`` m the force counts as spread,
-    evenly to both sides: no stress.
+    Logarithms in displacement are of distances in units of ``unit`` (m). Nearer than ``core`` m the force counts as
+    spread, evenly to both sides: no stress.
     """
 
     point: np.ndarray
@@ -93,8 +93,8 @@ class MelanLoad(KelvinLoad):
 
 @dataclass(frozen=True, eq=False)
 class WedgeLoad:
-    """A force (2,) N/m on the corner ``point`` (2,) of a wedge of half-angle ``half`` about ``axis`` (2,), a unit vector into
-    the rock: stress is radial, σ_rr = (A cosθ + B sinθ)/r (Michell 1902; half = π/2 is Flamant 1892).
+    """A force (2,) N/m on the corner ``point`` (2,) of a wedge of half-angle ``half`` about ``axis`` (2,), a unit
+    vector into the rock: stress is radial, σ_rr = (A cosθ + B sinθ)/r (Michell 1902; half = π/2 is Flamant 1892).
 
     θ runs from the axis; displacement is cut along θ = π, outside the rock.
     """

@@ -76,13 +76,13 @@ def propagate(
 ) -> Iterator[Step]:
     """Grow ``cracks`` in the body with outline ``loops`` ([] the infinite plane), one `Step` an increment.
 
-    ``load``: a `BodyLoad`, or ``load(factor, cracks)`` that gives one. ``control``: "load" holds the factor at 1 until no tip
-    is driven; "toughness" finds in every step the factor, starting from the last one, at which the largest K_eq/K_Ic is
-    one. A `BodyLoad` is then multiplied as a whole; with a function, part of the load can stand (in-situ stress) while
-    another rises, and where K does not rise steadily with the factor, some crossing of one is found, not always the
-    first. The run ends with the event "arrest" when nothing grows (or the factor would pass ``max_factor``), "split" when
-    cracks have cut off a part that nothing holds, or after ``max_steps``. ``body``: further arguments of `Body`. Raises
-    ValueError on an unknown control or criterion, and what `Body` and its ``solve`` raise.
+    ``load``: a `BodyLoad`, or ``load(factor, cracks)`` that gives one. ``control``: "load" holds the factor at 1 until
+    no tip is driven; "toughness" finds in every step the factor, starting from the last one, at which the largest
+    K_eq/K_Ic is one. A `BodyLoad` is then multiplied as a whole; with a function, part of the load can stand (in-situ
+    stress) while another rises, and where K does not rise steadily with the factor, some crossing of one is found, not
+    always the first. The run ends with the event "arrest" when nothing grows (or the factor would pass ``max_factor``),
+    "split" when cracks have cut off a part that nothing holds, or after ``max_steps``. ``body``: further arguments of
+    `Body`. Raises ValueError on an unknown control or criterion, and what `Body` and its ``solve`` raise.
     """
     if control not in ("load", "toughness"):
         raise ValueError(f'control must be "load" or "toughness", got {control!r}')

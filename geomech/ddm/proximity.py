@@ -2,8 +2,8 @@
 
 Between two faces at a distance d tractions vary over a length d: elements must not be much longer. Thin rock therefore
 takes many of them, its length over its thickness. Only in the acute angle where two faces meet they need not shrink for
-ever: what happens within a hundredth of the faces' length from there is not seen by K (of cracks that cross at 1° 6e-5 of
-it, at 3° 2e-7).
+ever: what happens within a hundredth of the faces' length from there is not seen by K (of cracks that cross at 1° 6e-5
+of it, at 3° 2e-7).
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ APART = 1.25
 #: The same for opposite sides of a body: what is left of equilibrium errors in a slender one is amplified by its
 #: slenderness squared.
 ACROSS = 0.6
-#: The same for elements of cracks that meet at an angle of less than `ACUTE`: they stand beside each other all along, however coarsely
-#: they are graded into the node. Graded ones, as long beside that angle as a ratio of 0.3 makes them, are left (0.15 left K of a fold
-#: by 165° 10 % off, by 168° anything).
+#: The same for elements of cracks that meet at an angle of less than `ACUTE`: they stand beside each other all along,
+#: however coarsely they are graded into the node. Graded ones, as long beside that angle as a ratio of 0.3 makes them,
+#: are left (0.15 left K of a fold by 165° 10 % off, by 168° anything).
 #: At order 2 and below they may be a share `LOW` of that, from a ratio `FINE` on whatever they are.
 BESIDE, ACUTE, GRADED, LOW, FINE = 3.5, np.radians(60), 1.05 * (1 / 0.3 - 1), 0.5, 0.299
 #: Elements of faces that meet are not halved below this part of the shorter face.
 AT_NODE = 0.01
-#: The same at a surface, where one of them is a side, or its own image behind a free surface: the thin rock between may be as good
-#: as loose, and what its end lacks of equilibrium bends it. (By dislocations, short cracks at 3.5° to a side: K 1 % off; 64 % where
-#: only a ten-thousandth of the longer face was.)
+#: The same at a surface, where one of them is a side, or its own image behind a free surface: the thin rock between may
+#: be as good as loose, and what its end lacks of equilibrium bends it. (By dislocations, short cracks at 3.5° to a
+#: side: K 1 % off; 64 % where only a ten-thousandth of the longer face was.)
 AT_BOUNDARY = 0.0001
 #: Elements are not halved below this part of the largest extent of the geometry.
 FLOOR = 1e-10
@@ -53,13 +53,13 @@ def crowding(
 ):
     """(n,) the largest length / (allowed length) of each element over all others.
 
-    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``), ``chained``
-    times it where the two lie on one source or on two that meet, whose grading already ties sizes to distances; there
-    elements below the part ``at_node`` (``at_boundary`` at a surface: where one is an edge, or one alone is of the images,
-    sources from ``images`` on) of the shorter ``span`` (n_sources,) are left alone. ``meeting`` (n_sources, n_sources) is 0
-    for sources that do not meet, 1 for those that do, −sin of the angle between cracks where that is acute: there `BESIDE`
-    and ``beside`` times `GRADED` count. Elements that share an end are not compared, but for the tip at the other end
-    (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
+    Allowed is ``apart`` times the distance, ``across`` times it between two edges (sources below ``n_edges``),
+    ``chained`` times it where the two lie on one source or on two that meet, whose grading already ties sizes to
+    distances; there elements below the part ``at_node`` (``at_boundary`` at a surface: where one is an edge, or one
+    alone is of the images, sources from ``images`` on) of the shorter ``span`` (n_sources,) are left alone. ``meeting``
+    (n_sources, n_sources) is 0 for sources that do not meet, 1 for those that do, −sin of the angle between cracks
+    where that is acute: there `BESIDE` and ``beside`` times `GRADED` count. Elements that share an end are not
+    compared, but for the tip at the other end (``tip`` 1 at the start, 2 at the end, 3 both) of the neighbour.
     """
     middle = 0.5 * (start[:, 0] + end[:, 0])
     length = np.hypot(end[:, 0] - start[:, 0], end[:, 1] - start[:, 1])
@@ -143,12 +143,13 @@ def _crowding(
 
 
 def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, extent, unknowns, images=None):
-    """Elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) with those halved that stand too close to another.
+    """Elements (``start``, ``end`` (n, 2), ``kind``, ``source`` (n,)) with those halved that stand too close to
+    another.
 
-    ``pieces`` (n_sources, 2, 2) are the edges, then the crack segments, ``touching`` (n_sources, n_sources) which of them
-    meet; ``ratio`` that of graded elements, ``unknowns`` those of an element; sources from ``images`` on are behind a free
-    surface. Raises ValueError, saying where, when rock is too thin for that: it would take too many elements, or shorter
-    ones than coordinates can tell apart.
+    ``pieces`` (n_sources, 2, 2) are the edges, then the crack segments, ``touching`` (n_sources, n_sources) which of
+    them meet; ``ratio`` that of graded elements, ``unknowns`` those of an element; sources from ``images`` on are
+    behind a free surface. Raises ValueError, saying where, when rock is too thin for that: it would take too many
+    elements, or shorter ones than coordinates can tell apart.
     """
     # A graded element is 1/ratio times its distance to the next but one.
     chained = max(2.5, 1.05 / ratio)

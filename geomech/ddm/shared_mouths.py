@@ -1,7 +1,8 @@
 """Cracks that leave the boundary at one mouth and close a ring: they would cut out a piece whose corner is that mouth.
 
-The rock around such a piece would hang together by a point, which no body does. So one of the two cracks at the mouth is moved a
-sliver along the boundary, away from the piece: then the piece has an edge there, and the rock around it two ends.
+The rock around such a piece would hang together by a point, which no body does. So one of the two cracks at the mouth
+is moved a sliver along the boundary, away from the piece: then the piece has an edge there, and the rock around it two
+ends.
 """
 
 from __future__ import annotations
@@ -42,9 +43,9 @@ def part_mouths(
     distance: float,
     free: Callable[[int, Point, Obstacle, Row], bool],
 ) -> None:
-    """Give the two cracks of a mouth, which a ``chain`` of nodes closed at ``joined`` goes through, one each: that on the outside of
-    the ring goes on from ``distance`` m along the boundary. ``free(node, at, edge, row)``: whether ``row`` may run from ``node`` to ``at``
-    on the ``edge``. Where there is no room nothing is done."""
+    """Give the two cracks of a mouth, which a ``chain`` of nodes closed at ``joined`` goes through, one each: that on
+    the outside of the ring goes on from ``distance`` m along the boundary. ``free(node, at, edge, row)``: whether
+    ``row`` may run from ``node`` to ``at`` on the ``edge``. Where there is no room nothing is done."""
     ring = [*chain, joined] if chain[-1] != joined else chain
     for before, mouth, after in zip(ring, ring[1:], ring[2:]):
         if network.surface[mouth]:
@@ -91,8 +92,8 @@ def _part(network: Network, block: int, mouth: int, neighbours: tuple[int, int],
 def own_mouth_at(
     network: Network, tip: int, obstacle: Obstacle, node: int | None, at: Point, distance: float
 ) -> Point | None:
-    """The mouth that the crack of ``tip`` has come from, if it is nearer than ``distance`` to ``at`` on the boundary, where a step would
-    end on an ``obstacle``, or at its ``node``."""
+    """The mouth that the crack of ``tip`` has come from, if it is nearer than ``distance`` to ``at`` on the boundary,
+    where a step would end on an ``obstacle``, or at its ``node``."""
     if not (obstacle.row is None if node is None else network.surface[node]):
         return None
     for row in network.within(tip, math.inf):

@@ -77,8 +77,8 @@ class Solution:
 
     @cached_property
     def states(self) -> np.ndarray:
-        """(n_elements, p+1) OPEN, STICK or SLIP at the collocation nodes of the crack elements; smooth faces that are closed
-        SLIP."""
+        """(n_elements, p+1) OPEN, STICK or SLIP at the collocation nodes of the crack elements; smooth faces that are
+        closed SLIP."""
         c = self.body.faces
         closed = self.closed.reshape(c.n, 2, c.per)[:, 1]
         if self.memory is None:
@@ -127,7 +127,8 @@ class Solution:
 
     @cached_property
     def tip_errors(self) -> np.ndarray:
-        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, against a finer mesh (`estimate`): as much work again."""
+        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, against a finer mesh (`estimate`): as much work
+        again."""
         from .estimate import tip_errors
 
         return tip_errors(self)
@@ -152,9 +153,9 @@ class Solution:
 
     @cached_property
     def reserve(self) -> np.ndarray:
-        """(n_elements, p+1) Pa: how far faces are from leaving their `states`, linear in the load while all states stand. Open
-        ones: the stress that closes a crack as long as their element by their gap (inf: they never meet); sticking ones: what
-        is left of their strength, or of what presses them; others that are closed the latter."""
+        """(n_elements, p+1) Pa: how far faces are from leaving their `states`, linear in the load while all states
+        stand. Open ones: the stress that closes a crack as long as their element by their gap (inf: they never meet);
+        sticking ones: what is left of their strength, or of what presses them; others that are closed the latter."""
         laws, faces = self.body.laws, self.faces
         normal, shear = faces.traction[:, 1:-1].transpose(2, 0, 1)
         broken = np.zeros(len(laws.closes), bool) if self.memory is None else self.memory.broken
@@ -175,8 +176,8 @@ class Solution:
 
     @cached_property
     def crack_energy(self) -> float:
-        """J/m by which the body's elastic energy is larger than without jumps at its cracks: ½ ∫ (t₀ − t)·[u] ds (Clapeyron),
-        t₀ the traction that the loads bring to closed faces, t that on the faces."""
+        """J/m by which the body's elastic energy is larger than without jumps at its cracks: ½ ∫ (t₀ − t)·[u] ds
+        (Clapeyron), t₀ the traction that the loads bring to closed faces, t that on the faces."""
         body, c = self.body, self.body.faces
         if not self.jumps.size:
             return 0.0
@@ -185,8 +186,8 @@ class Solution:
 
     @cached_property
     def residual(self) -> float:
-        """Largest traction left over at the collocation nodes, relative to the largest applied there. Mostly what loads,
-        discretised, lack in equilibrium; logs a warning above 1e-3."""
+        """Largest traction left over at the collocation nodes, relative to the largest applied there. Mostly what
+        loads, discretised, lack in equilibrium; logs a warning above 1e-3."""
         body = self.body
         # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
         follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
@@ -211,15 +212,16 @@ class Solution:
     def stress(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
 
-        Above the surface of a half-plane there is none: zero. On a boundary it is the rock's, on a crack that of the upper face (left of its segment), or the lower with ``side``
-        −1. At crack tips it is that a fiftieth of the element's length beside, and so it is nearer than that to other
-        ends of elements (corners, crack nodes): the discrete field has no value there.
+        Above the surface of a half-plane there is none: zero. On a boundary it is the rock's, on a crack that of the
+        upper face (left of its segment), or the lower with ``side`` −1. At crack tips it is that a fiftieth of the
+        element's length beside, and so it is nearer than that to other ends of elements (corners, crack nodes): the
+        discrete field has no value there.
         """
         return self._total(points, side)[0]
 
     def principal_stress(self, points: np.ndarray, side: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """(n, 2) in-plane principal stresses of `stress`, Pa, the larger first, and the angle (n,) from x to the larger one's
-        direction, rad, in (−π/2, π/2]."""
+        """(n, 2) in-plane principal stresses of `stress`, Pa, the larger first, and the angle (n,) from x to the larger
+        one's direction, rad, in (−π/2, π/2]."""
         xx, yy, xy = self.stress(points, side).T
         mean, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
         return np.column_stack([mean + radius, mean - radius]), 0.5 * np.arctan2(2 * xy, xx - yy)
@@ -268,8 +270,8 @@ class Solution:
         for part in self._applied.lines:
             add(part.start, part.end, np.zeros(len(part.start), np.int64), part.density, 2 * OFF * body._extent, True)
         if body.outlined:
-            # Forces that are in equilibrium but for the discretisation's error: their logarithms in units of the body, or
-            # displacement would know the unit of length.
+            # Forces that are in equilibrium but for the discretisation's error: their logarithms in units of the body,
+            # or displacement would know the unit of length.
             shift += net * (3 - 4 * nu) * np.log(body._extent) / (4 * np.pi * (1 - nu))
         shift /= 2 * body.material.shear_modulus
         stress, shift = stress + self._applied.stress(where), shift + self._applied.displacement(where)
@@ -328,10 +330,11 @@ class Solution:
 def _kelvin_constant(
     start: np.ndarray, end: np.ndarray, density: np.ndarray, nu: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(2,) 2μ times the translation by which line forces in their own frames differ from Kelvin's solution, and their sum.
+    """(2,) 2μ times the translation by which line forces in their own frames differ from Kelvin's solution, and their
+    sum.
 
-    The kernels have −y²/r² for his x²/r² = 1 − y²/r², which moves every element by a constant along itself; without it the
-    plane would not be at rest far away.
+    The kernels have −y²/r² for his x²/r² = 1 − y²/r², which moves every element by a constant along itself; without it
+    the plane would not be at rest far away.
     """
     whole = 0.5 * density @ shapes.moments()[shapes.ORDINARY, : density.shape[2]]
     along = end - start

@@ -1,8 +1,8 @@
 """Supports: pieces of the boundary on which displacement is imposed instead of traction, in both directions or in one.
 
-On an element that a support holds, the known displacement goes to the right-hand side and the unknown is the reaction, a
-Kelvin line force with the shape functions that displacement has elsewhere. What is held is a pair of directions of every
-element, so that rollers may stand at any angle to the side they are on.
+On an element that a support holds, the known displacement goes to the right-hand side and the unknown is the reaction,
+a Kelvin line force with the shape functions that displacement has elsewhere. What is held is a pair of directions of
+every element, so that rollers may stand at any angle to the side they are on.
 """
 
 from __future__ import annotations
@@ -27,8 +27,10 @@ _KINDS = ("both", "normal", "tangent", "x", "y")
 class Support:
     """A piece of a body's boundary that is held.
 
-    on     the number of an edge (the outline's first, then the holes'), or a straight piece of the boundary ((x, y), (x, y)), m
-    hold   "both" (pinned), "normal" (a roller: free to slide along the side), "tangent", "x", "y", or a direction (x, y)
+    on     the number of an edge (the outline's first, then the holes'), or a straight piece of the boundary ((x, y),
+           (x, y)), m
+    hold   "both" (pinned), "normal" (a roller: free to slide along the side), "tangent", "x", "y", or a direction (x,
+           y)
     name   what messages call it
 
     The displacement is zero unless `BodyLoad.displacements` says otherwise. Raises ValueError naming the support.
@@ -58,8 +60,8 @@ class Support:
 
 
 def place(supports: Sequence[Support], edges: np.ndarray, extent: float) -> np.ndarray:
-    """(k, 2, 2) where the ``supports`` stand, each along the one of ``edges`` (m, 2, 2) it is on. Raises ValueError naming the
-    support: no such edge, off the boundary, no length, overlap."""
+    """(k, 2, 2) where the ``supports`` stand, each along the one of ``edges`` (m, 2, 2) it is on. Raises ValueError
+    naming the support: no such edge, off the boundary, no length, overlap."""
     out = np.empty((len(supports), 2, 2))
     on = np.empty(len(supports), int)
     for k, support in enumerate(supports):
@@ -84,10 +86,12 @@ def place(supports: Sequence[Support], edges: np.ndarray, extent: float) -> np.n
 def marks(
     supports: Sequence[Support], placed: np.ndarray, loops: Sequence[np.ndarray], layers: int
 ) -> list[tuple[np.ndarray, int]]:
-    """Where the boundary needs nodes and how many graded layers there: the ends of the ``placed`` supports on ``loops``.
+    """Where the boundary needs nodes and how many graded layers there: the ends of the ``placed`` supports on
+    ``loops``.
 
-    Reactions are singular there like r^(−½) inside a side. At a corner they are so between a pinned and a free side, but not
-    at a right angle between a roller and a free side (mirrored there, the corner is none) or between two held sides.
+    Reactions are singular there like r^(−½) inside a side. At a corner they are so between a pinned and a free side,
+    but not at a right angle between a roller and a free side (mirrored there, the corner is none) or between two held
+    sides.
     """
     tiny = 1e-9 * np.ptp(loops[0], axis=0).max()
     before = np.concatenate([np.roll(loop, 1, axis=0) for loop in loops])
@@ -125,7 +129,8 @@ class Holds:
     held        (h, 2)    bool, in which of the two the element is held
     sources     the held elements
 
-    Unknown reactions are multiplied by their element's length, which makes their columns as large as those of displacements.
+    Unknown reactions are multiplied by their element's length, which makes their columns as large as those of
+    displacements.
     """
 
     def __init__(self, boundary: ElementSet, supports: Sequence[Support], placed: np.ndarray, extent: float):
@@ -194,7 +199,8 @@ class Holds:
         return matrix
 
     def mixed(self, jumps: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Columns (r, n_unknowns) of unit ``jumps`` on the boundary with those of unit ``forces`` (r, h_unknowns) where held."""
+        """Columns (r, n_unknowns) of unit ``jumps`` on the boundary with those of unit ``forces`` (r, h_unknowns) where
+        held."""
         out = np.asfortranarray(jumps).copy(order="F")
         self._swap(out, np.asfortranarray(forces), self.elements, np.arange(len(self.elements)))
         return out
@@ -219,7 +225,8 @@ class Holds:
         return np.einsum("hjc,hjn->hcn", self.directions, turned).ravel()
 
     def split(self, x: np.ndarray, imposed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """From unknowns ``x`` (n_unknowns,) the displacement of the whole boundary, local, and the reactions (h_unknowns,)."""
+        """From unknowns ``x`` (n_unknowns,) the displacement of the whole boundary, local, and the reactions
+        (h_unknowns,)."""
         b = self.boundary
         rows = x.reshape(b.n, 2, b.per)
         mine, free = rows[self.elements], rows.copy()
@@ -230,7 +237,8 @@ class Holds:
         return free.ravel(), reaction.ravel()
 
     def joined(self, displacement: np.ndarray, reactions: np.ndarray) -> np.ndarray:
-        """(n_unknowns,) the transposed of `split`: where the boundary is held from ``reactions``, else from ``displacement``."""
+        """(n_unknowns,) the transposed of `split`: where the boundary is held from ``reactions``, else from
+        ``displacement``."""
         b = self.boundary
         out = self.turned(displacement).reshape(b.n, 2, b.per)
         own = np.einsum("hjc,hcn->hjn", self.directions, reactions.reshape(-1, 2, b.per))
@@ -252,8 +260,8 @@ class Holds:
 def values_at(
     value: np.ndarray | Callable[[np.ndarray], np.ndarray] | None, segment: np.ndarray, points: np.ndarray, name: str
 ) -> np.ndarray:
-    """(n, 2) what ``value`` is at ``points`` (n, 2): a constant (2,), linear along ``segment`` from (2, 2) its values at the
-    ends, or a function of points; None is zero. Raises ValueError with ``name``."""
+    """(n, 2) what ``value`` is at ``points`` (n, 2): a constant (2,), linear along ``segment`` from (2, 2) its values
+    at the ends, or a function of points; None is zero. Raises ValueError with ``name``."""
     if value is None:
         return np.zeros((len(points), 2))
     if callable(value):

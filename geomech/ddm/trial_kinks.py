@@ -1,9 +1,9 @@
 """The F-criterion on kinks that are tried: a short fictitious extension at every tip, solved in many directions.
 
 For a kink of no length what presses on its faces vanishes beside its k_1 and k_2, so that under compression the energy
-criteria see wings that open where a real extension would be pressed shut. So, as Shen & Stephansson (1993) do, every tip is
-extended by a given length in one direction after the other, the body is solved with the kinks' faces in contact (with
-friction, where their crack has it), and the direction with the largest
+criteria see wings that open where a real extension would be pressed shut. So, as Shen & Stephansson (1993) do, every
+tip is extended by a given length in one direction after the other, the body is solved with the kinks' faces in contact
+(with friction, where their crack has it), and the direction with the largest
 
     F = (k_1/K_Ic)² + (k_2/K_IIc)²
 
@@ -154,7 +154,8 @@ def _owners(cracks: Cracks, nodes: np.ndarray) -> np.ndarray:
 
 
 def _load(load: BodyLoad, cracks: Cracks, at: np.ndarray) -> BodyLoad:
-    """``load`` on the kinked network: where every segment has its own fluid's pressure, a kink has that of its crack."""
+    """``load`` on the kinked network: where every segment has its own fluid's pressure, a kink has that of its
+    crack."""
     pressure = load.crack_pressure
     if callable(pressure) or not np.ndim(pressure):
         return load

@@ -28,9 +28,10 @@ _AT_ONCE = 256
 class UnitLoad:
     """What unit loads do, one a column of ``applied``: tractions g on the boundary above r on the cracks.
 
-    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹ g, of
-    which ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against`` whether they were
-    given against the boundary's direction; or ``densities`` (m, 2, 3, columns) are what acts on the m edges of the body.
+    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹
+    g, of which ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against``
+    whether they were given against the boundary's direction; or ``densities`` (m, 2, 3, columns) are what acts on the m
+    edges of the body.
     """
 
     def __init__(
@@ -47,8 +48,8 @@ class UnitLoad:
 
 
 class Eliminated:
-    """A ``load`` (n,) on the boundary, ``y`` = A_ΓΓ⁻¹ load and A_CΓ y ``on_faces`` (n_elements, width), both of which outlast
-    growth; ``new`` are the elements where the latter is not worked out yet."""
+    """A ``load`` (n,) on the boundary, ``y`` = A_ΓΓ⁻¹ load and A_CΓ y ``on_faces`` (n_elements, width), both of which
+    outlast growth; ``new`` are the elements where the latter is not worked out yet."""
 
     def __init__(self, load: np.ndarray, y: np.ndarray, on_faces: np.ndarray, new: np.ndarray | None = None):
         self.load, self.y, self.on_faces = load, y, on_faces
@@ -99,7 +100,8 @@ class UnitLoads:
         self._last: Eliminated | None = None
 
     def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
-        """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old numbers."""
+        """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old
+        numbers."""
         n_g = self.boundary.n_unknowns
         if old._last is not None:
             self._last = old._last.grown(c_old)
@@ -153,7 +155,8 @@ class UnitLoads:
         cg: np.ndarray,
         opened: Callable[[np.ndarray], np.ndarray],
     ) -> tuple[np.ndarray, ...]:
-        """g, r, y, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and cracks.
+        """g, r, y, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and
+        cracks.
 
         ``cg`` is A_CΓ, ``opened`` applies S⁻¹.
         """
@@ -245,9 +248,9 @@ class UnitLoads:
     def _edge_load(self, name: str | int) -> UnitLoad:
         """What acts on whole edges.
 
-        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy, in a half-plane the three slopes; "remote": the three uniform stresses of the plane
-        or the body, which holes leave without traction; a number: pressure in that hole, constant and growing with x and with y
-        from its centre.
+        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy, in a half-plane the three slopes; "remote": the
+        three uniform stresses of the plane or the body, which holes leave without traction; a number: pressure in that
+        hole, constant and growing with x and with y from its centre.
         """
         densities = self._edge_densities(name)
         applied = [self._from_edges(self.boundary, densities), self._on_faces(name, self.faces, densities)]

@@ -9,14 +9,16 @@ import numpy as np
 from ..model import Cracks
 from ..model.polygon import signed_area
 
-#: Coordinates must resolve a segment to this part of its length: K is off by some fifty times that (its elements are shorter).
+#: Coordinates must resolve a segment to this part of its length: K is off by some fifty times that (its elements are
+#: shorter).
 FEWEST_DIGITS = 1e-5
 #: Lengths below this part of the extent are zero.
 _SMALL = 1e-9
-#: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: there K begins to be off by more
-#: than grading mends.
+#: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: there K begins to be off
+#: by more than grading mends.
 SHARPEST_FOLD, SHARPEST_MOUTH = np.radians(10.0), np.radians(3.0)
-#: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two thousand.
+#: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two
+#: thousand.
 _PAIRS_AT_ONCE = 4_000_000
 
 
@@ -28,8 +30,8 @@ def outlined(loops: list[np.ndarray]) -> bool:
 def check_outline(loops: list[np.ndarray], holes: Sequence[np.ndarray] = ()) -> list[np.ndarray]:
     """``loops`` (an outline and its holes, or none) and further ``holes``, which may run either way, as float arrays.
 
-    Raises ValueError naming the loop: shape, finiteness, repeated vertices, sense of rotation (outline counter-clockwise,
-    holes clockwise), crossing edges, holes outside the outline or in each other.
+    Raises ValueError naming the loop: shape, finiteness, repeated vertices, sense of rotation (outline
+    counter-clockwise, holes clockwise), crossing edges, holes outside the outline or in each other.
     """
     out = [_checked(loop, "the outline" if k == 0 else f"hole {k}") for k, loop in enumerate(loops)]
     for k, loop in enumerate(out):
@@ -80,9 +82,9 @@ def _checked(loop: np.ndarray, name: str) -> np.ndarray:
 
 def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fresh: np.ndarray | None = None) -> None:
     """Raise ValueError naming the crack: not finite, no length, outside the rock, on the boundary without being a
-    mouth, crossing the outline or lying along it, crossing, covering or touching another without a shared node, folding back
-    on itself or leaving the boundary at an angle too sharp to be resolved. ``fresh`` (n_segments,) bool limits the comparison
-    to segments that are new."""
+    mouth, crossing the outline or lying along it, crossing, covering or touching another without a shared node, folding
+    back on itself or leaving the boundary at an angle too sharp to be resolved. ``fresh`` (n_segments,) bool limits the
+    comparison to segments that are new."""
     n = cracks.n_segments
     if n == 0:
         return

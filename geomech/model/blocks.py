@@ -167,8 +167,8 @@ class Blocks:
 
     @cached_property
     def affine_fit(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n_blocks, 2) the mean c of each block's reference vertices, and weights w (n_vertices, 2): the affine motion that
-        fits given vertices x best has the gradient Σ (x − mean x) ⊗ w."""
+        """(n_blocks, 2) the mean c of each block's reference vertices, and weights w (n_vertices, 2): the affine motion
+        that fits given vertices x best has the gradient Σ (x − mean x) ⊗ w."""
         centre, start = self.mean_vertices(self.vertices), self.vertex_start[:-1]
         arm = self.vertices - centre[self.vertex_block]
         moments = np.add.reduceat(arm[:, :, None] * arm[:, None, :], start, axis=0)
@@ -176,8 +176,8 @@ class Blocks:
 
     @cached_property
     def side_start(self) -> list[int]:
-        """(n_vertices,) the first edge of the straight side that each edge is part of: a block's strain, which is the same
-        all over it, leaves straight sides straight."""
+        """(n_vertices,) the first edge of the straight side that each edge is part of: a block's strain, which is the
+        same all over it, leaves straight sides straight."""
         along = self.vertices[self.next_vertex] - self.vertices
         before = along[self.previous_vertex]
         ahead = before[:, 0] * along[:, 0] + before[:, 1] * along[:, 1]

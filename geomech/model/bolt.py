@@ -40,8 +40,8 @@ class Bolt:
     shear_stiffness  N/m, dowel action: resistance across its axis, up to ``shear_strength`` N/m (perfectly plastic)
     compression      True: it also takes compression, down to −yield_force (a grouted bar); else it goes slack
 
-    Raises ValueError naming the bolt for a stiffness or strength that is not positive, a pretension beyond the yield force,
-    ends that are one point.
+    Raises ValueError naming the bolt for a stiffness or strength that is not positive, a pretension beyond the yield
+    force, ends that are one point.
     """
 
     block: int
@@ -99,11 +99,11 @@ def grouted_bolt(
 ) -> tuple[Bolt, ...]:
     """A fully grouted bar from ``start`` to ``end`` as short bolts, one where it crosses from a block into the next.
 
-    Grouted all along, a bar in blocky rock works where joints open or slide, over a short *active length* about the joint
-    (m, of the order of a few diameters to half a metre; local reinforcement, Lorig 1985): each crossing becomes a `Bolt` of
-    stiffness ``axial_stiffness`` (EA, N per metre of thickness) over ``active_length``, its ends half that length into the two
-    blocks (less where a block is thinner). ``properties`` as for `Bolt`; it takes compression too unless told otherwise.
-    Raises CrossesNoJoint when the bar does not.
+    Grouted all along, a bar in blocky rock works where joints open or slide, over a short *active length* about the
+    joint (m, of the order of a few diameters to half a metre; local reinforcement, Lorig 1985): each crossing becomes a
+    `Bolt` of stiffness ``axial_stiffness`` (EA, N per metre of thickness) over ``active_length``, its ends half that
+    length into the two blocks (less where a block is thinner). ``properties`` as for `Bolt`; it takes compression too
+    unless told otherwise. Raises CrossesNoJoint when the bar does not.
     """
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.hypot(*(b - a)))
@@ -130,8 +130,8 @@ def grouted_bolt(
 
 
 def _pieces(blocks: Blocks, a: np.ndarray, b: np.ndarray) -> list[tuple[int, float, float]]:
-    """The blocks that the line from ``a`` to ``b`` passes, in order, each with the distances from ``a`` where it enters and
-    leaves."""
+    """The blocks that the line from ``a`` to ``b`` passes, in order, each with the distances from ``a`` where it enters
+    and leaves."""
     along = b - a
     length = float(np.hypot(*along))
     p, q = blocks.vertices, blocks.vertices[blocks.next_vertex]

@@ -21,7 +21,8 @@ class Cracks:
         aperture      (n_segments,)     initial aperture, m: 0 is a closed crack, inf a slot that never closes
         surface       (n_nodes,)        True where a node lies on its block's boundary (a crack mouth)
         names         tuple of str      one name a crack
-        law           (n_segments,)     the law of its faces, an index among those given to who solves; zeros if left out
+        law           (n_segments,)     the law of its faces, an index among those given to who solves; zeros if left
+                      out
 
     A node that ends one segment only and is not on the surface is a *tip*. A node shared by three or more segments,
     or by two cracks, is a junction.

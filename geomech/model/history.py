@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-#: What a column of a record may be given in, and how many SI units one of them is. Standard gravity is 9.80665 m/s² (ISO
-#: 80000-3), 1 gal = 1 cm/s².
+#: What a column of a record may be given in, and how many SI units one of them is. Standard gravity is 9.80665 m/s²
+#: (ISO 80000-3), 1 gal = 1 cm/s².
 UNITS = {
     "s": 1.0,
     "ms": 1e-3,
@@ -49,8 +49,8 @@ _TIMES = ("s", "ms", "min", "h", "d", "")
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """``amplitude`` (k,) · sin(2π ``frequency`` (t − ``start``) + ``phase``) from ``start`` to ``end`` (s), zero elsewhere;
-    frequency in Hz, phase in rad."""
+    """``amplitude`` (k,) · sin(2π ``frequency`` (t − ``start``) + ``phase``) from ``start`` to ``end`` (s), zero
+    elsewhere; frequency in Hz, phase in rad."""
 
     amplitude: np.ndarray
     frequency: float
@@ -117,7 +117,8 @@ class History:
     def sinusoid(
         cls, amplitude, frequency: float, *, phase: float = 0.0, start: float = 0.0, end: float = math.inf, mean=None
     ) -> History:
-        """``mean`` (zero) and from ``start`` to ``end`` ``amplitude`` · sin(2π ``frequency`` (t − start) + ``phase``)."""
+        """``mean`` (zero) and from ``start`` to ``end`` ``amplitude`` · sin(2π ``frequency`` (t − start) +
+        ``phase``)."""
         amplitude = np.atleast_1d(np.asarray(amplitude, dtype=float))
         base = cls.constant(np.zeros(len(amplitude)) if mean is None else mean)
         return replace(base, wave=Wave(amplitude, frequency, phase, start, end))
@@ -130,7 +131,8 @@ class History:
 
     @classmethod
     def from_file(cls, path: str | Path, columns: int | None = None, scale=1.0) -> History:
-        """The record in the text file ``path``: time, then one or more values in a line (`read_record`), times ``scale``.
+        """The record in the text file ``path``: time, then one or more values in a line (`read_record`), times
+        ``scale``.
 
         ``columns``: how many values there must be. A one-column record is made a vector by a ``scale`` (k,).
         """
@@ -206,8 +208,8 @@ class History:
 
 
 def baseline_corrected(acceleration: History, degree: int = 1) -> History:
-    """The record less the polynomial of ``degree`` in time whose velocity fits the record's best (least squares), so that
-    the base comes to rest and does not drift away: degree 0 takes a constant acceleration off, 1 a linear one.
+    """The record less the polynomial of ``degree`` in time whose velocity fits the record's best (least squares), so
+    that the base comes to rest and does not drift away: degree 0 takes a constant acceleration off, 1 a linear one.
 
     Raises ValueError for a record of fewer times than coefficients, or one that runs on for ever.
     """
@@ -226,13 +228,13 @@ def baseline_corrected(acceleration: History, degree: int = 1) -> History:
 
 
 def read_record(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
-    """(times (n,) s, values (n, k)) of a text file in SI units: time and one or more values in a line, parted by commas,
-    semicolons, tabs or blanks.
+    """(times (n,) s, values (n, k)) of a text file in SI units: time and one or more values in a line, parted by
+    commas, semicolons, tabs or blanks.
 
-    Empty lines and what follows a ``#`` are skipped. The first line may be a header that names the columns, each with its
-    unit in brackets or parentheses: ``time [s], acceleration [g]``; without it, SI units hold. Raises ValueError naming
-    file and line for a unit that is not known, columns that are missing or too many, what is not a number, and times that
-    do not ascend; FileNotFoundError when there is no such file.
+    Empty lines and what follows a ``#`` are skipped. The first line may be a header that names the columns, each with
+    its unit in brackets or parentheses: ``time [s], acceleration [g]``; without it, SI units hold. Raises ValueError
+    naming file and line for a unit that is not known, columns that are missing or too many, what is not a number, and
+    times that do not ascend; FileNotFoundError when there is no such file.
     """
     path = Path(path)
     rows: list[list[float]] = []

@@ -24,10 +24,11 @@ def _known_kind(kind: str, what: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class BlockMotion:
-    """The motion of ``block`` in some of its unknowns, exact: u0, v0 (m) of its centroid, r0 (rad), the strains ex, ey, gxy.
+    """The motion of ``block`` in some of its unknowns, exact: u0, v0 (m) of its centroid, r0 (rad), the strains ex, ey,
+    gxy.
 
-    ``history`` has a column for each of ``unknowns``: their values since time 0, or their rates. The rest of the unknowns
-    follow their equations of motion. A fixed block moves as u0, v0 and r0 say and rests in what is not named.
+    ``history`` has a column for each of ``unknowns``: their values since time 0, or their rates. The rest of the
+    unknowns follow their equations of motion. A fixed block moves as u0, v0 and r0 say and rests in what is not named.
     """
 
     block: int
@@ -64,8 +65,8 @@ def _rate(history: History, kind: str, start: float, end: float) -> np.ndarray:
 class PointMotion:
     """The motion of the material point ``at`` (reference coordinates) of ``block``.
 
-    ``history``: its displacement since time 0 (m), or its velocity; two columns, x and y, or one along ``direction``, the
-    point then being free across it. Exact, or by a spring of ``stiffness`` (N/m per metre of thickness).
+    ``history``: its displacement since time 0 (m), or its velocity; two columns, x and y, or one along ``direction``,
+    the point then being free across it. Exact, or by a spring of ``stiffness`` (N/m per metre of thickness).
     """
 
     block: int
@@ -107,9 +108,9 @@ class BaseMotion:
     """Shaking: ``acceleration`` (x and y, m/s²) of the ground.
 
     ``frame`` "ground": the fixed blocks (all, or those in ``blocks``) move as the record says, from rest at time 0, and
-    everything is seen from the ground at rest. "base": seen by one who rides on the base, the fixed blocks stand and every
-    block feels the body force −ρ a; in a step it is the record's mean, so that velocities are exact. Both are the same
-    motion when all fixed blocks shake together.
+    everything is seen from the ground at rest. "base": seen by one who rides on the base, the fixed blocks stand and
+    every block feels the body force −ρ a; in a step it is the record's mean, so that velocities are exact. Both are the
+    same motion when all fixed blocks shake together.
     """
 
     acceleration: History

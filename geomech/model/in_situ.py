@@ -9,7 +9,8 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class InSituStress:
-    """σ(x) = ``stress`` + ``gradient`` · (x − ``about``): components (xx, yy, xy), Pa, tension positive; ``gradient`` (3, 2) Pa/m.
+    """σ(x) = ``stress`` + ``gradient`` · (x − ``about``): components (xx, yy, xy), Pa, tension positive; ``gradient``
+    (3, 2) Pa/m.
 
     Raises ValueError for arrays of other shapes or values that are not finite.
     """
@@ -26,8 +27,8 @@ class InSituStress:
 
     @classmethod
     def geostatic(cls, surface: float, unit_weight: float, k0: float, *, surcharge: float = 0.0) -> InSituStress:
-        """σ_v = −(``surcharge`` + ``unit_weight`` · depth) below the level ``surface`` (m), σ_h = ``k0`` σ_v, principal axes upright;
-        ``unit_weight`` ρg N/m³, ``surcharge`` Pa."""
+        """σ_v = −(``surcharge`` + ``unit_weight`` · depth) below the level ``surface`` (m), σ_h = ``k0`` σ_v, principal
+        axes upright; ``unit_weight`` ρg N/m³, ``surcharge`` Pa."""
         if not k0 >= 0:
             raise ValueError(f"the ratio K0 of horizontal to vertical stress must not be negative, got {k0!r}")
         share = np.array([k0, 1.0, 0.0])
@@ -36,7 +37,8 @@ class InSituStress:
         return cls(-surcharge * share, gradient, (0.0, surface))
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """(..., 3) Pa at ``points`` (..., 2); above the surface of a geostatic field it would pull, which is cut off nowhere."""
+        """(..., 3) Pa at ``points`` (..., 2); above the surface of a geostatic field it would pull, which is cut off
+        nowhere."""
         return (
             np.asarray(self.stress, dtype=float)
             + (points - np.asarray(self.about, dtype=float)) @ np.asarray(self.gradient, dtype=float).T

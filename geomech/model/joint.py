@@ -70,19 +70,22 @@ class Roughness:
 
 @dataclass(frozen=True)
 class JointLaw:
-    """Strength and stiffness of a joint; strengths are Pa (times a contact's tributary length), angles rad. A bonded face fails
-    as one, in tension at its extreme fibre, in shear by c ℓ + N tan φ of all of it.
+    """Strength and stiffness of a joint; strengths are Pa (times a contact's tributary length), angles rad. A bonded
+    face fails as one, in tension at its extreme fibre, in shear by c ℓ + N tan φ of all of it.
 
     friction_angle, cohesion    of the joint before it has slipped (its peak); with ``roughness`` the angle is φr
     tensile_strength            lost with the cohesion's peak when either fails
     residual_friction_angle     after slip (None: as before), residual_cohesion likewise
-    softening_slip              m of slip over which tan φ and cohesion fall in a straight line to the residual; 0: at once
-    dilation_angle              sliding lifts the faces by tan ψ times the slip, up to ``dilation_slip`` m from the start
+    softening_slip              m of slip over which tan φ and cohesion fall in a straight line to the residual; 0: at
+                                once
+    dilation_angle              sliding lifts the faces by tan ψ times the slip, up to ``dilation_slip`` m from the
+                                start
     roughness                   curved strength of Barton and Bandis, with its own dilation and its own decay
-    normal_stiffness, shear_stiffness   Pa/m, or None for the solver's penalty springs; a face with a normal stiffness resists
+    normal_stiffness, shear_stiffness   Pa/m, or None for the solver's penalty springs; a face with a normal stiffness
+                                        resists
                                 rotation as a bed of springs that cannot pull
-    max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J. Rock
-                                Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
+    max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J.
+                                Rock Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
 
     Raises ValueError that names the joint.
     """
@@ -166,7 +169,8 @@ class JointLaw:
 
     @property
     def straight(self) -> bool:
-        """Whether friction is one angle, and the faces neither lift nor stiffen: all that is asked of the law is a line."""
+        """Whether friction is one angle, and the faces neither lift nor stiffen: all that is asked of the law is a
+        line."""
         return (
             self.residual_friction == self.friction
             and not self.residual_cohesion

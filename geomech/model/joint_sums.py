@@ -31,8 +31,8 @@ JOINT_SUM = np.dtype(
 
 
 def joint_names(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw]) -> np.ndarray:
-    """(n_contacts,) str: the joint of every contact. It goes by the name of the edge that is touched, else by that of an edge
-    at the vertex, else by its law (without any, all contacts are frictionless)."""
+    """(n_contacts,) str: the joint of every contact. It goes by the name of the edge that is touched, else by that of
+    an edge at the vertex, else by its law (without any, all contacts are frictionless)."""
     joints = joints or (JointLaw("frictionless"),)
     edge = np.asarray(blocks.edge_name)
     name = edge[contacts["edge"]]
@@ -82,8 +82,8 @@ def joint_sums(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw])
 
 
 def reactions(blocks: Blocks, contacts: np.ndarray) -> dict[int, np.ndarray]:
-    """Block → (force x, force y, moment about the mean of its reference vertices) that all contacts put on it, N and N m per
-    metre, for every block that is fixed or guided: what it must be held with is the opposite."""
+    """Block → (force x, force y, moment about the mean of its reference vertices) that all contacts put on it, N and N
+    m per metre, for every block that is fixed or guided: what it must be held with is the opposite."""
     supports = np.asarray(blocks.fixed, dtype=bool).copy()
     if blocks.held is not None:
         supports |= blocks.held.any(axis=1)

@@ -1,10 +1,10 @@
 """Which blocks can be taken out of their neighbours, and which of them go: block theory in two dimensions.
 
-A block between fixed neighbours can move along s if s leads into none of the faces that touch it, s·n ≥ 0 for the normals n
-with which they push it. It is removable if there is such an s (its joint pyramid is not empty, and being a block it is
-finite: the theorem of Goodman & Shi 1985, Block theory, chapter 4). The resultant r of the forces on it says how it goes (their
-modes, chapter 9): it falls along r, or slides along the face that lets it go most nearly along r, held by that face's friction
-and cohesion, or it is pushed in.
+A block between fixed neighbours can move along s if s leads into none of the faces that touch it, s·n ≥ 0 for the
+normals n with which they push it. It is removable if there is such an s (its joint pyramid is not empty, and being a
+block it is finite: the theorem of Goodman & Shi 1985, Block theory, chapter 4). The resultant r of the forces on it
+says how it goes (their modes, chapter 9): it falls along r, or slides along the face that lets it go most nearly along
+r, held by that face's friction and cohesion, or it is pushed in.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ def key_blocks(
     for b, start, end, spare in _spares(owner, angle):
         if fixed[b]:
             continue
-        # Normals fill the arc from `start` to `end`; directions that leave all faces that from end − 90° to start + 90°.
+        # Normals fill the arc from `start` to `end`; directions that leave all faces that from end − 90° to start +
+        # 90°.
         low, high = end - 0.5 * np.pi, end - 0.5 * np.pi + max(spare, 0.0)
         out["kind"][b] = SAFE
         if np.isnan(pull):
@@ -101,8 +102,8 @@ def _principal(angle):
 
 
 def _spares(owner: np.ndarray, angle: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-    """Of every block whose normals leave half a turn free: block, the arc of its normals from start to end (rad), what is free
-    beyond the half turn."""
+    """Of every block whose normals leave half a turn free: block, the arc of its normals from start to end (rad), what
+    is free beyond the half turn."""
     if len(owner) == 0:
         return
     order = np.lexsort((angle, owner))
@@ -128,7 +129,8 @@ def _rank(out: np.ndarray, blocks: Blocks, state: State, fixed: np.ndarray) -> N
 
 
 def _faces(contacts: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of every touching pair and of both its blocks: block, angle of the normal that pushes it (rad), row in ``contacts``."""
+    """Of every touching pair and of both its blocks: block, angle of the normal that pushes it (rad), row in
+    ``contacts``."""
     inside = (contacts["length"] > 0) | ((contacts["position"] > 1e-3) & (contacts["position"] < 1 - 1e-3))
     inside |= contacts["normal_force"] > 0
     near = _NEAR * np.minimum(size[contacts["block"]], size[contacts["other"]])

@@ -13,8 +13,8 @@ from .imposed_motion import BaseMotion, BlockMotion, PointMotion
 
 @dataclass(frozen=True, eq=False)
 class LinearProfile:
-    """A factor that runs linearly from ``factors[0]`` at ``start`` to ``factors[1]`` at ``end`` (reference coordinates, m),
-    and on beyond them; across the line between them it is constant."""
+    """A factor that runs linearly from ``factors[0]`` at ``start`` to ``factors[1]`` at ``end`` (reference coordinates,
+    m), and on beyond them; across the line between them it is constant."""
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -51,8 +51,8 @@ class EdgeTraction:
 
 @dataclass(frozen=True, eq=False)
 class PointLoad:
-    """A force (N per metre of thickness) on ``block`` at the material point ``at`` (reference coordinates); with ``follower``
-    it turns with the block."""
+    """A force (N per metre of thickness) on ``block`` at the material point ``at`` (reference coordinates); with
+    ``follower`` it turns with the block."""
 
     block: int
     at: tuple[float, float]
@@ -64,11 +64,11 @@ class PointLoad:
 class WaterTable:
     """Water that stands in all joints, cracks between blocks and on all outer faces below a line.
 
-    ``points`` (n, 2) m, x ascending: the line, level beyond its ends; under it the pressure is ``unit_weight`` (N/m³) times
-    the depth below it, above it there is none. ``level`` (m) raises the whole line with time. An inclined line is a
-    piezometric one: the pressure on a joint under it is what that line says. The pressure acts on both faces of a joint,
-    so that contact forces are effective ones and a submerged block is lifted by the weight of the water it displaces.
-    ``dry`` names edges that no water reaches (lined or drained).
+    ``points`` (n, 2) m, x ascending: the line, level beyond its ends; under it the pressure is ``unit_weight`` (N/m³)
+    times the depth below it, above it there is none. ``level`` (m) raises the whole line with time. An inclined line is
+    a piezometric one: the pressure on a joint under it is what that line says. The pressure acts on both faces of a
+    joint, so that contact forces are effective ones and a submerged block is lifted by the weight of the water it
+    displaces. ``dry`` names edges that no water reaches (lined or drained).
 
     Blocks carry their own (saturated) density; their stress is the total one.
     """
@@ -93,7 +93,8 @@ class WaterTable:
 
 @dataclass(frozen=True, eq=False)
 class ViscousBoundary:
-    """Edges called ``edge_name`` absorb the waves that reach them, as rock that goes on for ever would (dynamic steps only).
+    """Edges called ``edge_name`` absorb the waves that reach them, as rock that goes on for ever would (dynamic steps
+    only).
 
     ``incoming`` (2,) m/s: particle velocity, as a history, of a plane wave that enters through them, straight on.
     """
@@ -106,8 +107,8 @@ class ViscousBoundary:
 class Excavation:
     """At ``time`` (s) ``blocks`` are taken out, and those whose reference centroid lies in ``polygon`` (n, 2).
 
-    Their contacts vanish, loads and bolts on them go, and the run goes on. With ``drained`` no water presses any more on
-    what lay against them.
+    Their contacts vanish, loads and bolts on them go, and the run goes on. With ``drained`` no water presses any more
+    on what lay against them.
     """
 
     time: float

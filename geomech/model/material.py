@@ -14,10 +14,10 @@ class Material:
 
     ``density`` kg/m³, ``youngs_modulus`` Pa, ``k_ic`` Pa √m (infinite: cracks in it do not grow), ``plane`` either
     "strain" or "stress". ``k_iic`` Pa √m is the toughness against growth in shear, asked for by the F-criterion alone;
-    ``tensile_strength`` Pa, ``cohesion`` Pa and ``friction_angle`` rad (Mohr–Coulomb) are those of intact rock, asked for
-    where cracks may be born. Blocks of a ``rigid`` material move as if they were stiffer than all others, by three unknowns; its
-    Young's modulus sets the springs of their contacts only. What is infinite does not fail. Raises ValueError, naming the material, on constants
-    that no elastic solid has.
+    ``tensile_strength`` Pa, ``cohesion`` Pa and ``friction_angle`` rad (Mohr–Coulomb) are those of intact rock, asked
+    for where cracks may be born. Blocks of a ``rigid`` material move as if they were stiffer than all others, by three
+    unknowns; its Young's modulus sets the springs of their contacts only. What is infinite does not fail. Raises
+    ValueError, naming the material, on constants that no elastic solid has.
     """
 
     name: str
@@ -79,8 +79,8 @@ class Material:
 
     @property
     def rayleigh_speed(self) -> float:
-        """c_R, m/s, that of Rayleigh's surface wave: c_s (0.87 + 1.12 ν)/(1 + ν) (Viktorov 1967), half a per cent off at most
-        for ν from 0; infinite without mass."""
+        """c_R, m/s, that of Rayleigh's surface wave: c_s (0.87 + 1.12 ν)/(1 + ν) (Viktorov 1967), half a per cent off
+        at most for ν from 0; infinite without mass."""
         if not self.density:
             return math.inf
         nu = self.effective_poissons_ratio
@@ -98,7 +98,8 @@ class Material:
         return np.array([[1 - nu, -nu, 0.0], [-nu, 1 - nu, 0.0], [0.0, 0.0, 2.0]]) / (2 * mu)
 
     def out_of_plane_stress(self, stress: np.ndarray) -> np.ndarray:
-        """σzz (...,) that goes with in-plane ``stress`` (..., 3): ν(σxx + σyy) in plane strain, zero in plane stress."""
+        """σzz (...,) that goes with in-plane ``stress`` (..., 3): ν(σxx + σyy) in plane strain, zero in plane
+        stress."""
         stress = np.asarray(stress, dtype=float)
         nu = self.poissons_ratio if self.plane == "strain" else 0.0
         return nu * (stress[..., 0] + stress[..., 1])

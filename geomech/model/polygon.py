@@ -53,8 +53,8 @@ def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
 def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which of many loops are convex, once round, with finite and distinct vertices, and which turn counter-clockwise.
 
-    ``vertices`` (n, 2) of all loops, loop k from ``start[k]`` to ``start[k + 1]``. Two (n_loops,) arrays of bools; what is
-    not plainly simple may be so all the same.
+    ``vertices`` (n, 2) of all loops, loop k from ``start[k]`` to ``start[k + 1]``. Two (n_loops,) arrays of bools; what
+    is not plainly simple may be so all the same.
     """
     first, count = start[:-1], np.diff(start)
     following = np.arange(1, len(vertices) + 1)
@@ -77,7 +77,8 @@ def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray,
 
 
 def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
-    """Two edges of ``loop`` (n, 2) that cross or touch away from a shared corner, the first found; None for a simple polygon.
+    """Two edges of ``loop`` (n, 2) that cross or touch away from a shared corner, the first found; None for a simple
+    polygon.
 
     Edge k leaves vertex k.
     """

@@ -19,19 +19,21 @@ from .material import Material
 class DdaSettings:
     """How blocks are moved (names and values of Shi 1988 where he has them).
 
-    ``time_step`` s is that of every step, or with ``automatic_time_step`` the longest, by which steps then grow and shrink
-    as they prove easy or hard (`dda.StepLength`). ``normal_penalty`` and ``shear_penalty`` are contact spring stiffnesses, N/m per metre of thickness (Pa); None
-    picks them from the blocks' stiffness. ``contact`` "augmented" adds multipliers to these springs until closed contacts
-    gape and sticking ones give by less than ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``dynamic_factor`` multiplies the velocity carried from step to step: 0 is
-    static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1) is Shi's, (¼, ½) the trapezoidal rule, which
-    has no dissipation; in between it has some; 2β ≥ γ ≥ ½. ``spectral_radius`` ϱ of 0 to 1 puts the α-scheme of Wood,
-    Bossak & Zienkiewicz in its place, of second order, which damps by ϱ a step what the step does not resolve. ``damping`` is
-    the fraction of critical damping of a block's own lowest vibration, and
-    of its contacts' (dynamic steps only): below about 0.3 a block that should stick may flutter on its friction and creep,
-    waves that cross many blocks want less; ``rayleigh_mass`` 1/s and ``rayleigh_stiffness`` s damp blocks by α M + β K besides (`rayleigh_coefficients`
-    finds them). ``max_displacement_ratio`` bounds the largest displacement in a step, in units of half the
-    height of the domain. ``equilibrium`` says when a run seeks static equilibrium (`dda.equilibrium`): "" never, "start" before
-    it begins, "loads" at every load of a static run too; ``unbalanced_tolerance`` is its unbalanced force over the mean force.
+    ``time_step`` s is that of every step, or with ``automatic_time_step`` the longest, by which steps then grow and
+    shrink as they prove easy or hard (`dda.StepLength`). ``normal_penalty`` and ``shear_penalty`` are contact spring
+    stiffnesses, N/m per metre of thickness (Pa); None picks them from the blocks' stiffness. ``contact`` "augmented"
+    adds multipliers to these springs until closed contacts gape and sticking ones give by less than
+    ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``dynamic_factor`` multiplies the
+    velocity carried from step to step: 0 is static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1)
+    is Shi's, (¼, ½) the trapezoidal rule, which has no dissipation; in between it has some; 2β ≥ γ ≥ ½.
+    ``spectral_radius`` ϱ of 0 to 1 puts the α-scheme of Wood, Bossak & Zienkiewicz in its place, of second order, which
+    damps by ϱ a step what the step does not resolve. ``damping`` is the fraction of critical damping of a block's own
+    lowest vibration, and of its contacts' (dynamic steps only): below about 0.3 a block that should stick may flutter
+    on its friction and creep, waves that cross many blocks want less; ``rayleigh_mass`` 1/s and ``rayleigh_stiffness``
+    s damp blocks by α M + β K besides (`rayleigh_coefficients` finds them). ``max_displacement_ratio`` bounds the
+    largest displacement in a step, in units of half the height of the domain. ``equilibrium`` says when a run seeks
+    static equilibrium (`dda.equilibrium`): "" never, "start" before it begins, "loads" at every load of a static run
+    too; ``unbalanced_tolerance`` is its unbalanced force over the mean force.
     """
 
     time_step: float = 1.0
@@ -55,14 +57,14 @@ class DdaSettings:
 
 @dataclass(frozen=True)
 class DdmSettings:
-    """How cracked blocks are meshed: order ``p``, node family, elements of a straight crack, of a boundary side; and how
-    they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the number of unknowns.
+    """How cracked blocks are meshed: order ``p``, node family, elements of a straight crack, of a boundary side; and
+    how they are solved: ``solver`` "dense" (factored), "compressed" (iterated) or "auto", by the number of unknowns.
 
     Kinks get more than the ``grading_layers``, by their angle: 2 leave an error of 5e-4 in K, every one more halves it.
 
-    With ``target_error``, the relative error of K that is asked for, order, elements and grading follow from it instead.
-    With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs there, in place
-    of ``grading_layers`` everywhere.
+    With ``target_error``, the relative error of K that is asked for, order, elements and grading follow from it
+    instead. With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs
+    there, in place of ``grading_layers`` everywhere.
     """
 
     order: int = 4
@@ -91,10 +93,10 @@ class GrowthSettings:
     """When and how far tips go. ``increment`` m, longest advance in a cycle; ``min_increment`` m, shortest.
 
     ``initiation`` says where cracks may be born besides: "" nowhere, "surface" on outlines, holes and crack faces,
-    "everywhere" inside the rock too. ``initiation_distance`` m averages the stress there over a distance into the rock (0:
-    the stress at the point), ``initiation_spacing`` m is the least distance between births (0: five increments).
-    ``speed_limit`` is the part of the Rayleigh speed above which no tip runs in a dynamic run: 0.4, for cracks in rock and
-    glass stay below half of it (Ravi-Chandar & Knauss 1984).
+    "everywhere" inside the rock too. ``initiation_distance`` m averages the stress there over a distance into the rock
+    (0: the stress at the point), ``initiation_spacing`` m is the least distance between births (0: five increments).
+    ``speed_limit`` is the part of the Rayleigh speed above which no tip runs in a dynamic run: 0.4, for cracks in rock
+    and glass stay below half of it (Ravi-Chandar & Knauss 1984).
     ``trial_kink`` m: the criterion "f" tries kinks of this length in all directions, faces in contact (0: kinks of no
     length, on which nothing presses).
     """
@@ -126,8 +128,8 @@ class GrowthSettings:
             raise ValueError(f"join_length must be a length, got {self.join_length!r} m")
 
 
-#: Kinds of events that contacts and crack faces make: one opens, none touches any more, one closes, one slips, none sticks any more,
-#: one sticks again, one loses its bond.
+#: Kinds of events that contacts and crack faces make: one opens, none touches any more, one closes, one slips, none
+#: sticks any more, one sticks again, one loses its bond.
 CHANGES = ("opening", "parting", "closure", "slip", "sliding", "stick", "debonding")
 #: Kinds of events that may end a run, of which `RunSettings.stop_at` names some.
 STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", *CHANGES)
@@ -137,13 +139,13 @@ STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", *
 class RunSettings:
     """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``.
 
-    ``stepping`` "fixed": steps of `DdaSettings.time_step`; "events": static steps that end where a tip has just reached its
-    toughness or, as ``events`` says, a contact or a crack face changes its state, otherwise as long as blocks may move in one, or
-    ``longest_step`` s. ``control`` "load": loads and imposed motion
-    rise with time; "toughness" (with "events"): they are those at which the most driven tip has K_eq = K_Ic, more or less
-    than before. ``boundary_stress`` says how contact forces load cracked blocks: "contacts" spread over faces, "springs" at
-    points, "kelvin-springs" at points of the infinite plane. Without ``skip`` every body is made anew and every answer worked out anew in every
-    pass, though nothing about it has changed: the same results, for comparison.
+    ``stepping`` "fixed": steps of `DdaSettings.time_step`; "events": static steps that end where a tip has just reached
+    its toughness or, as ``events`` says, a contact or a crack face changes its state, otherwise as long as blocks may
+    move in one, or ``longest_step`` s. ``control`` "load": loads and imposed motion
+    rise with time; "toughness" (with "events"): they are those at which the most driven tip has K_eq = K_Ic, more or
+    less than before. ``boundary_stress`` says how contact forces load cracked blocks: "contacts" spread over faces,
+    "springs" at points, "kelvin-springs" at points of the infinite plane. Without ``skip`` every body is made anew and
+    every answer worked out anew in every pass, though nothing about it has changed: the same results, for comparison.
     """
 
     end_time: float = 1.0
@@ -162,11 +164,13 @@ WEIGHT = "gravity"
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Everything a run needs. ``joint_of`` maps a pair of edge names to the law of contacts between such edges, the cracks'
-    ``law`` counts in ``face_laws``.
+    """Everything a run needs. ``joint_of`` maps a pair of edge names to the law of contacts between such edges, the
+    cracks' ``law`` counts in ``face_laws``.
 
     ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
-    compression), or what it takes to move their block, or is `WEIGHT`; ``in_situ`` is the stress that the blocks have, at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose approach over their distance is the axial strain.
+    compression), or what it takes to move their block, or is `WEIGHT`; ``in_situ`` is the stress that the blocks have,
+    at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose
+    approach over their distance is the axial strain.
     """
 
     title: str

@@ -76,7 +76,8 @@ class State:
     contacts      CONTACT rows      open ones that are near included
     acceleration  (n_blocks, 6)     of the unknowns, as a time scheme that needs it has left it; None: begin anew
     bolts         BOLT rows         one a bolt of the loads, empty before there are any
-    imposed       (k,)              what motion the loads have imposed so far: of the base, of blocks, of points; empty before
+    imposed       (k,)              what motion the loads have imposed so far: of the base, of blocks, of points; empty
+                  before
     removed       (n_blocks,)       True: excavated; None before anything is
     """
 

@@ -38,8 +38,8 @@ __all__ = [
 
 def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
     """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
-    (``every``, ``joints``, ``interior``, ``interior_every``, ``configuration``, ``checkpoint_every``) and its ``resolved()``
-    form."""
+    (``every``, ``joints``, ``interior``, ``interior_every``, ``configuration``, ``checkpoint_every``) and its
+    ``resolved()`` form."""
     output = getattr(scene, "output", None)
     resolved = None if scene is None else scene.resolved()
     watchers: list[Observer] = []
@@ -64,6 +64,7 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
 
 
 def _joints_wanted(scene: Any) -> bool:
-    """Whether sums by joint are written: as the scene says, else where no crack makes the blocks a specimen in a press."""
+    """Whether sums by joint are written: as the scene says, else where no crack makes the blocks a specimen in a
+    press."""
     wanted = getattr(getattr(scene, "output", None), "joints", None)
     return wanted if wanted is not None else scene is not None and not scene.cracks.n_cracks

@@ -1,4 +1,5 @@
-"""Long jobs done beside the run: what waits in Gmsh, in compiled kernels and in compression leaves it the interpreter."""
+"""Long jobs done beside the run: what waits in Gmsh, in compiled kernels and in compression leaves it the
+interpreter."""
 
 from __future__ import annotations
 

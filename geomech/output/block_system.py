@@ -22,8 +22,9 @@ _PASSING = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 
 
 def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
-    """Write ``block_system.vtu``, ``joint_lines.vtu``, ``block_system.msh`` and ``block_system.json`` of a loaded scene into
-    ``folder``, and where it has traces of the field or an origin ``block_system.geojson`` in world coordinates; what the JSON holds."""
+    """Write ``block_system.vtu``, ``joint_lines.vtu``, ``block_system.msh`` and ``block_system.json`` of a loaded scene
+    into ``folder``, and where it has traces of the field or an origin ``block_system.geojson`` in world coordinates;
+    what the JSON holds."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     problem = scene.problem()
@@ -79,8 +80,8 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
 def _write_msh(
     path: Path, blocks: Blocks, cracks: Cracks, cells: np.ndarray, owner: np.ndarray, zones: list[str], zone: np.ndarray
 ) -> None:
-    """Gmsh's format 2.2: a surface a block, zones, edge names and cracks as physical groups. Read as a model it gives the
-    same blocks."""
+    """Gmsh's format 2.2: a surface a block, zones, edge names and cracks as physical groups. Read as a model it gives
+    the same blocks."""
     curves = [name for name in blocks.edge_names if name] + [f"crack:{name}" for name in cracks.names]
     number = {name: k for k, name in enumerate(curves, 1)}
     groups = [f'1 {k} "{name}"' for name, k in number.items()]

@@ -1,11 +1,12 @@
 """Checkpoints: all that a run goes on from, in one file; how it is written, and read back.
 
-A checkpoint holds whatever the run's solvers and writers keep, not only blocks, cracks and loads: factors that were renewed
-in part, face states that the next solution is tried with, meshes. They decide about round-off, so that a run goes on bit for
-bit only with them, and keeping them lets a run be stored at any moment without changing a bit of what it does afterwards.
-What they are is the solvers' own business; hence a pickle (of arrays, as good as binary), in which every object stands once
-and arrays that share memory go on sharing it. It is of use to the sources that wrote it alone: its first line, plain JSON,
-says which, and is read before anything else. As any pickle it can run code: resume only what you trust.
+A checkpoint holds whatever the run's solvers and writers keep, not only blocks, cracks and loads: factors that were
+renewed in part, face states that the next solution is tried with, meshes. They decide about round-off, so that a run
+goes on bit for bit only with them, and keeping them lets a run be stored at any moment without changing a bit of what
+it does afterwards. What they are is the solvers' own business; hence a pickle (of arrays, as good as binary), in which
+every object stands once and arrays that share memory go on sharing it. It is of use to the sources that wrote it alone:
+its first line, plain JSON, says which, and is read before anything else. As any pickle it can run code: resume only
+what you trust.
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ class FilesChanged(ValueError):
 
 @cache
 def identity() -> Mapping[str, Any]:
-    """What must be the same for a checkpoint to be of use, and for the run to go on bit for bit. Sources are those of the
-    time when it was asked for first: they may be edited while a run lasts."""
+    """What must be the same for a checkpoint to be of use, and for the run to go on bit for bit. Sources are those of
+    the time when it was asked for first: they may be edited while a run lasts."""
     packages = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
     return {"format": FORMAT, "python": platform.python_version(), **packages, "sources": _sources()}
 
@@ -62,8 +63,8 @@ def surroundings() -> dict[str, Any]:
 
 
 def write(folder: Path, header: dict[str, Any], content: Any) -> Path:
-    """``content`` as the checkpoint of cycle ``header["cycle"]`` in ``folder``, whole or not at all; older ones than the
-    one before are removed. Raises OSError."""
+    """``content`` as the checkpoint of cycle ``header["cycle"]`` in ``folder``, whole or not at all; older ones than
+    the one before are removed. Raises OSError."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"cycle_{header['cycle']:07d}.checkpoint"
     beside = path.with_name(path.name + ".part")
@@ -147,8 +148,8 @@ class _Summed(io.RawIOBase):
 
 
 class _Pickler(pickle.Pickler):
-    """Stores views of arrays as views: they go on sharing memory, and are laid out as they were. Strides decide which of
-    BLAS' ways a product is taken by, and so about its last bits."""
+    """Stores views of arrays as views: they go on sharing memory, and are laid out as they were. Strides decide which
+    of BLAS' ways a product is taken by, and so about its last bits."""
 
     def reducer_override(self, value: Any) -> Any:
         if type(value) is np.ndarray and type(value.base) is np.ndarray and not value.dtype.hasobject:

@@ -25,10 +25,12 @@ _NAMING_FILES = ("model", "file")
 
 
 class Checkpoints:
-    """Observer that knows when a checkpoint is `due`; whoever runs the cycles then lets it `write` one, between two cycles.
+    """Observer that knows when a checkpoint is `due`; whoever runs the cycles then lets it `write` one, between two
+    cycles.
 
-    ``every`` counts cycles between two, 0 for none at all; None leaves it to `INTERVAL` and `SHARE`. ``scene`` is the resolved
-    scene, which a resumed run must still have. That a checkpoint cannot be written is told to the log and ends nothing.
+    ``every`` counts cycles between two, 0 for none at all; None leaves it to `INTERVAL` and `SHARE`. ``scene`` is the
+    resolved scene, which a resumed run must still have. That a checkpoint cannot be written is told to the log and ends
+    nothing.
     """
 
     def __init__(self, *, every: int | None = None, scene: Mapping[str, Any] | None = None) -> None:
@@ -64,7 +66,8 @@ class Checkpoints:
         return time.monotonic() - self._last >= self._interval
 
     def write(self, cycle: int, now: float, content: Any) -> bool:
-        """Store ``content`` as what the run goes on with after ``cycle``, at the time ``now`` s; whether it could be."""
+        """Store ``content`` as what the run goes on with after ``cycle``, at the time ``now`` s; whether it could
+        be."""
         began = time.monotonic()
         header = {
             **checkpoint.identity(), **checkpoint.surroundings(), "geomech": __version__, "cycle": cycle, "time_s": now,

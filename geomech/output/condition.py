@@ -10,16 +10,19 @@ import numpy as np
 from geomech.model import OPEN, SLIP, Cycle, Problem
 from geomech.model.key_blocks import CLASSES, FIXED, key_blocks
 
-#: Blocks are at rest, but for small vibrations, when less than this part of the forces on any of them is left to move it …
+#: Blocks are at rest, but for small vibrations, when less than this part of the forces on any of them is left to move
+#: it …
 AT_REST = 1e-2
-#: … and their kinetic energy is below this part of what blocks and contacts store: what slides steadily is balanced too.
+#: … and their kinetic energy is below this part of what blocks and contacts store: what slides steadily is balanced
+#: too.
 STILL = 1e-2
 #: So many blocks are named.
 NAMED = 5
 
 
 def condition(cycle: Cycle) -> str:
-    """One of "at rest", "sliding" (every block that moves keeps touching others), "moving"; "" before the first step."""
+    """One of "at rest", "sliding" (every block that moves keeps touching others), "moving"; "" before the first
+    step."""
     statistics = cycle.statistics
     unbalanced = statistics.get("unbalanced_ratio", math.nan)
     if math.isnan(unbalanced):

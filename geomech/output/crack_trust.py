@@ -15,8 +15,9 @@ _log = logging.getLogger(__name__)
 
 
 def crack_trust(cycle: Cycle) -> dict[str, Any]:
-    """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction, ``condition``
-    of the equations, and the estimated error of K relative to the largest K of its block, with the block it is of."""
+    """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction,
+    ``condition`` of the equations, and the estimated error of K relative to the largest K of its block, with the block
+    it is of."""
     told: dict[str, Any] = {
         "residual": max(float(body.residual) for body in cycle.bodies.values()),
         "condition": max(float(body.condition) for body in cycle.bodies.values()),

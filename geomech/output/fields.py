@@ -212,8 +212,8 @@ _DECLARED = {
 
 
 def declared(series: str, place: str, count: int, arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """A dictionary of ``arrays``, which must be those that ``series`` has at ``place``, with ``count`` rows each; vectors
-    in the plane may leave out their third component.
+    """A dictionary of ``arrays``, which must be those that ``series`` has at ``place``, with ``count`` rows each;
+    vectors in the plane may leave out their third component.
 
     Raises ValueError naming a missing, an undeclared or a wrongly shaped array."""
     fields = _DECLARED[series, place]

@@ -83,8 +83,8 @@ class Table:
 
     @classmethod
     def cut_back(cls, path: Path, end: TableEnd) -> Table:
-        """Go on with the file ``path`` from where it ended as ``end`` says: columns and rows that came later are dropped.
-        Raises FilesChanged when it has not got what it had then."""
+        """Go on with the file ``path`` from where it ended as ``end`` says: columns and rows that came later are
+        dropped. Raises FilesChanged when it has not got what it had then."""
         table = cls.__new__(cls)
         table.path, table.columns, table._known, table._rows = path, list(end.columns), set(end.columns), end.rows
         if not path.is_file():

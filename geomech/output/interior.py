@@ -94,7 +94,8 @@ class InteriorMeshes:
         turn = float(rotation(gradient))
         n = len(kept.points)
         stress, own = body.fields(np.concatenate([kept.points, kept.centres]))
-        # At a tip or a sharp corner there is no stress to give: that of the triangles about it is what the mesh resolves.
+        # At a tip or a sharp corner there is no stress to give: that of the triangles about it is what the mesh
+        # resolves.
         count = np.bincount(kept.owner, minlength=n)
         singular = np.flatnonzero(count)
         for k in range(3):

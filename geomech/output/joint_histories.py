@@ -1,4 +1,5 @@
-"""CSV files of joints and supports that grow with the run: ``joints.csv``, a row a joint and cycle, and ``reactions.csv``."""
+"""CSV files of joints and supports that grow with the run: ``joints.csv``, a row a joint and cycle, and
+``reactions.csv``."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from .histories import Table, TableEnd
 
 
 class JointHistories:
-    """Observer that adds contacts up by joint (`geomech.model.joint_sums`) and what they put on fixed and guided blocks."""
+    """Observer that adds contacts up by joint (`geomech.model.joint_sums`) and what they put on fixed and guided
+    blocks."""
 
     def on_start(self, problem: Problem, folder: Path) -> None:
         folder = Path(folder)

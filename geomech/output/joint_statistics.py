@@ -30,8 +30,8 @@ def given(value: float) -> float | None:
 
 
 def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[str, Any]]:
-    """An entry for every joint set of a loaded scene: what it is like in the rock of the ``free`` blocks (a mask), and below
-    "asked" what its laws say, by the same keys."""
+    """An entry for every joint set of a loaded scene: what it is like in the rock of the ``free`` blocks (a mask), and
+    below "asked" what its laws say, by the same keys."""
     import shapely
 
     blocks, cracks, drawing = problem.blocks, problem.cracks, scene.drawing

@@ -22,7 +22,8 @@ SHOWN_WARNINGS, WIDTH = 3, 240
 
 
 class Warned(logging.Handler):
-    """Counts what geomech warns of while a run lasts, from its making to its `end`; and keeps the first of each kind."""
+    """Counts what geomech warns of while a run lasts, from its making to its `end`; and keeps the first of each
+    kind."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -145,8 +146,8 @@ class Progress:
 
 
 def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
-    """The few lines that end a run: why it ended, at what loads (times, where nothing leads), how long it took, where the
-    files are."""
+    """The few lines that end a run: why it ended, at what loads (times, where nothing leads), how long it took, where
+    the files are."""
     lines = [f"{summary.get('title', 'run')}: {summary.get('end', 'done')}"]
     for kind, first in summary.get("first", {}).items():
         # A load of 0 is that of a scene which has no leading one: it is driven by time.

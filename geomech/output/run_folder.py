@@ -9,7 +9,8 @@ from geomech.model import Cycle, Problem
 
 from . import checkpoint
 
-#: Files of a run, by the names that it gives them. Files of series are written over, and those left are deleted at the end.
+#: Files of a run, by the names that it gives them. Files of series are written over, and those left are deleted at the
+#: end.
 _OWN = (
     "history.csv", "tips.csv", "events.csv", "joints.csv", "reactions.csv", "summary.json", "*.csv.part", "*.pvd.part",
     "*.json.part", "*.toml.part", f"{checkpoint.FOLDER}/cycle_[0-9]*.checkpoint", f"{checkpoint.FOLDER}/*.part",
@@ -17,7 +18,8 @@ _OWN = (
 
 
 class RunFolder:
-    """Observer that clears the folder of an earlier run's histories, summary and checkpoints before the others begin."""
+    """Observer that clears the folder of an earlier run's histories, summary and checkpoints before the others
+    begin."""
 
     def on_start(self, problem: Problem, folder: Path) -> None:
         _clear(Path(folder), _OWN)

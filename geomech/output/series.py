@@ -67,7 +67,8 @@ class Series:
         return {"listed": listed, **{name: getattr(self, name) for name in _REMEMBERED}}
 
     def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
-        """Goes on with the files that were listed then; later ones are deleted. Raises FilesChanged when one is missing."""
+        """Goes on with the files that were listed then; later ones are deleted. Raises FilesChanged when one is
+        missing."""
         listed = memory["listed"]
         vars(self).update({name: memory[name] for name in _REMEMBERED})
         missing = [file for entries in listed.values() for _, file in entries if not (Path(folder) / file).is_file()]
@@ -161,8 +162,8 @@ class Series:
         self._put("interior", cycle, at, grid)
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
-        """Small grids at once; large ones beside the run, which need not wait until they are packed. A series that has been
-        large stays beside, so that its files are listed in their order."""
+        """Small grids at once; large ones beside the run, which need not wait until they are packed. A series that has
+        been large stays beside, so that its files are listed in their order."""
         if name in self._large or _size(grid) > LARGE:
             self._large.add(name)
             self._beside.do(self._put, name, cycle, at, grid)

@@ -120,8 +120,9 @@ class Summary:
 
 
 def skipped(work: dict[str, int], seconds: dict[str, float]) -> dict[str, dict[str, float]]:
-    """What a run did not do since nothing had changed: how often, and about how long it would have taken, by the mean of those
-    that were done (s): elastic bodies of unchanged geometry, solutions under the very same load, compliances."""
+    """What a run did not do since nothing had changed: how often, and about how long it would have taken, by the mean
+    of those that were done (s): elastic bodies of unchanged geometry, solutions under the very same load,
+    compliances."""
     each = {
         "bodies": ("bodies", "ddm assembly"),
         "solutions": ("solutions", "ddm solve"),

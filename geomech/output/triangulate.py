@@ -8,7 +8,8 @@ from geomech.model import Blocks
 
 
 class Triangles:
-    """The triangles of a block system, kept while it stands; of blocks that are not convex, while their outline does."""
+    """The triangles of a block system, kept while it stands; of blocks that are not convex, while their outline
+    does."""
 
     def __init__(self) -> None:
         self._blocks: Blocks | None = None

@@ -1,8 +1,8 @@
 """VTK's XML files, written directly: unstructured grids (appended raw data, large ones zlib level 1), PVD collections.
 
 The format is VTK's own (VTK XML file formats, "Serial vtkUnstructuredGrid" with appended data). Writing it from NumPy
-takes a tenth of the time of ``vtkXMLUnstructuredGridWriter`` on the small files that a run leaves by the thousand, and a
-run that writes files need not import VTK.
+takes a tenth of the time of ``vtkXMLUnstructuredGridWriter`` on the small files that a run leaves by the thousand, and
+a run that writes files need not import VTK.
 """
 
 from __future__ import annotations
@@ -39,8 +39,9 @@ _size = struct.Struct("=Q").pack
 class Grid:
     """Points and cells with their arrays.
 
-    Vectors, the ``points`` (m) too, are (n, 2) or (n, 3); ``connectivity`` point indices, cell after cell; ``offsets`` (n_cells,) one past each
-    cell's last index; ``types`` (n_cells,) VTK cell types; ``point_data`` and ``cell_data`` name → array.
+    Vectors, the ``points`` (m) too, are (n, 2) or (n, 3); ``connectivity`` point indices, cell after cell; ``offsets``
+    (n_cells,) one past each cell's last index; ``types`` (n_cells,) VTK cell types; ``point_data`` and ``cell_data``
+    name → array.
     """
 
     points: np.ndarray
@@ -60,8 +61,8 @@ def world_origin(problem: Any) -> dict[str, float]:
 class GridFiles:
     """Writes the grids of one ``series`` as .vtu files.
 
-    From cycle to cycle a small grid mostly keeps its numbers of points and cells: its file is laid out once, and the arrays
-    are put in place.
+    From cycle to cycle a small grid mostly keeps its numbers of points and cells: its file is laid out once, and the
+    arrays are put in place.
     """
 
     def __init__(self, series: str) -> None:
@@ -120,8 +121,8 @@ class _Layout:
             _Column("Cells", "offsets", "i8", (n_cells,)),
             _Column("Cells", "types", "u1", (n_cells,)),
         ]
-        # The last array comes first: meshio gives arrays new offsets one by one as it reads, in the order of the data, and
-        # would take one of those for the offset of a later array, did it not meet that one first.
+        # The last array comes first: meshio gives arrays new offsets one by one as it reads, in the order of the data,
+        # and would take one of those for the offset of a later array, did it not meet that one first.
         self._columns = columns[::-1]
         self._compress = sum(c.nbytes for c in columns) > SMALL
         if not self._compress:
@@ -153,8 +154,8 @@ class _Layout:
         return self._file
 
     def _head(self, sizes: list[int]) -> bytes:
-        """The file up to its data; ``sizes``: the bytes that each array takes in the file, in the order of the data, which
-        is the tags' backwards."""
+        """The file up to its data; ``sizes``: the bytes that each array takes in the file, in the order of the data,
+        which is the tags' backwards."""
         tags: dict[str, list[str]] = {name: [] for name in ("FieldData", "PointData", "CellData", "Points", "Cells")}
         at = 0
         for column, size in zip(self._columns, sizes, strict=True):
@@ -186,9 +187,9 @@ def _fill(place: np.ndarray, value: Any) -> None:
 def _put(path: Path | str, content: bytes | bytearray) -> None:
     """A file of ``content``; a file that is there already is written over where it stands.
 
-    Few system calls, a fraction of what a buffered file object takes. To empty a file first costs several times as much as to
-    write over it, and to delete and make thousands anew tens of times (ext4 will not take an inode again that was freed
-    minutes ago, and steps over all of these for every new one).
+    Few system calls, a fraction of what a buffered file object takes. To empty a file first costs several times as much
+    as to write over it, and to delete and make thousands anew tens of times (ext4 will not take an inode again that was
+    freed minutes ago, and steps over all of these for every new one).
     """
     handle = os.open(path, os.O_WRONLY | os.O_CREAT, 0o666)
     try:
@@ -219,8 +220,8 @@ class Collection:
     """A PVD file: a time series of .vtu files.
 
     Times are written with ``repr`` so that they read back as the same numbers. An entry and the end of the file are
-    written over the end that was there, at once: after every cycle, also the last before a crash, whoever reads the file
-    finds a complete series. There is no file before there is an entry: ParaView opens no empty one.
+    written over the end that was there, at once: after every cycle, also the last before a crash, whoever reads the
+    file finds a complete series. There is no file before there is an entry: ParaView opens no empty one.
 
     ``entries`` (time, file) are listed already: the file is made anew with them, in place of what it was.
     """

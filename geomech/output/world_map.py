@@ -13,8 +13,8 @@ from .summary import write_json
 
 
 def write_world_map(problem: Problem, zones: tuple[str, ...], path: Path | str) -> None:
-    """Write the blocks of ``problem`` (polygons with "set" = "zone:NAME", block, material, fixed, area_m2) and its cracks (lines
-    with "set" = "crack:NAME") as the GeoJSON file ``path``; ``zones`` names each block's zone.
+    """Write the blocks of ``problem`` (polygons with "set" = "zone:NAME", block, material, fixed, area_m2) and its
+    cracks (lines with "set" = "crack:NAME") as the GeoJSON file ``path``; ``zones`` names each block's zone.
 
     Read as traces of a scene it gives the same blocks.
     """

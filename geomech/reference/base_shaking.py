@@ -15,11 +15,11 @@ def sliding_block(
 ) -> np.ndarray:
     """(n,) displacement (m) of a block relative to its plane, positive down the plane, at ``times`` (n,) s.
 
-    The ground accelerates by ``base`` (n,) m/s², linear between the times and positive towards the uphill side of a plane of
-    ``incline``, so that positive values throw the block downhill. Newmark (1965), "Effects of earthquakes on dams and
-    embankments", Géotechnique 15, 139-160: ẍ = T − sign(ẋ) N tan φ with T = g sin α + a cos α and N = g cos α − a sin α per unit of
-    mass; at rest it sticks while |T| ≤ N tan φ. Uphill slip is followed too. Between two times, T and N are linear, so every stop
-    and start is a root of a polynomial: exact but for round-off.
+    The ground accelerates by ``base`` (n,) m/s², linear between the times and positive towards the uphill side of a
+    plane of ``incline``, so that positive values throw the block downhill. Newmark (1965), "Effects of earthquakes on
+    dams and embankments", Géotechnique 15, 139-160: ẍ = T − sign(ẋ) N tan φ with T = g sin α + a cos α and N = g cos α
+    − a sin α per unit of mass; at rest it sticks while |T| ≤ N tan φ. Uphill slip is followed too. Between two times, T
+    and N are linear, so every stop and start is a root of a polynomial: exact but for round-off.
     """
     slope = math.tan(friction_angle)
     pull = gravity * math.sin(incline) + np.asarray(base, dtype=float) * math.cos(incline)
@@ -74,9 +74,9 @@ def rocking_parameter(half_diagonal: float, gravity: float = 9.81) -> float:
 def rocking_period(amplitude: float, slenderness: float, half_diagonal: float, gravity: float = 9.81) -> float:
     """Period (s) of free rocking of ``amplitude`` θ₀ < α, no loss at impact; ``slenderness`` α, tan α = b/h.
 
-    Four times the time from θ₀ to 0 by energy, ∫ dθ / √(2p² [cos(α−θ) − cos(α−θ₀)]); for slender blocks it is Housner's (1963,
-    "The behavior of inverted pendulum structures during earthquakes", Bulletin of the Seismological Society of America 53, 403-417,
-    eq. 4) T = (4/p) arcosh 1/(1 − θ₀/α). Substitution θ = θ₀(1 − s²), Gauss–Legendre.
+    Four times the time from θ₀ to 0 by energy, ∫ dθ / √(2p² [cos(α−θ) − cos(α−θ₀)]); for slender blocks it is Housner's
+    (1963, "The behavior of inverted pendulum structures during earthquakes", Bulletin of the Seismological Society of
+    America 53, 403-417, eq. 4) T = (4/p) arcosh 1/(1 − θ₀/α). Substitution θ = θ₀(1 − s²), Gauss–Legendre.
     """
     nodes, weights = np.polynomial.legendre.leggauss(60)
     s = 0.5 * (nodes + 1.0)
@@ -96,21 +96,24 @@ def housner_period(amplitude: float, slenderness: float, half_diagonal: float, g
 def rocking_restitution(slenderness: float) -> float:
     """Angular velocity after an impact over that before: 1 − (3/2) sin²α.
 
-    Angular momentum about the corner that lands is kept and the other lifts off (Housner 1963, eq. 9, whose r is the square).
+    Angular momentum about the corner that lands is kept and the other lifts off (Housner 1963, eq. 9, whose r is the
+    square).
     """
     return 1.0 - 1.5 * math.sin(slenderness) ** 2
 
 
 def uplift_acceleration(slenderness: float, gravity: float = 9.81) -> float:
-    """g tan α: the least steady or peak horizontal acceleration that lifts a corner (Milne & Omori 1893; Housner 1963)."""
+    """g tan α: the least steady or peak horizontal acceleration that lifts a corner (Milne & Omori 1893; Housner
+    1963)."""
     return gravity * math.tan(slenderness)
 
 
 def overturning_pulse(duration: float, slenderness: float, half_diagonal: float, gravity: float = 9.81) -> float:
-    """Least constant acceleration (m/s²) that overturns a slender block when it lasts for ``duration`` s and then stops.
+    """Least constant acceleration (m/s²) that overturns a slender block when it lasts for ``duration`` s and then
+    stops.
 
-    Housner (1963, eq. 13): cosh(p t₁) = 1 + ½ /[(a/gα)(a/gα − 1)], from θ̈ = p²(θ − α + a/g) and then the energy to pass the
-    top; linear in the angles. ``duration`` → ∞: g α.
+    Housner (1963, eq. 13): cosh(p t₁) = 1 + ½ /[(a/gα)(a/gα − 1)], from θ̈ = p²(θ − α + a/g) and then the energy to
+    pass the top; linear in the angles. ``duration`` → ∞: g α.
     """
     p = rocking_parameter(half_diagonal, gravity)
     product = 0.5 / (math.cosh(p * duration) - 1.0)
@@ -126,11 +129,12 @@ def rocking(
     start: float = 0.0,
     restitution: float | None = None,
 ) -> np.ndarray:
-    """(n,) tilt θ (rad, positive towards −x, counter-clockwise) of a rocking block on a base accelerated by ``base`` (n,) m/s².
+    """(n,) tilt θ (rad, positive towards −x, counter-clockwise) of a rocking block on a base accelerated by ``base``
+    (n,) m/s².
 
-    θ̈ = −p² [s sin(α − |θ|) − (a/g) cos(α − |θ|)] about the corner of side s = sign θ, θ̇ multiplied by ``restitution`` (None:
-    `rocking_restitution`) at each impact (Housner 1963; Yim, Chopra & Penzien 1980, Earthquake Engineering and Structural
-    Dynamics 8, 565-587). Runge–Kutta of fourth order between the times, impacts at a root of a cubic.
+    θ̈ = −p² [s sin(α − |θ|) − (a/g) cos(α − |θ|)] about the corner of side s = sign θ, θ̇ multiplied by ``restitution``
+    (None: `rocking_restitution`) at each impact (Housner 1963; Yim, Chopra & Penzien 1980, Earthquake Engineering and
+    Structural Dynamics 8, 565-587). Runge–Kutta of fourth order between the times, impacts at a root of a cubic.
     """
     p2 = rocking_parameter(half_diagonal, gravity) ** 2
     bounce = rocking_restitution(slenderness) if restitution is None else restitution

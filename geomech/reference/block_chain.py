@@ -1,12 +1,14 @@
 """Longitudinal waves along a row of blocks that strain uniformly and touch through springs.
 
-A block of length h, cross-section A (per metre of thickness), mass m = ρ A h has the displacement u + e x along the row: mean
-motion u and strain e. Its neighbours press its faces through springs of stiffness K (N/m, all springs of a joint together):
+A block of length h, cross-section A (per metre of thickness), mass m = ρ A h has the displacement u + e x along the
+row: mean motion u and strain e. Its neighbours press its faces through springs of stiffness K (N/m, all springs of a
+joint together):
 
     m ü_k = N_{k+1/2} − N_{k−1/2},    (m h²/12) ë_k = (h/2)(N_{k+1/2} + N_{k−1/2}) − E A h e_k,
     N_{k+1/2} = K (u_{k+1} − u_k − (h/2)(e_{k+1} + e_k))
 
-Brillouin (1946), Wave propagation in periodic structures, ch. 3-4: a diatomic chain of another kind; derived here. SI units.
+Brillouin (1946), Wave propagation in periodic structures, ch. 3-4: a diatomic chain of another kind; derived here. SI
+units.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ import numpy as np
 
 
 def long_wave_speed(length: float, mass: float, joint: float, axial: float) -> float:
-    """Speed (m/s) of waves much longer than a block: h √(k/m), 1/k = 1/K + 1/k_b, ``joint`` K and block stiffness ``axial``
-    k_b = E A/h (N/m). The continuum of the same mass and compliance; √(E/ρ) for stiff joints."""
+    """Speed (m/s) of waves much longer than a block: h √(k/m), 1/k = 1/K + 1/k_b, ``joint`` K and block stiffness
+    ``axial`` k_b = E A/h (N/m). The continuum of the same mass and compliance; √(E/ρ) for stiff joints."""
     return length * math.sqrt(1.0 / (1.0 / joint + 1.0 / axial) / mass)
 
 
@@ -43,8 +45,8 @@ def dispersion(wave_number: np.ndarray, length: float, mass: float, joint: float
 def chain_matrices(
     n: int, length: float, mass: float, joint: float, axial: float, fixed_end: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(mass (2n,), stiffness (2n, 2n)) of a row of ``n`` blocks, unknowns u_1, e_1, u_2, e_2, …; its left end free, its right
-    end free or, with ``fixed_end``, joined to a block that does not move."""
+    """(mass (2n,), stiffness (2n, 2n)) of a row of ``n`` blocks, unknowns u_1, e_1, u_2, e_2, …; its left end free, its
+    right end free or, with ``fixed_end``, joined to a block that does not move."""
     masses = np.tile([mass, mass * length**2 / 12.0], n)
     stiffness = np.zeros((2 * n, 2 * n))
     for k in range(n):

@@ -34,8 +34,8 @@ def stopping_distance(speed: float, friction_angle: float, gravity: float = 9.81
 def shi_amplification(omega_dt: float) -> np.ndarray:
     """(2, 2) what Shi's (1988) time step does to (x, v dt) of an undamped oscillator, Ω = ω dt.
 
-    d = v dt + a dt²/2 and v' = v + a dt with a = −ω²(x + d): Newmark's (1959) scheme with β = ½, γ = 1. Its determinant,
-    the squared modulus of the complex pair for Ω < 4, is 1/(1 + Ω²/2).
+    d = v dt + a dt²/2 and v' = v + a dt with a = −ω²(x + d): Newmark's (1959) scheme with β = ½, γ = 1. Its
+    determinant, the squared modulus of the complex pair for Ω < 4, is 1/(1 + Ω²/2).
     """
     o = omega_dt**2
     return np.array([[2.0, 2.0], [-2.0 * o, 2.0 - o]]) / (2.0 + o)
@@ -101,7 +101,8 @@ def column_shortening(
 
 
 def plastic_impact_bounds(masses: tuple[float, float], speeds: tuple[float, float]) -> tuple[float, float]:
-    """(total momentum, least kinetic energy) of two bodies that meet head on: Newton (1687); the least is the plastic case."""
+    """(total momentum, least kinetic energy) of two bodies that meet head on: Newton (1687); the least is the plastic
+    case."""
     m, v = np.asarray(masses), np.asarray(speeds)
     momentum = float(m @ v)
     return momentum, momentum**2 / (2 * float(m.sum()))

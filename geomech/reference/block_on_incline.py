@@ -1,12 +1,12 @@
 """A rigid block, or two, on a plane incline: stays, slides, topples, or slides and topples, and how fast it starts.
 
-A column of width b and height h has the slenderness angle δ with tan δ = b/h. Ashby (1971), "Sliding and toppling modes of
-failure in models and jointed rock slopes" (MSc thesis, Imperial College), drew the map over α, δ, φ from statics;
-Bray & Goodman (1981) and Sagaseta (1986), "On the modes of instability of a rigid block on an inclined plane", Rock Mechanics and
-Rock Engineering 19, 261-266, moved the boundary between toppling and toppling with sliding to where the toe, in
-rotation, just holds; Yagoda-Biran & Hatzor (2013), "A new failure mode chart for toppling and sliding with consideration
-of earthquake inertia force", International Journal of Rock Mechanics and Mining Sciences 64, 122-131, give the map so
-completed. Angles rad, accelerations m/s² and rad/s²; the thickness and the density cancel.
+A column of width b and height h has the slenderness angle δ with tan δ = b/h. Ashby (1971), "Sliding and toppling modes
+of failure in models and jointed rock slopes" (MSc thesis, Imperial College), drew the map over α, δ, φ from statics;
+Bray & Goodman (1981) and Sagaseta (1986), "On the modes of instability of a rigid block on an inclined plane", Rock
+Mechanics and Rock Engineering 19, 261-266, moved the boundary between toppling and toppling with sliding to where the
+toe, in rotation, just holds; Yagoda-Biran & Hatzor (2013), "A new failure mode chart for toppling and sliding with
+consideration of earthquake inertia force", International Journal of Rock Mechanics and Mining Sciences 64, 122-131,
+give the map so completed. Angles rad, accelerations m/s² and rad/s²; the thickness and the density cancel.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def starting_accelerations(
 ) -> tuple[float, float]:
     """(acceleration of the toe down the incline, angular acceleration forwards) of a column at rest, m/s² and rad/s².
 
-    Newton's equations in each mode: about the toe for toppling, I = (4/3) m r²; for sliding and toppling with T = N tan φ at
-    the toe, about the centroid, I = m r²/3.
+    Newton's equations in each mode: about the toe for toppling, I = (4/3) m r²; for sliding and toppling with T = N tan
+    φ at the toe, about the centroid, I = m r²/3.
     """
     a, d, slope = incline, slenderness, math.tan(friction_angle)
     r = 0.5 * height / math.cos(d)
@@ -64,8 +64,8 @@ def starting_accelerations(
 def stacked_accelerations(
     incline: float, base_friction: float, between: float, masses: tuple[float, float], gravity: float = 9.81
 ) -> tuple[float, float]:
-    """Accelerations (m/s²) down the ``incline`` of a lower and an upper block from rest, friction angle ``base_friction``
-    under the lower, ``between`` them; ``masses`` lower first. Neither topples.
+    """Accelerations (m/s²) down the ``incline`` of a lower and an upper block from rest, friction angle
+    ``base_friction`` under the lower, ``between`` them; ``masses`` lower first. Neither topples.
 
     Coulomb (1785) in each joint. If the upper block slides on the lower it drags it along with its friction; the lower
     one never outruns it, since friction would then push the upper one faster than free sliding.

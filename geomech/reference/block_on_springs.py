@@ -1,8 +1,9 @@
 """A square that may strain, on an incline, on two springs with friction: explicit integration in time.
 
 Independent of the block solver: small motions of fixed axes along and across the incline, forces at the start of a step
-only, steps that resolve the stiffest spring, friction as a return mapping of a spring in series with a slider. A first-order
-block has no other physics, so what this does under a suddenly acting weight is what a block solver must tend to.
+only, steps that resolve the stiffest spring, friction as a return mapping of a spring in series with a slider. A
+first-order block has no other physics, so what this does under a suddenly acting weight is what a block solver must
+tend to.
 """
 
 from __future__ import annotations
@@ -25,19 +26,20 @@ def creep_of_a_sudden_weight(
     density: float,
     gravity: float = 9.81,
 ) -> np.ndarray:
-    """(outputs,) m that a 1 m square has gone down an ``incline`` (rad) at equal times up to ``duration`` (s), when its weight
-    acts at once on a block that just touches, in plane strain.
+    """(outputs,) m that a 1 m square has gone down an ``incline`` (rad) at equal times up to ``duration`` (s), when its
+    weight acts at once on a block that just touches, in plane strain.
 
-    Contact ``spring`` (Pa) normal and along, at its two lower corners; ``damping`` as `geomech.model.DdaSettings` counts it: a
-    viscous stress for the block's vibration, ω² = 12 C₁₁/(ρ h²), and a dashpot 2 ξ √(k m) across each contact. Semi-implicit
-    Euler steps ``dt`` (s), of first order.
+    Contact ``spring`` (Pa) normal and along, at its two lower corners; ``damping`` as `geomech.model.DdaSettings`
+    counts it: a viscous stress for the block's vibration, ω² = 12 C₁₁/(ρ h²), and a dashpot 2 ξ √(k m) across each
+    contact. Semi-implicit Euler steps ``dt`` (s), of first order.
     """
     bulk = youngs_modulus / ((1 + poissons_ratio) * (1 - 2 * poissons_ratio))
     modulus, lateral = bulk * (1 - poissons_ratio), bulk * poissons_ratio
     friction, drag = math.tan(friction_angle), 2 * damping * math.sqrt(spring * density)
     viscous = 2 * damping * math.sqrt(density / (12 * modulus))
     along, across = density * gravity * math.sin(incline), density * gravity * math.cos(incline)
-    # Displacements and rates of the centre, the rotation and three strains; plain numbers are quicker than short arrays.
+    # Displacements and rates of the centre, the rotation and three strains; plain numbers are quicker than short
+    # arrays.
     u = v = r = ex = ey = g = du = dv = dr = dex = dey = dg = 0.0
     corners = [[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]]  # x, stretch of the shear spring, where the corner was
     y = -0.5

@@ -10,9 +10,10 @@ import math
 
 
 def breakout_ratio(greater: float, lesser: float, cohesion: float, friction_angle: float) -> float:
-    """By how much both remote stresses have to be multiplied for the wall of an empty hole to fail in shear: uniaxial strength
-    2c cos φ/(1 − sin φ) over the greatest hoop stress 3σ_H − σ_h (Kirsch 1898; Jaeger, Cook & Zimmerman 2007, ch. 8). It is
-    reached where the wall faces σ_h, so that breakouts point along the lesser stress (Bell & Gough 1979)."""
+    """By how much both remote stresses have to be multiplied for the wall of an empty hole to fail in shear: uniaxial
+    strength 2c cos φ/(1 − sin φ) over the greatest hoop stress 3σ_H − σ_h (Kirsch 1898; Jaeger, Cook & Zimmerman 2007,
+    ch. 8). It is reached where the wall faces σ_h, so that breakouts point along the lesser stress (Bell & Gough
+    1979)."""
     strength = 2 * cohesion * math.cos(friction_angle) / (1 - math.sin(friction_angle))
     return strength / (3 * greater - lesser)
 

@@ -32,9 +32,9 @@ def centre_crack(
 
 
 def crack_in_disc(half_length: float, power: int, shear: bool = False, terms: int = 24) -> float:
-    """K_I (K_II with ``shear``) of a crack 2·``half_length`` in the middle of a free disc of radius 1 whose faces a traction
-    x^``power``, even, pulls apart (shears). Less a field with that traction along the whole x-axis (Φ = 0, Ψ = z^power) the
-    faces are free and the outline bears the field's."""
+    """K_I (K_II with ``shear``) of a crack 2·``half_length`` in the middle of a free disc of radius 1 whose faces a
+    traction x^``power``, even, pulls apart (shears). Less a field with that traction along the whole x-axis (Φ = 0, Ψ =
+    z^power) the faces are free and the outline bears the field's."""
     angle = (np.arange(10 * terms) + 0.5) * np.pi / (10 * terms)
     z = np.exp(1j * angle)
     right = (1j * z) ** 2 * (1j if shear else 1.0) * z**power
@@ -42,8 +42,8 @@ def crack_in_disc(half_length: float, power: int, shear: bool = False, terms: in
 
 
 def _fitted(a: float, z, along, weight, right, terms: int) -> tuple[float, float]:
-    """K_I, K_II from ``right`` (n,), normal plus i times minus shear traction at points ``z`` of half the outline, which runs
-    ``along``; each counts by its ``weight``."""
+    """K_I, K_II from ``right`` (n,), normal plus i times minus shear traction at points ``z`` of half the outline,
+    which runs ``along``; each counts by its ``weight``."""
     root = np.sqrt(z - a) * np.sqrt(z + a)
     columns, tip = [], []
     for p, dp, p_tip in _orthogonal(z, a, terms):

@@ -51,8 +51,9 @@ def small_crack(ratio: float, angle: float) -> tuple[float, float]:
 @lru_cache
 def power_factors(ratio: float, terms: int = TERMS) -> tuple[np.ndarray, np.ndarray]:
     """(terms,) T_i and S_i: K_I and K_II, in units of √(πa), of a crack a/R = ``ratio`` whose faces bear the traction
-    (x/a)^(2i−2). They are the coefficients of Atkinson, Smelser & Sanchez (1982), computed by `boundary_collocation` (not taken
-    from their table, which later literature prints with errors beyond the second column); `dislocations` has the same ten digits."""
+    (x/a)^(2i−2). They are the coefficients of Atkinson, Smelser & Sanchez (1982), computed by `boundary_collocation`
+    (not taken from their table, which later literature prints with errors beyond the second column); `dislocations` has
+    the same ten digits."""
     out = [
         [crack_in_disc(ratio, 2 * j, shear) / ratio ** (2 * j) / math.sqrt(math.pi * ratio) for j in range(terms)]
         for shear in (False, True)
@@ -61,9 +62,9 @@ def power_factors(ratio: float, terms: int = TERMS) -> tuple[np.ndarray, np.ndar
 
 
 def hertz_powers(angle: float, terms: int = TERMS) -> tuple[np.ndarray, np.ndarray]:
-    """(terms,) what pulls and what shears the line of the crack in the whole disc, as coefficients of (x/R)^(2j), P/πR = 1:
-    −4 (j+1) sin θ sin (2j+1)θ (+1 for a uniform part that j = 0 has: 1 − 4 sin²θ) and 2j sin 2jθ − 2 (j+1) sin 2(j+1)θ, by
-    expanding `whole_disc`; θ = ``angle`` between crack and load."""
+    """(terms,) what pulls and what shears the line of the crack in the whole disc, as coefficients of (x/R)^(2j), P/πR
+    = 1: −4 (j+1) sin θ sin (2j+1)θ (+1 for a uniform part that j = 0 has: 1 − 4 sin²θ) and 2j sin 2jθ − 2 (j+1) sin
+    2(j+1)θ, by expanding `whole_disc`; θ = ``angle`` between crack and load."""
     j = np.arange(terms)
     pull = -4 * (j + 1) * math.sin(angle) * np.sin((2 * j + 1) * angle)
     pull[0] += 1
@@ -71,8 +72,8 @@ def hertz_powers(angle: float, terms: int = TERMS) -> tuple[np.ndarray, np.ndarr
 
 
 def atkinson(ratio: float, angle: float, terms: int = TERMS) -> tuple[float, float]:
-    """N_I and |N_II| by the series in (a/R)², ``ratio`` = a/R (Atkinson, Smelser & Sanchez 1982), with `power_factors`. What is
-    left out is of order 4 ``terms`` (a/R)^(2 terms) T."""
+    """N_I and |N_II| by the series in (a/R)², ``ratio`` = a/R (Atkinson, Smelser & Sanchez 1982), with `power_factors`.
+    What is left out is of order 4 ``terms`` (a/R)^(2 terms) T."""
     reach = ratio ** (2.0 * np.arange(terms))
     pull, shear = hertz_powers(angle, terms)
     opened, slid = power_factors(ratio, terms)

@@ -17,8 +17,8 @@ def collinear_array(stress: float, half_length: float, period: float) -> float:
 
 
 def stacked_array(half_length: float, period: float, n: int = 65) -> float:
-    """K_I/σ of cracks 2a above one another, a ``period`` h apart, pulled across (computed, `dislocations.stack`); √(h/2)
-    when they are long beside it (Koiter 1959)."""
+    """K_I/σ of cracks 2a above one another, a ``period`` h apart, pulled across (computed, `dislocations.stack`);
+    √(h/2) when they are long beside it (Koiter 1959)."""
     pulled = np.array([0.0, 1.0, 0.0])
     return float(stress_intensity([Arm(-half_length, half_length)], _uniform(pulled), stack(period), n)[0, 0])
 
@@ -42,8 +42,8 @@ def near_surface(ends: np.ndarray, pressure: float, n: int = 65) -> np.ndarray:
     return stress_intensity([Arm(complex(*a), complex(*b))], _uniform(inside), "half-plane", n)
 
 
-#: Edge crack in a half-plane, K_I/(σ√(πa)) (Koiter 1965). The digits are those of `dislocations` with 257 to 1025 points, which
-#: differ by 1e-11.
+#: Edge crack in a half-plane, K_I/(σ√(πa)) (Koiter 1965). The digits are those of `dislocations` with 257 to 1025
+#: points, which differ by 1e-11.
 EDGE_CRACK_HALF_PLANE = 1.1215222552
 
 
@@ -71,8 +71,9 @@ def random_cracks(number: int, seed: int = 7, length: float = 1.0, spacing: floa
 
 
 def cracks_in_cells(number: int, seed: int = 0, spread: float = 6.0) -> list[np.ndarray]:
-    """``number``² cracks (2, 2) of lengths from 0.96 down to that over ``spread``, evenly in the logarithm, each anywhere in
-    its cell of side 1 and in any direction; quick for thousands of them, and neighbours come as near as a fiftieth."""
+    """``number``² cracks (2, 2) of lengths from 0.96 down to that over ``spread``, evenly in the logarithm, each
+    anywhere in its cell of side 1 and in any direction; quick for thousands of them, and neighbours come as near as a
+    fiftieth."""
     random = np.random.default_rng(seed)
     n = number * number
     half = 0.48 * spread ** -random.uniform(0, 1, n)

@@ -8,11 +8,12 @@ import numpy as np
 def griffith_field(
     points: np.ndarray, half_length: float, remote: np.ndarray, shear_modulus: float, poissons_ratio: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) stress and (n, 2) displacement about an open crack |x| < a, y = 0 in a ``remote`` stress (Westergaard 1939;
-    Muskhelishvili's potentials for the parallel field that Westergaard's lack, Sih 1966). Plane strain.
+    """(n, 3) stress and (n, 2) displacement about an open crack |x| < a, y = 0 in a ``remote`` stress (Westergaard
+    1939; Muskhelishvili's potentials for the parallel field that Westergaard's lack, Sih 1966). Plane strain.
 
-    With T = σ_yy − iσ_xy of the remote field the crack adds Φ = T (z/√(z²−a²) − 1)/2 and as much to Ω with T's conjugate.
-    Its displacement vanishes at infinity, that of the uniform strain at the origin. On the crack: the upper face.
+    With T = σ_yy − iσ_xy of the remote field the crack adds Φ = T (z/√(z²−a²) − 1)/2 and as much to Ω with T's
+    conjugate. Its displacement vanishes at infinity, that of the uniform strain at the origin. On the crack: the upper
+    face.
     """
     points = np.asarray(points, dtype=float)
     z = points[:, 0] + 1j * points[:, 1]

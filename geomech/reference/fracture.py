@@ -52,7 +52,8 @@ def closed(
 
 
 def collinear_pair(stress: float, inner: float, outer: float) -> tuple[float, float]:
-    """K_I at the inner and outer tips of two equal collinear cracks, inner < |x| < outer (Willmore 1949; Erdogan 1962)."""
+    """K_I at the inner and outer tips of two equal collinear cracks, inner < |x| < outer (Willmore 1949; Erdogan
+    1962)."""
     from scipy.special import ellipe, ellipkm1
 
     b, c = inner, outer
@@ -89,5 +90,6 @@ def crack_in_bending(gradient: float, half_length: float) -> tuple[float, float]
 
 
 def spinning_disc_centre(density: float, rate: float, radius: float, poissons_ratio: float) -> float:
-    """σ_rr = σ_θθ at the centre of a spinning cylinder in plane strain, ρω²R²(3−2ν)/(8(1−ν)) (Timoshenko & Goodier 1951)."""
+    """σ_rr = σ_θθ at the centre of a spinning cylinder in plane strain, ρω²R²(3−2ν)/(8(1−ν)) (Timoshenko & Goodier
+    1951)."""
     return density * rate**2 * radius**2 * (3 - 2 * poissons_ratio) / (8 * (1 - poissons_ratio))

@@ -24,12 +24,12 @@ def trace_length_moments(diameter_moments: tuple[float, float, float]) -> tuple[
 
 
 def cells_of_poisson_lines(length_per_area: float) -> dict[str, float]:
-    """Means of the cells between Poisson lines of all directions, P21 = τ: area π/τ² m², perimeter 2π/τ m, sides 4 (Miles
-    1964, Proc. Natl. Acad. Sci. 52, 901; Santaló 1976)."""
+    """Means of the cells between Poisson lines of all directions, P21 = τ: area π/τ² m², perimeter 2π/τ m, sides 4
+    (Miles 1964, Proc. Natl. Acad. Sci. 52, 901; Santaló 1976)."""
     return {"area": np.pi / length_per_area**2, "perimeter": 2 * np.pi / length_per_area, "sides": 4.0}
 
 
 def scan_line_spacing(distance: np.ndarray, per_length: float) -> np.ndarray:
-    """Part of the spacings along a scan-line not larger than ``distance`` m where traces fall anywhere: exponential (Priest &
-    Hudson 1976, Int. J. Rock Mech. Min. Sci. 13, 135)."""
+    """Part of the spacings along a scan-line not larger than ``distance`` m where traces fall anywhere: exponential
+    (Priest & Hudson 1976, Int. J. Rock Mech. Min. Sci. 13, 135)."""
     return 1.0 - np.exp(-per_length * np.asarray(distance, dtype=float))

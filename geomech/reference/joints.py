@@ -9,9 +9,9 @@ import numpy as np
 #: Basic friction angle (rad), JRC and JCS (Pa) of the example that `ROUGH_JOINT_TABLE` is of.
 ROUGH_JOINT_EXAMPLE = (math.radians(29.0), 16.9, 96e6)
 
-#: Normal stress, shear strength (MPa), its slope, and the cohesion of its tangent (MPa): Hoek, Practical Rock Engineering
-#: (2007), chapter "Shear strength of discontinuities", the spreadsheet of instantaneous cohesion and friction angle.
-#: Quoted; every figure agrees with Barton's equation to the digits printed.
+#: Normal stress, shear strength (MPa), its slope, and the cohesion of its tangent (MPa): Hoek, Practical Rock
+#: Engineering (2007), chapter "Shear strength of discontinuities", the spreadsheet of instantaneous cohesion and
+#: friction angle. Quoted; every figure agrees with Barton's equation to the digits printed.
 ROUGH_JOINT_TABLE = np.array(
     [
         [0.360, 0.989, 1.652, 0.394],
@@ -37,9 +37,9 @@ def barton_strength(pressure: float, jrc: float, jcs: float, residual_angle: flo
 def lift_at_constant_stiffness(
     slip: np.ndarray, jrc: float, jcs: float, pressure: float, stiffness: float, peak_slip: float
 ) -> np.ndarray:
-    """(n,) m: lift of a rough joint that slides by ``slip`` (n,) m beyond its peak against a wall of ``stiffness`` Pa/m,
-    from ``pressure`` Pa on: dv/ds = tan(½ JRC_mob log₁₀(JCS/σ)), σ = σ₀ + K v (Barton & Choubey 1977 eq. 11; decay of JRC
-    by Barton, Bandis & Bakhtar 1985), by Runge–Kutta of order 8."""
+    """(n,) m: lift of a rough joint that slides by ``slip`` (n,) m beyond its peak against a wall of ``stiffness``
+    Pa/m, from ``pressure`` Pa on: dv/ds = tan(½ JRC_mob log₁₀(JCS/σ)), σ = σ₀ + K v (Barton & Choubey 1977 eq. 11;
+    decay of JRC by Barton, Bandis & Bakhtar 1985), by Runge–Kutta of order 8."""
     from scipy.integrate import solve_ivp
 
     def rate(s, v):

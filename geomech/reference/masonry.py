@@ -10,16 +10,17 @@ import math
 
 import numpy as np
 
-#: Thinnest semicircular arch with radial joints, thickness over mean radius, and its haunch hinge from the crown, degrees:
-#: Milankovitch (1907), "Theorie der Druckkurven", Zeitschrift für Mathematik und Physik 55, 1-27, confirmed by Ochsendorf
-#: (2006), "The masonry arch on spreading supports", The Structural Engineer 84, 29-36, and Cocchetti, Colasante & Rizzi (2011),
-#: "On the analysis of minimum thickness in circular masonry arches", Applied Mechanics Reviews 64, 050802.
+#: Thinnest semicircular arch with radial joints, thickness over mean radius, and its haunch hinge from the crown,
+#: degrees: Milankovitch (1907), "Theorie der Druckkurven", Zeitschrift für Mathematik und Physik 55, 1-27, confirmed by
+#: Ochsendorf (2006), "The masonry arch on spreading supports", The Structural Engineer 84, 29-36, and Cocchetti,
+#: Colasante & Rizzi (2011), "On the analysis of minimum thickness in circular masonry arches", Applied Mechanics
+#: Reviews 64, 050802.
 MILANKOVITCH_RATIO, MILANKOVITCH_HINGE_DEG = 0.1075, 54.5
 
 
 def voussoirs(n: int, ratio: float, radius: float = 1.0) -> list[np.ndarray]:
-    """Outlines (4, 2) of ``n`` equal voussoirs of a semicircular arch of mean ``radius`` and thickness ``ratio`` times it,
-    from the right springing to the left; centre at the origin."""
+    """Outlines (4, 2) of ``n`` equal voussoirs of a semicircular arch of mean ``radius`` and thickness ``ratio`` times
+    it, from the right springing to the left; centre at the origin."""
     inner, outer = radius * (1 - 0.5 * ratio), radius * (1 + 0.5 * ratio)
     angle = np.linspace(0.0, np.pi, n + 1)
     rays = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -28,7 +29,8 @@ def voussoirs(n: int, ratio: float, radius: float = 1.0) -> list[np.ndarray]:
 
 
 def least_pull(n: int, ratio: float) -> float:
-    """Least tension, over all equilibria of ``n`` rigid voussoirs under their own weight, that some joint's corner must carry.
+    """Least tension, over all equilibria of ``n`` rigid voussoirs under their own weight, that some joint's corner must
+    carry.
 
     In units of the weight per area times R²; negative: the arch stands, and its corners can all be pressed by as much.
     Heyman's (1966) safe theorem as a linear program (Livesley 1978, "Limit analysis of structures formed from rigid
@@ -70,8 +72,8 @@ def least_pull(n: int, ratio: float) -> float:
 def thinnest_arch(n: int) -> float:
     """t/R below which an arch of ``n`` voussoirs falls: the root of `least_pull`.
 
-    Hinges form at joints only, so few voussoirs stand at less: 0.1041 (6), 0.1015 (9), 0.1049 (12), 0.1070 (25), 0.1074 (50);
-    Milankovitch's 0.1075 is the limit of many.
+    Hinges form at joints only, so few voussoirs stand at less: 0.1041 (6), 0.1015 (9), 0.1049 (12), 0.1070 (25), 0.1074
+    (50); Milankovitch's 0.1075 is the limit of many.
     """
     from scipy.optimize import brentq
 
@@ -84,22 +86,23 @@ def three_hinge_thrust(span: float, thickness: float, unit_weight: float) -> flo
 
 
 def voussoir_contact(span: float, thickness: float) -> float:
-    """Part of its faces on which a beam of two elastic halves bears at the crown and the abutments, n = 1/(0.22 S/T + 2.7):
-    fitted to finite elements by Sofianos (1996), "Analysis and design of an underground hard rock voussoir beam roof",
-    International Journal of Rock Mechanics 33, 153-166, values of 0.12 to 0.30; quoted in Brady & Brown (2004), "Rock mechanics for
-    underground mining", eq. 8.15. Diederichs & Kaiser (1999), Int. J. Rock Mech. 36, 97-117, take n near 0.75, from the least of
-    the greatest stresses, which no continuum bears out (ibid.)."""
+    """Part of its faces on which a beam of two elastic halves bears at the crown and the abutments, n = 1/(0.22 S/T +
+    2.7): fitted to finite elements by Sofianos (1996), "Analysis and design of an underground hard rock voussoir beam
+    roof", International Journal of Rock Mechanics 33, 153-166, values of 0.12 to 0.30; quoted in Brady & Brown (2004),
+    "Rock mechanics for underground mining", eq. 8.15. Diederichs & Kaiser (1999), Int. J. Rock Mech. 36, 97-117, take n
+    near 0.75, from the least of the greatest stresses, which no continuum bears out (ibid.)."""
     return 1.0 / (0.22 * span / thickness + 2.7)
 
 
 def voussoir_thrust(span: float, thickness: float, unit_weight: float, sag: float = 0.0) -> float:
-    """Thrust (N) of that beam: w S²/(8 z), z = T (1 − 2 n/3) − ``sag`` (m), for triangles of pressure at both ends of the arm."""
+    """Thrust (N) of that beam: w S²/(8 z), z = T (1 − 2 n/3) − ``sag`` (m), for triangles of pressure at both ends of
+    the arm."""
     arm = thickness * (1.0 - 2.0 / 3.0 * voussoir_contact(span, thickness)) - sag
     return unit_weight * thickness * span**2 / (8.0 * arm)
 
 
-#: Sag at which it snaps through, over its arm before: w ∝ z (z₀² − z²) is greatest at z = z₀/√3 (Sofianos 1996; Brady & Brown
-#: 2004, eqs. 8.37 and 8.38).
+#: Sag at which it snaps through, over its arm before: w ∝ z (z₀² − z²) is greatest at z = z₀/√3 (Sofianos 1996; Brady &
+#: Brown 2004, eqs. 8.37 and 8.38).
 SNAP_THROUGH_SAG = 1.0 - 1.0 / math.sqrt(3.0)
 
 
@@ -108,8 +111,9 @@ def two_block_beam(
 ) -> tuple[float, float]:
     """(thrust N, sag of the crown m) of a beam of two halves, each of them strained uniformly by its own forces.
 
-    Three-hinge statics on the deformed halves: mean stress σ̄ = (1/A) Σ sym(x ⊗ f) of the corner forces, plane compliance
-    (3, 3) 1/Pa, and a ``spring`` N/m in each corner contact. Fixed-point iteration on the rotation of a half.
+    Three-hinge statics on the deformed halves: mean stress σ̄ = (1/A) Σ sym(x ⊗ f) of the corner forces, plane
+    compliance (3, 3) 1/Pa, and a ``spring`` N/m in each corner contact. Fixed-point iteration on the rotation of a
+    half.
     """
     half = 0.5 * span
     weight = unit_weight * half * thickness

@@ -35,7 +35,8 @@ def edge_crack_strip(ratio: float) -> float:
     return math.sqrt(math.tan(angle) / angle) * bracket / math.cos(angle)
 
 
-#: Edge crack in pure bending, σ = 6M/W²: a/W → F (Kaya & Erdogan 1987; the crack solver at order 8 has the same digits).
+#: Edge crack in pure bending, σ = 6M/W²: a/W → F (Kaya & Erdogan 1987; the crack solver at order 8 has the same
+#: digits).
 EDGE_CRACK_BENDING = {
     0.1: 1.0472, 0.2: 1.0553, 0.3: 1.1241, 0.4: 1.2606, 0.5: 1.4972, 0.6: 1.9140, 0.7: 2.7252, 0.8: 4.6764
 }  # fmt: skip
@@ -43,8 +44,8 @@ EDGE_CRACK_BENDING = {
 
 def three_point_bending(ratio: float, load: float, depth: float) -> float:
     """K_I of a beam of span 4W under ``load`` (N/m) in the middle, depth W, edge crack a = ``ratio``·W: stated to be
-    within 0.5 % for 0 ≤ a/W ≤ 1 (Srawley 1976, Int. J. Fracture 12, 475–476; coefficients as ASTM E399 has them, quoted by
-    Dowling, Mechanical Behavior of Materials, fig. 8.13b: the paper itself was not at hand)."""
+    within 0.5 % for 0 ≤ a/W ≤ 1 (Srawley 1976, Int. J. Fracture 12, 475–476; coefficients as ASTM E399 has them, quoted
+    by Dowling, Mechanical Behavior of Materials, fig. 8.13b: the paper itself was not at hand)."""
     r = ratio
     f = 3 * math.sqrt(r) * (1.99 - r * (1 - r) * (2.15 - 3.93 * r + 2.7 * r * r)) / (2 * (1 + 2 * r) * (1 - r) ** 1.5)
     return 4 * load / math.sqrt(depth) * f

@@ -21,8 +21,8 @@ def plane_failure_factor(
 ) -> float:
     """Factor of safety of a block of ``weight`` on a plane: [c A + (W cos α − U − V sin α) tan φ]/(W sin α + V cos α).
 
-    ``uplift`` U is the water force normal to the plane, ``thrust`` V the horizontal one in a vertical tension crack behind
-    the block. Hoek & Bray (1981), Rock slope engineering, 3rd ed., chapter 7.
+    ``uplift`` U is the water force normal to the plane, ``thrust`` V the horizontal one in a vertical tension crack
+    behind the block. Hoek & Bray (1981), Rock slope engineering, 3rd ed., chapter 7.
     """
     sine, cosine = math.sin(dip), math.cos(dip)
     holding = cohesion * length + (weight * cosine - uplift - thrust * sine) * math.tan(friction_angle)
@@ -32,12 +32,13 @@ def plane_failure_factor(
 def two_block_friction(
     active: tuple[float, float], passive: tuple[float, float], interface: float | None = None
 ) -> float:
-    """The friction angle (rad) at which two blocks on two planes just slide, ``active`` = (weight, dip) on the steeper plane
-    behind ``passive`` = (weight, dip), across a vertical interface of friction angle ``interface`` (None: that of the planes).
+    """The friction angle (rad) at which two blocks on two planes just slide, ``active`` = (weight, dip) on the steeper
+    plane behind ``passive`` = (weight, dip), across a vertical interface of friction angle ``interface`` (None: that of
+    the planes).
 
     Both slide down their planes, the active block down along the interface too, friction fully mobilised everywhere:
-    two equations of force a block, three unknown forces and tan φ (Jaeger 1971, "Friction of rocks and stability of rock
-    slopes", Géotechnique 21, 97-134; the sliding-block method of the active and passive wedge).
+    two equations of force a block, three unknown forces and tan φ (Jaeger 1971, "Friction of rocks and stability of
+    rock slopes", Géotechnique 21, 97-134; the sliding-block method of the active and passive wedge).
     """
 
     def surplus(angle: float) -> float:

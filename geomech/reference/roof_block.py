@@ -1,7 +1,7 @@
 """A block that hangs in the roof of a tunnel: on a rock bridge, and between two joints that widen downwards.
 
-Forces N per metre of thickness, lengths m, angles rad. The block is symmetric; its side joints stand at ``half_angle`` from
-the vertical, and the rock on either side presses on them with the horizontal ``thrust``.
+Forces N per metre of thickness, lengths m, angles rad. The block is symmetric; its side joints stand at ``half_angle``
+from the vertical, and the rock on either side presses on them with the horizontal ``thrust``.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ def ligament_factor(force: float, half_width: float) -> float:
 def bridge_force(weight: float, thrust: float, half_angle: float, friction: float) -> float:
     """What a bridge above the block carries once the block is about to slide: W − 2H tan(φ − α), not less than 0.
 
-    Statics of the wedge between two planes on which the reaction is inclined by φ against the motion (as for the roof block
-    of Goodman & Shi 1985, Block Theory, and Brady & Brown, Rock Mechanics for Underground Mining, on roof prisms). Smooth
-    planes squeeze the block out: W + 2H tan α.
+    Statics of the wedge between two planes on which the reaction is inclined by φ against the motion (as for the roof
+    block of Goodman & Shi 1985, Block Theory, and Brady & Brown, Rock Mechanics for Underground Mining, on roof
+    prisms). Smooth planes squeeze the block out: W + 2H tan α.
     """
     return max(0.0, weight - 2 * thrust * math.tan(friction - half_angle))
 
@@ -36,8 +36,9 @@ def least_thrust(weight: float, half_angle: float, friction: float) -> float:
 def acceleration(
     weight: float, thrust: float, half_angle: float, friction: float, wall_mass: float = 0.0, gravity: float = 9.81
 ) -> float:
-    """Acceleration of the block, free of its bridge, as it slides out between walls of ``wall_mass`` (kg/m) each that the
-    thrust keeps pressed on it: they follow it with tan α of its own. 0 when the thrust holds it, g when walls are too slow."""
+    """Acceleration of the block, free of its bridge, as it slides out between walls of ``wall_mass`` (kg/m) each that
+    the thrust keeps pressed on it: they follow it with tan α of its own. 0 when the thrust holds it, g when walls are
+    too slow."""
     grip, lean = 2 * math.tan(friction - half_angle), math.tan(half_angle)
     sliding = max(0.0, weight - thrust * grip) / (weight / gravity - grip * wall_mass * lean)
     return gravity if wall_mass * lean * sliding > thrust else sliding

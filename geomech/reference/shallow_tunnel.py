@@ -1,9 +1,9 @@
 """A circular hole below a free surface: closed forms for pressure in it, and a series for any load (Mindlin 1940).
 
-The potentials of the whole plane outside the circle, in powers of 1/(z − z₀) and with the logarithms of the force that the hole
-bears, are continued through the surface (Muskhelishvili 1953, §§ 92–93), so that it is free whatever the coefficients are;
-those are fitted to the tractions on the circle by least squares. The error falls geometrically with the number of terms.
-Radius 1, rock in y < 0, the hole's centre at (0, −depth).
+The potentials of the whole plane outside the circle, in powers of 1/(z − z₀) and with the logarithms of the force that
+the hole bears, are continued through the surface (Muskhelishvili 1953, §§ 92–93), so that it is free whatever the
+coefficients are; those are fitted to the tractions on the circle by least squares. The error falls geometrically with
+the number of terms. Radius 1, rock in y < 0, the hole's centre at (0, −depth).
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ def surface_stress(x: np.ndarray, depth: float, pressure: float = 1.0) -> np.nda
 
 
 def wall_stress(angle: np.ndarray, depth: float, pressure: float = 1.0) -> np.ndarray:
-    """Hoop stress on the wall of the same hole at ``angle`` from straight up, seen from its centre: p (1 + 2 tan²β), β the angle
-    at the surface, above the centre, between straight down and the point (Jeffery 1920; Timoshenko & Goodier 1951, §66)."""
+    """Hoop stress on the wall of the same hole at ``angle`` from straight up, seen from its centre: p (1 + 2 tan²β), β
+    the angle at the surface, above the centre, between straight down and the point (Jeffery 1920; Timoshenko & Goodier
+    1951, §66)."""
     return pressure * (1 + 2 * (np.sin(angle) / (depth - np.cos(angle))) ** 2)
 
 
@@ -41,8 +42,9 @@ def stress(
     poissons_ratio: float = 0.25,
     terms: int = 60,
 ) -> np.ndarray:
-    """(n, 3) stress at ``points`` (n, 2) about the hole in ground of ``weight`` per volume with ``k0`` and a stress ``along`` the
-    surface, ``pressure`` in the hole. Poisson's ratio counts because the hole bears a force, the weight of what was in it."""
+    """(n, 3) stress at ``points`` (n, 2) about the hole in ground of ``weight`` per volume with ``k0`` and a stress
+    ``along`` the surface, ``pressure`` in the hole. Poisson's ratio counts because the hole bears a force, the weight
+    of what was in it."""
     angle = 2 * math.pi * (np.arange(6 * terms) + 0.5) / (6 * terms)
     wall = np.column_stack([np.cos(angle), np.sin(angle) - depth])
     turn = (1j * np.exp(1j * angle)) ** 2
@@ -63,8 +65,8 @@ def stress(
 
 
 def _fields(points: np.ndarray, depth: float, sources: list) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Half the trace and (σyy − σxx)/2 + i σxy at ``points`` of φ₀ = a g, ψ₀ = b g, for (a, b, k) in ``sources``: g = (z − z₀)^−k, or
-    log(z − z₀) where k is zero, and what frees the surface."""
+    """Half the trace and (σyy − σxx)/2 + i σxy at ``points`` of φ₀ = a g, ψ₀ = b g, for (a, b, k) in ``sources``: g =
+    (z − z₀)^−k, or log(z − z₀) where k is zero, and what frees the surface."""
     z = np.asarray(points) @ np.array([1.0, 1j])
 
     def powers(w: np.ndarray, k: int) -> list[np.ndarray]:

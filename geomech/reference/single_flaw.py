@@ -14,8 +14,9 @@ import numpy as np
 WIDTH, HEIGHT, HALF_LENGTH, ANGLE_DEG = 0.050, 0.170, 0.010, 30.0
 YOUNGS_MODULUS, POISSONS_RATIO, UNIAXIAL_STRENGTH, K_IC = 50e9, 0.25, 200e6, 1.2e6
 
-#: (|K_I|, |K_II|)/σ, √m, of the open slot before growth in this plate under uniform end stress, and the kink angle of the
-#: maximum tangential stress that goes with them, degrees; computed with elements of order 8, converged to these digits.
+#: (|K_I|, |K_II|)/σ, √m, of the open slot before growth in this plate under uniform end stress, and the kink angle of
+#: the maximum tangential stress that goes with them, degrees; computed with elements of order 8, converged to these
+#: digits.
 OPEN_SLOT = (0.149807, 0.079556)
 KINK_DEG = 105.72
 
@@ -27,8 +28,8 @@ WING_FACTOR = 0.03371
 
 
 def open_slot_in_plane(half_length: float = HALF_LENGTH, angle_deg: float = ANGLE_DEG) -> tuple[float, float]:
-    """(|K_I|, |K_II|)/σ of an open slot at ``angle_deg`` from the horizontal, infinite plane under vertical compression:
-    cos²β √(πa) and sin β cos β √(πa); K_I is negative, the faces approach."""
+    """(|K_I|, |K_II|)/σ of an open slot at ``angle_deg`` from the horizontal, infinite plane under vertical
+    compression: cos²β √(πa) and sin β cos β √(πa); K_I is negative, the faces approach."""
     b = math.radians(angle_deg)
     root = math.sqrt(math.pi * half_length)
     return math.cos(b) ** 2 * root, math.sin(b) * math.cos(b) * root

@@ -12,8 +12,8 @@ FILM_ANGLE = math.radians(52.07)
 
 
 def thin_layer(half_length: float, depth: float, pressure: float) -> np.ndarray:
-    """(2,) |K_I|, |K_II| of a crack much longer than it is deep: the layer above is a plate clamped at the tips, where the
-    moment pa²/3 makes K = √6 M h^(−3/2) (sin ω, cos ω) (Hutchinson & Suo 1992).
+    """(2,) |K_I|, |K_II| of a crack much longer than it is deep: the layer above is a plate clamped at the tips, where
+    the moment pa²/3 makes K = √6 M h^(−3/2) (sin ω, cos ω) (Hutchinson & Suo 1992).
 
     The clamp yields a little: corrections are of order h/a.
     """

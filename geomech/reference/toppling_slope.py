@@ -2,11 +2,12 @@
 
 Goodman & Bray (1976), "Toppling of rock slopes", in: Rock engineering for foundations and slopes, ASCE Specialty
 Conference, Boulder, vol. 2, 201-234; the example and its table also in Hoek & Bray (1981), Rock slope engineering, 3rd
-ed., chapter 10, and in Wyllie & Mah (2004), 4th ed., table 9.1. Blocks are numbered from the toe, 1 … 16, block 10 stands at the
-crest. Lengths m, forces kN per metre of thickness, unit weight kN/m³.
+ed., chapter 10, and in Wyllie & Mah (2004), 4th ed., table 9.1. Blocks are numbered from the toe, 1 … 16, block 10
+stands at the crest. Lengths m, forces kN per metre of thickness, unit weight kN/m³.
 
-The printed forces are not taken on trust: `limit_equilibrium` repeats every thrust within 0.1 kN, every normal force within 1.5 kN
-(three are printed without decimals) and the limit friction within 1e-4 (`tests/validation/test_dda_slopes.py`).
+The printed forces are not taken on trust: `limit_equilibrium` repeats every thrust within 0.1 kN, every normal force
+within 1.5 kN (three are printed without decimals) and the limit friction within 1e-4
+(`tests/validation/test_dda_slopes.py`).
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ HEIGHTS = np.array([4.0, 8, 12, 16, 20, 24, 28, 32, 36, 40, 34, 28, 22, 16, 10, 
 LIMIT_FRICTION, LIMIT_FRICTION_DEG = 0.7855, 38.15
 
 #: Blocks 1 … 16 at that friction: force from the block above P_{n+1} (what the table calls P_n comes from block n on
-#: block n−1), base normal R_n and shear S_n, kN (Wyllie & Mah 2004, table 9.1). The toe's own P is 0.5 kN by Goodman & Bray.
+#: block n−1), base normal R_n and shear S_n, kN (Wyllie & Mah 2004, table 9.1). The toe's own P is 0.5 kN by Goodman &
+#: Bray.
 PUBLISHED_P = np.array(
     [472.2, 1413.5, 2825.6, 3978.1, 4637.5, 4837.0, 4594.8, 3922.1, 2826.7, 1556.0, 825.7, 292.5, 0, 0, 0, 0]
 )
@@ -41,8 +43,8 @@ SLIDING, TOPPLING, STANDING = range(1, 4), range(4, 14), range(14, 17)
 
 @dataclass(frozen=True, eq=False)
 class Limit:
-    """Forces (16,) kN of blocks 1 … 16: ``thrust`` P_n that block n hands to block n−1, ``normal`` R_n and ``shear`` S_n on
-    its base. ``thrust[0]`` is what would have to hold the toe: the slope stands while it is zero."""
+    """Forces (16,) kN of blocks 1 … 16: ``thrust`` P_n that block n hands to block n−1, ``normal`` R_n and ``shear``
+    S_n on its base. ``thrust[0]`` is what would have to hold the toe: the slope stands while it is zero."""
 
     thrust: np.ndarray
     normal: np.ndarray
@@ -53,8 +55,8 @@ def limit_equilibrium(friction: float) -> Limit:
     """Goodman & Bray's (1976) calculation, from the top block down, at friction ``friction`` = tan φ in all joints.
 
     Block n topples about its toe under P_{n−1} = [P_n (M − Δx tan φ) + ½ W (y sin α − Δx cos α)]/L, or slides under
-    P_{n−1} = P_n − W (cos α tan φ − sin α)/(1 − tan²φ); the greater acts, if it pushes. M and L are the heights of the two
-    thrusts above the base.
+    P_{n−1} = P_n − W (cos α tan φ − sin α)/(1 − tan²φ); the greater acts, if it pushes. M and L are the heights of the
+    two thrusts above the base.
     """
     dip = math.radians(BASE_DIP_DEG)
     sine, cosine = math.sin(dip), math.cos(dip)

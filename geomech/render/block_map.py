@@ -19,7 +19,8 @@ FIXED, INK, CRACK, BRIDGE, LOAD, WATER = "#b9bcc2", "#33363b", "#d7263d", "#ff7a
 
 
 def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
-    """Draw the blocks of a loaded scene, with the statistics that `geomech.output.block_system` has ``told``, as a PNG."""
+    """Draw the blocks of a loaded scene, with the statistics that `geomech.output.block_system` has ``told``, as a
+    PNG."""
     from matplotlib.collections import LineCollection, PathCollection
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D

@@ -1,5 +1,5 @@
-"""The pictures of `geomech bench dda` and `geomech bench geometry`: time against the number of blocks, or against what is left of
-the equations."""
+"""The pictures of `geomech bench dda` and `geomech bench geometry`: time against the number of blocks, or against what
+is left of the equations."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def draw(costs: Sequence[Measured], other: Mapping[int, float], path: Path) -> P
 
 
 def draw_solvers(solutions: Sequence[Mapping[str, Any]], path: Path) -> Path:
-    """Time against residual of ways to solve a step's equations, a panel a scene and size: ``solutions`` are rows of scene, blocks,
-    method, seconds, residual."""
+    """Time against residual of ways to solve a step's equations, a panel a scene and size: ``solutions`` are rows of
+    scene, blocks, method, seconds, residual."""
     from matplotlib.figure import Figure
 
     scenes = list(dict.fromkeys((row["scene"], row["blocks"]) for row in solutions))

@@ -16,8 +16,9 @@ _SOFT = "#4a4e55"
 
 
 def draw_network_statistics(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
-    """Draw what `geomech.output.block_system` has ``told`` of the joints of a loaded scene, as a PNG: the block-size curve,
-    a rose of directions by length, trace lengths beside the laws asked for, and Sanderson & Nixon's triangle of nodes."""
+    """Draw what `geomech.output.block_system` has ``told`` of the joints of a loaded scene, as a PNG: the block-size
+    curve, a rose of directions by length, trace lengths beside the laws asked for, and Sanderson & Nixon's triangle of
+    nodes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.4, 9.0), dpi=130)

@@ -1,5 +1,5 @@
-"""Curves of a run: load against strain, stress intensity factors and crack length against load; where there is no load or
-nothing cracks, energies and the monitors' ways against time."""
+"""Curves of a run: load against strain, stress intensity factors and crack length against load; where there is no load
+or nothing cracks, energies and the monitors' ways against time."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ _ENERGIES = {
 
 
 def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -> list[Path]:
-    """Draw the curves that ``run`` has data for as files in ``folder``; their paths. ``suffix`` ".svg" draws lines that stay
-    sharp; ``more`` draws energies and monitors as well."""
+    """Draw the curves that ``run`` has data for as files in ``folder``; their paths. ``suffix`` ".svg" draws lines that
+    stay sharp; ``more`` draws energies and monitors as well."""
     history, tips = run.history, run.tips
     several = len(history) > 1
     wanted = {
@@ -55,7 +55,8 @@ def plots(run: Run, folder: Path, *, suffix: str = ".png", more: bool = False) -
 
 
 def energies(axes: Axes, run: Run) -> None:
-    """What the work of loads and gravity went into, against time: curves below a hundredth of the largest are left out."""
+    """What the work of loads and gravity went into, against time: curves below a hundredth of the largest are left
+    out."""
     history = _to_the_end(run)
     for k, (name, energy) in enumerate(_energy_curves(run).items()):
         axes.plot(history["time"], energy, color=COLOURS[k % len(COLOURS)], lw=1.5, label=name)
@@ -126,8 +127,8 @@ def compared(runs: Mapping[str, Run], path: Path) -> Path | None:
 
 
 def stress_intensity(axes: Axes, run: Run) -> None:
-    """K_I (full) and K_II (dashed) at every tip against load, or time where nothing leads: growth relieves a tip, the load
-    drives it up again. Tips with the same curves share one; the toughness is a line across."""
+    """K_I (full) and K_II (dashed) at every tip against load, or time where nothing leads: growth relieves a tip, the
+    load drives it up again. Tips with the same curves share one; the toughness is a line across."""
     curves = _tip_curves(run)
     for k, (label, load, k_i, k_ii) in enumerate(curves):
         colour = COLOURS[k % len(COLOURS)]

@@ -1,5 +1,5 @@
-"""The picture of `geomech bench slopes`: a square a slope, coloured by what became of it; and how near to its bound each
-quantity came."""
+"""The picture of `geomech bench slopes`: a square a slope, coloured by what became of it; and how near to its bound
+each quantity came."""
 
 from __future__ import annotations
 

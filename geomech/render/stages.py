@@ -16,8 +16,8 @@ MOST = 4
 
 
 def stages(run: Run, folder: Path, *, width: int = 560) -> list[tuple[Path, str, int]]:
-    """(PNG file in ``folder``, what it shows, cycle) of every stage, in the same colours throughout; [] of a run that wrote no
-    blocks. Raises RenderingUnavailable where VTK can open no window."""
+    """(PNG file in ``folder``, what it shows, cycle) of every stage, in the same colours throughout; [] of a run that
+    wrote no blocks. Raises RenderingUnavailable where VTK can open no window."""
     shown = moments(run)
     if not shown:
         return []

@@ -1,4 +1,5 @@
-"""Run time against error, a panel a problem: the pictures of `geomech bench ddm`, `schemes`, `coupling`, `boundary` and `steps`."""
+"""Run time against error, a panel a problem: the pictures of `geomech bench ddm`, `schemes`, `coupling`, `boundary` and
+`steps`."""
 
 from __future__ import annotations
 
@@ -32,8 +33,9 @@ def draw(
     ),
     goal: float | None = 1e-4,
 ) -> Path:
-    """``points`` as one curve a method (at most seven, in the legend's order), logarithmic axes shared by all ``panels`` (rows,
-    columns). The first method's ends are labelled by ``size_of``; ``labels`` are those of the axes, ``goal`` an error to mark."""
+    """``points`` as one curve a method (at most seven, in the legend's order), logarithmic axes shared by all
+    ``panels`` (rows, columns). The first method's ends are labelled by ``size_of``; ``labels`` are those of the axes,
+    ``goal`` an error to mark."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
 

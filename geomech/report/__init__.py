@@ -12,8 +12,8 @@ __all__ = ["COLUMNS", "as_csv", "as_text", "is_benchmark", "table", "write_page"
 
 
 def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> Path:
-    """Write the page of ``runs``, which lie in ``folder`` (one: in it), or with none of the benchmark there; the file, by
-    default ``report.html`` in ``folder``, or ``runs.html`` where runs are below it: there a study leaves its own
+    """Write the page of ``runs``, which lie in ``folder`` (one: in it), or with none of the benchmark there; the file,
+    by default ``report.html`` in ``folder``, or ``runs.html`` where runs are below it: there a study leaves its own
     ``report.html``."""
     if not runs:
         from .of_benchmark import page_of_benchmark

@@ -1,4 +1,5 @@
-"""The page of one run: what it is, what it came to, pictures, curves, events, where its time went, how to make it again."""
+"""The page of one run: what it is, what it came to, pictures, curves, events, where its time went, how to make it
+again."""
 
 from __future__ import annotations
 

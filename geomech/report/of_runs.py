@@ -1,4 +1,5 @@
-"""The page of several runs side by side: one table, what differs between their scenes, a picture and the curves of each."""
+"""The page of several runs side by side: one table, what differs between their scenes, a picture and the curves of
+each."""
 
 from __future__ import annotations
 

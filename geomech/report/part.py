@@ -1,4 +1,5 @@
-"""A part of a study's comparison: a title, a table, what there is to say about it; for the terminal and for the page alike."""
+"""A part of a study's comparison: a title, a table, what there is to say about it; for the terminal and for the page
+alike."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ from .table import aligned
 
 @dataclass(frozen=True)
 class Part:
-    """``rows`` are cells under ``headers``: words, numbers, None; ``before`` and ``after`` sentences around the table."""
+    """``rows`` are cells under ``headers``: words, numbers, None; ``before`` and ``after`` sentences around the
+    table."""
 
     title: str
     headers: Sequence[str] = ()

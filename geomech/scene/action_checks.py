@@ -1,4 +1,5 @@
-"""Checks of what acts besides forces: records that can be read, zones and edges that are there, ends of bolts in rock."""
+"""Checks of what acts besides forces: records that can be read, zones and edges that are there, ends of bolts in
+rock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Loads of a scene as functions of time, and what acts besides forces: given motion, water, bolts, excavations, stress."""
+"""Loads of a scene as functions of time, and what acts besides forces: given motion, water, bolts, excavations,
+stress."""
 
 from __future__ import annotations
 
@@ -139,7 +140,8 @@ def _water(tables: SceneTables) -> WaterTable | None:
 
 
 def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:
-    """The bolts of one table; none after saying why an end is in no block. Raises ValueError for what `Bolt` refuses."""
+    """The bolts of one table; none after saying why an end is in no block. Raises ValueError for what `Bolt`
+    refuses."""
     compression = {} if table.compression is None else {"compression": table.compression}
     properties = {
         "name": table.name,

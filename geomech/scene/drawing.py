@@ -31,10 +31,11 @@ MENDED = "mended while cutting"
 class Drawing:
     """Blocks and cracks before materials and apertures are given. ``zones`` (n_blocks,) is the
     name of the zone each block belongs to, ``cracks_drawn`` the names of the cracks, ``parameters`` those of a Gmsh
-    model, as used, ``choices`` the names of their values where they have such, ``model`` its file, ``joints`` what edges along
-    joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock. ``blocks`` is None
-    where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing, ``mark_places`` (path in the scene,
-    where in the file) of each by name, ``crack_paths`` the paths of the drawn cracks; ``origin`` m, world coordinates of what is (0, 0) in all these."""
+    model, as used, ``choices`` the names of their values where they have such, ``model`` its file, ``joints`` what
+    edges along joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock.
+    ``blocks`` is None where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing,
+    ``mark_places`` (path in the scene, where in the file) of each by name, ``crack_paths`` the paths of the drawn
+    cracks; ``origin`` m, world coordinates of what is (0, 0) in all these."""
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
@@ -79,8 +80,8 @@ class Drawing:
 
 @dataclass(eq=False)
 class _Parts:
-    """What is drawn so far, in world coordinates. ``sources`` says, for (part, index) or (part, name) of joints and marks,
-    where each stands: its path in the scene and, for other files, where there."""
+    """What is drawn so far, in world coordinates. ``sources`` says, for (part, index) or (part, name) of joints and
+    marks, where each stands: its path in the scene and, for other files, where there."""
 
     zones: list[Zone] = field(default_factory=list)
     traces: list[Trace] = field(default_factory=list)
@@ -91,7 +92,8 @@ class _Parts:
     only_in: dict[int, Sequence[str]] = field(default_factory=dict)  # names of zones that a joint cuts
 
     def add(self, read, source: Callable[[str, int], tuple[Path, str]], zones: Sequence[str] = ()) -> None:
-        """What a file holds: zones, traces, joints (that cut the named ``zones`` alone), marks, and edges where it has such."""
+        """What a file holds: zones, traces, joints (that cut the named ``zones`` alone), marks, and edges where it has
+        such."""
         if zones:
             self.only_in.update((len(self.joints) + k, zones) for k in range(len(read.joints)))
         for part, mine, own in (
@@ -294,7 +296,8 @@ def _source(flaw: Flaw, parts: _Parts, joints: Sequence[str], own: Sequence[str]
 
 
 def _tell_outside(geometry: Geometry, parts: _Parts, place: Callable[[Path], str], warnings: list[Fault]) -> None:
-    """Warn of joints, drawn in the scene or from files, of which nothing lies in the rock: units or origins that differ."""
+    """Warn of joints, drawn in the scene or from files, of which nothing lies in the rock: units or origins that
+    differ."""
     import shapely
 
     found = [

@@ -1,4 +1,5 @@
-"""Bolts, water tables and measuring points of the drawing, put into the tables of the scene that give their properties."""
+"""Bolts, water tables and measuring points of the drawing, put into the tables of the scene that give their
+properties."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ Place = Callable[[Path], str]
 def with_marks(
     tables: SceneTables, drawing: Drawing, place: Place, faults: list[Fault], warnings: list[Fault]
 ) -> tuple[SceneTables, Place]:
-    """``tables`` with every bolt, the water table and every monitor of the drawing in them, and ``place`` for what is there
-    now. Tables that mean nothing drawn are faults; what is drawn and no table means is warned of."""
+    """``tables`` with every bolt, the water table and every monitor of the drawing in them, and ``place`` for what is
+    there now. Tables that mean nothing drawn are faults; what is drawn and no table means is warned of."""
     marks = {mark.name: mark for mark in drawing.marks}
     work = _Matching(marks, drawing, place, faults, warnings)
     came_from: dict[Path, Path] = {}

@@ -22,8 +22,8 @@ def read_traces(
     faults: list[Fault],
     warnings: list[Fault],
 ) -> bool:
-    """Give what all files hold to ``add`` (a `FieldDrawing`, a function from (part, index) to its path in the scene and its
-    place in the file, and the names of zones that its joints cut); False after saying why one cannot be read."""
+    """Give what all files hold to ``add`` (a `FieldDrawing`, a function from (part, index) to its path in the scene and
+    its place in the file, and the names of zones that its joints cut); False after saying why one cannot be read."""
     every: list[Named] = []
     by_file: dict[int, list[Named]] = {}
     path_of: dict[str, Path] = {}
@@ -69,7 +69,8 @@ def read_traces(
     if not sound:
         return False
     try:
-        # Joints by file, for each may cut zones of its own; outlines of all files together, for they may close one another.
+        # Joints by file, for each may cut zones of its own; outlines of all files together, for they may close one
+        # another.
         joints = {k: drawing_of_lines(own) for k, own in by_file.items()}
         drawn = drawing_of_lines([item for item in every if item.role != "joint"])
     except FieldFileError as error:

@@ -8,7 +8,8 @@ from .drawing import Drawing
 from .errors import Check
 from .tables import SceneTables
 
-#: Edges called "fixed" or "fixed:NAME" fix the blocks that have them, "guided:x" or "guided:x:NAME" let them move along x.
+#: Edges called "fixed" or "fixed:NAME" fix the blocks that have them, "guided:x" or "guided:x:NAME" let them move along
+#: x.
 FIXED, GUIDED = "fixed", "guided"
 #: What a block keeps that is guided along an axis: it moves along it, turns, and strains across nothing.
 _HELD = {"x": [1, 2, 5], "y": [0, 2, 5]}

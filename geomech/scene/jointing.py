@@ -29,8 +29,9 @@ from .tables.geometry import Geometry, JointSetShape
 
 #: So many places of each kind of defect are told in full.
 _TOLD = 4
-#: More pieces of joints between one crossing and the next are not cut: 100 000 blocks have 250 000, and take seconds; ten times as
-#: many take a minute and 10 GB, and no solver here moves them. Nor are joints of which so many pairs lie beside each other.
+#: More pieces of joints between one crossing and the next are not cut: 100 000 blocks have 250 000, and take seconds;
+#: ten times as many take a minute and 10 GB, and no solver here moves them. Nor are joints of which so many pairs lie
+#: beside each other.
 MOST_PIECES, MOST_PAIRS = 2_000_000, 20_000_000
 
 
@@ -44,8 +45,8 @@ class Jointed:
     cracks: Cracks
 
     def told(self, others: str) -> list[str]:
-        """What was found and mended, a line a kind, with the first places and what meets there now; ``others`` says where
-        the rest are listed."""
+        """What was found and mended, a line a kind, with the first places and what meets there now; ``others`` says
+        where the rest are listed."""
         kinds: dict[str, list[Mend]] = {}
         for mend in self.cutting.mends:
             kinds.setdefault(mend.kind, []).append(mend)
@@ -136,8 +137,8 @@ def within(joint: Joint, zones: Sequence[Zone]) -> Joint:
 
 
 def _too_fine(geometry: Geometry, box: np.ndarray) -> list[Flaw]:
-    """A flaw where the sets, as they are asked for, would have too many pieces, or joints so near to each other that too many have
-    to be compared; it names the finest of them."""
+    """A flaw where the sets, as they are asked for, would have too many pieces, or joints so near to each other that
+    too many have to be compared; it names the finest of them."""
     finest, pieces, pairs, lengths = (0.0, 0, 0.0), 0.0, 0.0, 0.0
     for k, shape in enumerate(geometry.joint_sets):
         try:
@@ -271,8 +272,8 @@ def _cracks(geometry: Geometry, zones: list[Zone], cutting: Cutting, traces: lis
 
 
 def _parted(trace: Trace, polygons: np.ndarray, tolerance: float) -> list[Trace]:
-    """A drawn crack where joints cross it: a crack in every block, "NAME 1", "NAME 2", …; else as it is. Pieces shorter than
-    ``tolerance`` m are left out."""
+    """A drawn crack where joints cross it: a crack in every block, "NAME 1", "NAME 2", …; else as it is. Pieces shorter
+    than ``tolerance`` m are left out."""
     import shapely
 
     whole = shapely.multilinestrings(shapely.linestrings(trace.lines)) if len(trace.lines) > 1 else None

@@ -37,8 +37,9 @@ MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf")
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A scene that has passed every check. ``warnings`` are faults that do not keep it from running. ``tables`` count from
-    ``origin`` and hold what the drawing says of bolts, water and monitors; the file's own are in world coordinates."""
+    """A scene that has passed every check. ``warnings`` are faults that do not keep it from running. ``tables`` count
+    from ``origin`` and hold what the drawing says of bolts, water and monitors; the file's own are in world
+    coordinates."""
 
     path: FilePath
     variant: str | None
@@ -248,7 +249,8 @@ def _syntax_hint(source: str) -> str:
 
 
 def _resolve_records(data: dict[str, Any], folder: FilePath) -> None:
-    """Make the files of loads absolute, in place: they stand beside the scene, and a resolved scene may stand elsewhere."""
+    """Make the files of loads absolute, in place: they stand beside the scene, and a resolved scene may stand
+    elsewhere."""
     loads = data.get("loads")
     for entry in loads.values() if isinstance(loads, dict) else ():
         for table in entry if isinstance(entry, list) else [entry]:

@@ -20,9 +20,9 @@ SIZES = 1e-3, 100.0
 LEAST_MODULUS, LEAST_TOUGHNESS = 1e6, 1e3
 #: The lightest pumice weighs more, kg/m³. Below (but for 0, which is meant), the number is in g/cm³ or t/m³.
 LEAST_DENSITY = 100.0
-#: A cracked block that lies on a fixed one with a side so many times as long as the block is deep behind it. Contacts press linearly
-#: there; on a rigid base true pressure keeps under its load. K is 2 % off for 1, 1.4 times too large for 1½, twice for 2, 5 times
-#: for 3 (`tests/scene/test_plausibility.py`).
+#: A cracked block that lies on a fixed one with a side so many times as long as the block is deep behind it. Contacts
+#: press linearly there; on a rigid base true pressure keeps under its load. K is 2 % off for 1, 1.4 times too large for
+#: 1½, twice for 2, 5 times for 3 (`tests/scene/test_plausibility.py`).
 SHALLOW = 1.5
 #: What lies on one another: nearer than this part of the side, over no less than that part of it.
 LIES_ON, MOST_OF_IT = 1e-6, 0.5

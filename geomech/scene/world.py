@@ -1,7 +1,8 @@
 """World coordinates: where the scene lies, and the scene moved to a local origin and back.
 
-All coordinates of a scene and of the files it names are of one frame, the world's. What is computed and written is local:
-world less origin. At five million metres north a coordinate has nine digits left for the rock instead of sixteen.
+All coordinates of a scene and of the files it names are of one frame, the world's. What is computed and written is
+local: world less origin. At five million metres north a coordinate has nine digits left for the rock instead of
+sixteen.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ PLACES: Mapping[str, Any] = {
 
 
 def local_origin(given: tuple[float, float] | None, drawn: Iterable[np.ndarray], far_is_moved: bool) -> np.ndarray:
-    """(2,) world coordinates of the local origin: as ``given``, or, where that is None and ``far_is_moved``, a round place
-    at the lower left of what is ``drawn`` (arrays (n, 2)), on each axis that lies far from 0."""
+    """(2,) world coordinates of the local origin: as ``given``, or, where that is None and ``far_is_moved``, a round
+    place at the lower left of what is ``drawn`` (arrays (n, 2)), on each axis that lies far from 0."""
     if given is not None:
         return np.array(given, dtype=float)
     drawn = [np.asarray(points) for points in drawn if len(points)]

@@ -1,4 +1,5 @@
-"""The faces of a planar graph: half-edges, cycles, dead ends; arrays all the way, for hundreds of thousands of edges."""
+"""The faces of a planar graph: half-edges, cycles, dead ends; arrays all the way, for hundreds of thousands of
+edges."""
 
 from __future__ import annotations
 
@@ -57,8 +58,8 @@ class Arrangement:
         return _polygons(self.nodes, self.loop_node[flat], start, loop_start)
 
     def only(self, keep: np.ndarray) -> Arrangement:
-        """Without the edges that are not to ``keep`` (a mask) and nodes that no edge is left at. Those edges must be dead
-        ends, or bound faces that are not looked at any more: the other faces stay what they are."""
+        """Without the edges that are not to ``keep`` (a mask) and nodes that no edge is left at. Those edges must be
+        dead ends, or bound faces that are not looked at any more: the other faces stay what they are."""
         used, flat = np.unique(self.edges[keep].ravel(), return_inverse=True)
         node, edge = np.full(len(self.nodes), -1), np.cumsum(keep) - 1
         node[used] = np.arange(len(used))
@@ -166,8 +167,8 @@ def _faces_at(faces: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def gathered(start: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of runs that begin at ``start`` (n + 1,), the ``chosen`` ones (m,): where they begin in a row of their own (m + 1,),
-    and the place that each of its members had."""
+    """Of runs that begin at ``start`` (n + 1,), the ``chosen`` ones (m,): where they begin in a row of their own (m +
+    1,), and the place that each of its members had."""
     count = np.diff(start)[chosen]
     begin = np.concatenate([[0], np.cumsum(count)])
     return begin, np.arange(begin[-1]) + np.repeat(start[chosen] - begin[:-1], count)
@@ -238,8 +239,8 @@ def _traced(nodes: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _cycles(following: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All cycles of half-edges in the order of their ``first`` ones, at which they begin: the half-edges, cycle after cycle;
-    where each cycle begins; the cycle of each half-edge."""
+    """All cycles of half-edges in the order of their ``first`` ones, at which they begin: the half-edges, cycle after
+    cycle; where each cycle begins; the cycle of each half-edge."""
     n = len(following)
     # How many half-edges come after each one until its cycle closes, again by leaps (Wyllie 1979).
     last = following == first
@@ -265,8 +266,8 @@ def _pinched(node: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 
 def _unpinch(nodes: np.ndarray, loops: list[np.ndarray], cycle: np.ndarray) -> None:
-    """Take the one of ``loops`` that is ``cycle`` (n, 2), nodes and edges, which passes through a node twice, apart there: a
-    hole may touch its outline or another hole at a corner, but is a loop of its own."""
+    """Take the one of ``loops`` that is ``cycle`` (n, 2), nodes and edges, which passes through a node twice, apart
+    there: a hole may touch its outline or another hole at a corner, but is a loop of its own."""
     loops.pop(next(k for k, loop in enumerate(loops) if np.array_equal(loop, cycle)))
     chain: list[list[int]] = []
     parts: list[list[list[int]]] = []

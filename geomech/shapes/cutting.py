@@ -1,8 +1,8 @@
 """Rock cut into blocks by joint traces: cleaned, noded, faces taken, dead ends kept as cracks.
 
 Everything nearer than the tolerance meets: ends stop on what they nearly reach, near corners become one, a trace that
-nearly passes through a corner passes through it. Outlines stand still; joints give way. What was mended is told with its
-place. Cuts are exact otherwise: the blocks tile their zones.
+nearly passes through a corner passes through it. Outlines stand still; joints give way. What was mended is told with
+its place. Cuts are exact otherwise: the blocks tile their zones.
 """
 
 from __future__ import annotations
@@ -53,11 +53,12 @@ def cut(
     """Cut ``zones`` along ``joints``.
 
     Joint ends that stop in rock become cracks ("cracks") or are taken away ("trim"), those shorter than
-    ``shortest_crack`` m always. Blocks smaller than ``smallest_area`` m² join a neighbour, of those with at least half as long a common
-    side as any the one across the least important joint; ``joints`` are listed by importance, and no small block breaks one of the first ``lasting`` ones. Only
-    what is thinner than the tolerance joins across any of them.
-    ``tolerance`` m, default `TOLERANCE` of the largest side. Block edges carry their zone's edge names and the joints'
-    names. Raises ShapeError where a joint or zone has no length, area or number, or ``tolerance`` leaves nothing in place.
+    ``shortest_crack`` m always. Blocks smaller than ``smallest_area`` m² join a neighbour, of those with at least half
+    as long a common side as any the one across the least important joint; ``joints`` are listed by importance, and no
+    small block breaks one of the first ``lasting`` ones. Only what is thinner than the tolerance joins across any of
+    them. ``tolerance`` m, default `TOLERANCE` of the largest side. Block edges carry their zone's edge names and the
+    joints' names. Raises ShapeError where a joint or zone has no length, area or number, or ``tolerance`` leaves
+    nothing in place.
     """
     _refuse_bad(zones, joints)
     every = [np.asarray(loop, dtype=float) for zone in zones for loop in zone.loops]
@@ -171,8 +172,8 @@ def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
 def _kept(
     arrangement: Arrangement, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, lasting, mends
 ) -> tuple[np.ndarray, list[Mend]]:
-    """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, a joint of blocks too
-    small; and the small blocks that stay."""
+    """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, a joint of blocks
+    too small; and the small blocks that stay."""
     joint = graph.source >= drawn.n_outlines
     keep = ~(joint & _outside(arrangement, zone))
     dead = arrangement.dead & keep & joint
@@ -329,8 +330,8 @@ def _blocks(
     a, b = points - points[before], points[following] - points
     off = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     short = np.minimum(np.hypot(*a.T), np.hypot(*b.T))
-    # A neighbour's corner on a straight side is no corner of this block. The turn, over the longer edge, is within the grid:
-    # beside a short edge it may be more, and the corner stays.
+    # A neighbour's corner on a straight side is no corner of this block. The turn, over the longer edge, is within the
+    # grid: beside a short edge it may be more, and the corner stays.
     flat = (off <= 8 * grid * short) & (np.einsum("ij,ij->i", a, b) > 0) & (label == label[before])
     kept = np.flatnonzero(~flat)
     owner = np.repeat(np.arange(len(loops)), count)[kept]
@@ -355,8 +356,8 @@ def _blocks(
 
 
 def _junctions(graph: Graph, drawn: Drawn) -> np.ndarray:
-    """(n_nodes,) what the joints do at each node off the outlines: "I" end, "V" bend or meeting of two ends, "T" one abuts
-    another, "Y" three part ways, "X" cross; "E" for nodes on outlines."""
+    """(n_nodes,) what the joints do at each node off the outlines: "I" end, "V" bend or meeting of two ends, "T" one
+    abuts another, "Y" three part ways, "X" cross; "E" for nodes on outlines."""
     joint = graph.source >= drawn.n_outlines
     edges = graph.edges[joint]
     n = len(graph.nodes)

@@ -26,12 +26,13 @@ _DEEPEST = 32
 
 
 def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None = None) -> FieldFile:
-    """The lines of the model space of a DXF file, in m: LINE, LWPOLYLINE and POLYLINE with bulges, ARC, CIRCLE, ELLIPSE,
-    SPLINE, POINT and what INSERT puts there of them.
+    """The lines of the model space of a DXF file, in m: LINE, LWPOLYLINE and POLYLINE with bulges, ARC, CIRCLE,
+    ELLIPSE, SPLINE, POINT and what INSERT puts there of them.
 
-    ``unit`` (a key of `METRES`) overrides the file's $INSUNITS; ``chord_tolerance`` m, default `CHORD` of the largest side.
-    Layers that are off or frozen and other kinds of entities are left out and told. What a block draws on layer 0 is on the
-    layer of its INSERT. Raises FieldFileError for a file that cannot be read, or where ezdxf is not installed.
+    ``unit`` (a key of `METRES`) overrides the file's $INSUNITS; ``chord_tolerance`` m, default `CHORD` of the largest
+    side. Layers that are off or frozen and other kinds of entities are left out and told. What a block draws on layer 0
+    is on the layer of its INSERT. Raises FieldFileError for a file that cannot be read, or where ezdxf is not
+    installed.
     """
     try:
         import ezdxf
@@ -220,8 +221,8 @@ def _polyline(entity: Any, chord: float) -> tuple[Any, bool]:
 
 
 def _bulged(rows: list[tuple[float, float, float]], closed: bool, chord: float) -> list[tuple[float, float]]:
-    """Vertices with the points of arcs between them; a bulge is the tangent of a quarter of its arc's angle, positive to the
-    left of the way from end to end as the arc turns."""
+    """Vertices with the points of arcs between them; a bulge is the tangent of a quarter of its arc's angle, positive
+    to the left of the way from end to end as the arc turns."""
     points: list[tuple[float, float]] = []
     for k, (x, y, bulge) in enumerate(rows):
         points.append((x, y))

@@ -1,8 +1,10 @@
-"""What a joint set is expected to be like from the laws it is drawn by; the mean of many networks, of which one shows some.
+"""What a joint set is expected to be like from the laws it is drawn by; the mean of many networks, of which one shows
+some.
 
-A dictionary of each: ``p10_per_m`` across the set, ``p20_per_m2``, ``p21_per_m``, ``mean_length_m``, ``length_deviation_m``,
-``spacing_m``, ``spacing_deviation_m``, ``persistence``, ``mean_angle_deg``, ``angle_deviation_deg``; what a set does not
-have is left out. Terminations on other sets, which shorten traces, are not counted in.
+A dictionary of each: ``p10_per_m`` across the set, ``p20_per_m2``, ``p21_per_m``, ``mean_length_m``,
+``length_deviation_m``, ``spacing_m``, ``spacing_deviation_m``, ``persistence``, ``mean_angle_deg``,
+``angle_deviation_deg``; what a set does not have is left out. Terminations on other sets, which shorten traces, are not
+counted in.
 """
 
 from __future__ import annotations

@@ -41,9 +41,9 @@ class FieldFileError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class FieldLine:
-    """One line of a file: ``points`` (n, 2), one alone for a point; ``layer`` the layer or set it is in, ``label`` a name of
-    its own (of a monitor) or ""; ``place`` says where it stands in the file. ``shape`` is "line", "closed" (its first point not repeated),
-    "area" (a closed line that is meant as an area) or "hole" (of the area before it)."""
+    """One line of a file: ``points`` (n, 2), one alone for a point; ``layer`` the layer or set it is in, ``label`` a
+    name of its own (of a monitor) or ""; ``place`` says where it stands in the file. ``shape`` is "line", "closed" (its
+    first point not repeated), "area" (a closed line that is meant as an area) or "hole" (of the area before it)."""
 
     layer: str
     points: np.ndarray
@@ -71,8 +71,8 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FieldDrawing:
-    """What lines make. ``places`` says, for ("zones" | "cracks" | "joints" | "edges" | "marks", index), where in its file
-    each stands."""
+    """What lines make. ``places`` says, for ("zones" | "cracks" | "joints" | "edges" | "marks", index), where in its
+    file each stands."""
 
     zones: tuple[Zone, ...] = ()
     traces: tuple[Trace, ...] = ()
@@ -111,10 +111,10 @@ def named_lines(
 ) -> tuple[list[Named], list[str], dict[str, int]]:
     """What each line of ``file`` is.
 
-    ``layers`` maps layers (with wildcards) to names, as {"J1*": "joint:bedding", "*": ""}; "" leaves it to the layer's own,
-    and lines in layers that no pattern means are left out. A plain name is a set of ``kind`` "joint" or "crack"; ``name``
-    stands for the plain names of all layers. Areas with plain names are zones. Also returned: the patterns that mean no layer,
-    and the number of lines left out by layer.
+    ``layers`` maps layers (with wildcards) to names, as {"J1*": "joint:bedding", "*": ""}; "" leaves it to the layer's
+    own, and lines in layers that no pattern means are left out. A plain name is a set of ``kind`` "joint" or "crack";
+    ``name`` stands for the plain names of all layers. Areas with plain names are zones. Also returned: the patterns
+    that mean no layer, and the number of lines left out by layer.
     """
     found: list[Named] = []
     idle, out = set(layers or ()), {}
@@ -140,9 +140,9 @@ def named_lines(
 def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
     """Zones, cracks, joints, named edges and marks that ``lines`` make.
 
-    Closed lines of zones, and open ones where they close one another, are outlines; one inside another is cut out of it, and
-    so are holes. Every line of a set of cracks is a crack, "NAME 1", "NAME 2", … where there are several. Raises
-    FieldFileError for outlines that do not close.
+    Closed lines of zones, and open ones where they close one another, are outlines; one inside another is cut out of
+    it, and so are holes. Every line of a set of cracks is a crack, "NAME 1", "NAME 2", … where there are several.
+    Raises FieldFileError for outlines that do not close.
     """
     warnings: list[tuple[str, str]] = []
     places: dict[tuple[str, int], str] = {}

@@ -1,5 +1,5 @@
-"""What a joint network is like: intensities, trace lengths, spacings, persistence, angles, nodes, block sizes (Dershowitz &
-Herda 1992)."""
+"""What a joint network is like: intensities, trace lengths, spacings, persistence, angles, nodes, block sizes
+(Dershowitz & Herda 1992)."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class SetStatistics:
 
 @dataclass(frozen=True)
 class LineStatistics:
-    """The lines that the traces of a parallel set lie on: their number, ``mean_spacing`` and ``spacing_deviation`` m between
-    neighbours, and what part of them is joint, ``persistence``."""
+    """The lines that the traces of a parallel set lie on: their number, ``mean_spacing`` and ``spacing_deviation`` m
+    between neighbours, and what part of them is joint, ``persistence``."""
 
     lines: int
     mean_spacing: float
@@ -101,7 +101,8 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics
 def line_statistics(joint: Joint, region) -> LineStatistics:
     """Of the lines that the straight traces of a parallel set lie on inside ``region``, (n, 2) or a shapely polygon.
 
-    Lines without any trace in the region are not seen. Spacings are taken where the lines pass beside the region's middle.
+    Lines without any trace in the region are not seen. Spacings are taken where the lines pass beside the region's
+    middle.
     """
     import shapely
 
@@ -216,8 +217,8 @@ class Topology:
 
 
 def block_sizes(areas: np.ndarray, passing: Sequence[float] = (0.1, 0.25, 0.5, 0.75, 0.9)) -> dict[float, float]:
-    """Block size, √area in m, that the part ``passing`` of all rock, by area, is not larger than: the in-situ block size
-    distribution (Hudson & Priest 1979)."""
+    """Block size, √area in m, that the part ``passing`` of all rock, by area, is not larger than: the in-situ block
+    size distribution (Hudson & Priest 1979)."""
     order = np.sort(np.asarray(areas, dtype=float))
     share = np.cumsum(order) / order.sum()
     return {p: float(np.sqrt(order[min(np.searchsorted(share, p), len(order) - 1)])) for p in passing}

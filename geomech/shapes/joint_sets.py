@@ -19,8 +19,8 @@ LAWS = ("constant", "normal", "uniform", "lognormal", "exponential")
 
 @dataclass(frozen=True)
 class Law:
-    """How a length or an angle is distributed: its ``mean`` and standard ``deviation`` (of the quantity itself, also for
-    "lognormal"; "exponential" has its mean for one)."""
+    """How a length or an angle is distributed: its ``mean`` and standard ``deviation`` (of the quantity itself, also
+    for "lognormal"; "exponential" has its mean for one)."""
 
     mean: float
     deviation: float = 0.0
@@ -85,10 +85,11 @@ class Law:
 
 
 def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
-    """Angle (rad, counter-clockwise) of the trace of a plane in a vertical section whose x axis points to azimuth ``section``.
+    """Angle (rad, counter-clockwise) of the trace of a plane in a vertical section whose x axis points to azimuth
+    ``section``.
 
-    ``dip`` and azimuths in rad, azimuths clockwise from north: tan α = −tan δ cos(dip direction − section), which falls to
-    the right where the plane dips to the right (Priest 1993, Discontinuity analysis, section 2.4).
+    ``dip`` and azimuths in rad, azimuths clockwise from north: tan α = −tan δ cos(dip direction − section), which falls
+    to the right where the plane dips to the right (Priest 1993, Discontinuity analysis, section 2.4).
     """
     if abs(dip - math.pi / 2) < 1e-12:
         return math.pi / 2
@@ -97,9 +98,9 @@ def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
 
 @dataclass(frozen=True)
 class FisherAngle:
-    """Angles of the traces of planes whose poles are spread in space by Fisher's law of constant ``concentration`` about
-    those of the mean ``dip`` and ``dip_direction``; in a section with its x axis to azimuth ``section``. In rad; stands in
-    place of a `Law` of the angle."""
+    """Angles of the traces of planes whose poles are spread in space by Fisher's law of constant ``concentration``
+    about those of the mean ``dip`` and ``dip_direction``; in a section with its x axis to azimuth ``section``. In rad;
+    stands in place of a `Law` of the angle."""
 
     dip: float
     dip_direction: float
@@ -132,8 +133,8 @@ class FisherAngle:
 
 
 def fisher_rule() -> tuple[np.ndarray, np.ndarray]:
-    """``share`` and ``turn`` of `poles_about` for means over Fisher's law: equal parts of the probability, each with as many
-    turns about the mean."""
+    """``share`` and ``turn`` of `poles_about` for means over Fisher's law: equal parts of the probability, each with as
+    many turns about the mean."""
     share, turn = (np.arange(400) + 0.5) / 400, (np.arange(64) + 0.5) / 64 * 2 * math.pi
     share, turn = np.meshgrid(share, turn)
     return share.ravel(), turn.ravel()
@@ -148,9 +149,9 @@ def parallel_set(
     gap: Law | None,
     rng: np.random.Generator,
 ) -> Joint:
-    """Traces along parallel lines over ``region`` (n, 2): lines ``spacing`` apart, on each of them traces and gaps by turns
-    from a random start; without ``length`` a trace goes right through. Each line has its own angle about the region's middle
-    line of the set. The persistence is length / (length + gap)."""
+    """Traces along parallel lines over ``region`` (n, 2): lines ``spacing`` apart, on each of them traces and gaps by
+    turns from a random start; without ``length`` a trace goes right through. Each line has its own angle about the
+    region's middle line of the set. The persistence is length / (length + gap)."""
     middle, radius = _circle(region)
     across = _unit(angle.mean + 0.5 * math.pi)
     offsets = _renewal(spacing, 2 * radius, rng) - radius
@@ -217,9 +218,9 @@ def discs(
     section: float,
     rng: np.random.Generator,
 ) -> Joint:
-    """Discs about anywhere in space, cut by the vertical section with its x axis to azimuth ``section`` (Baecher, Lanney &
-    Einstein 1977): ``per_volume_area`` (P32, m²/m³) of joint, poles spread about the mean by Fisher's law with constant
-    ``fisher`` (0: all alike). Angles in rad, azimuths clockwise from north."""
+    """Discs about anywhere in space, cut by the vertical section with its x axis to azimuth ``section`` (Baecher,
+    Lanney & Einstein 1977): ``per_volume_area`` (P32, m²/m³) of joint, poles spread about the mean by Fisher's law with
+    constant ``fisher`` (0: all alike). Angles in rad, azimuths clockwise from north."""
     middle, radius = _circle(region)
     largest = diameter.mean + 5 * diameter.deviation + (8 * diameter.mean if diameter.law == "exponential" else 0.0)
     reach = radius + 0.5 * largest
@@ -247,8 +248,9 @@ def discs(
 def poisson_lines(
     name: str, region: np.ndarray, angle: Law | FisherAngle | None, per_area_length: float, rng: np.random.Generator
 ) -> Joint:
-    """Endless lines, ``per_area_length`` (P21, m/m²) of them, of ``angle`` or, without it, of all directions alike (Miles
-    1964): those that meet a circle of radius R are Poisson with mean 2 R P21, their distances from its middle uniform."""
+    """Endless lines, ``per_area_length`` (P21, m/m²) of them, of ``angle`` or, without it, of all directions alike
+    (Miles 1964): those that meet a circle of radius R are Poisson with mean 2 R P21, their distances from its middle
+    uniform."""
     middle, radius = _circle(region)
     n = rng.poisson(2 * radius * per_area_length)
     turn = rng.uniform(0, math.pi, n) if angle is None else angle.sample(rng, n)
@@ -272,8 +274,8 @@ def voronoi(name: str, region: np.ndarray, cell_area: float, rng: np.random.Gene
 
 
 def terminated(joint: Joint, on: Sequence[Joint], share: float, rng: np.random.Generator) -> Joint:
-    """``joint`` with the part ``share`` of its traces ended where they first meet a trace of ``on``, to either side of their
-    middle."""
+    """``joint`` with the part ``share`` of its traces ended where they first meet a trace of ``on``, to either side of
+    their middle."""
     import shapely
 
     walls = shapely.linestrings([piece for other in on for line in other.lines for piece in _pairs(line)])
@@ -342,8 +344,8 @@ def mean_pole(dip: float, dip_direction: float, section: float) -> np.ndarray:
 
 
 def poles_about(mean: np.ndarray, concentration: float, share: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """(n, 3) unit vectors about ``mean`` by Fisher's law (1953): farther from it than the part ``share`` of all, with ``turn``
-    about it, rad; by inversion (Priest 1993, 3.6). All alike for ``concentration`` 0."""
+    """(n, 3) unit vectors about ``mean`` by Fisher's law (1953): farther from it than the part ``share`` of all, with
+    ``turn`` about it, rad; by inversion (Priest 1993, 3.6). All alike for ``concentration`` 0."""
     if concentration == 0:
         return np.tile(mean, (len(share), 1))
     cosine = 1 + np.log1p(-share * -math.expm1(-2 * concentration)) / concentration

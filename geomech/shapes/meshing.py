@@ -102,7 +102,8 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float):
             option(f"Mesh.{name}", 0)
         option("Mesh.MeshSizeMax", size)
         # By default Gmsh spends half of its time on smoothing, for a least angle of 31° in place of 23°, and a sixth on
-        # dividing lines to nine digits of their sizes. Fields are evaluated at the nodes: such a mesh shows them as well.
+        # dividing lines to nine digits of their sizes. Fields are evaluated at the nodes: such a mesh shows them as
+        # well.
         option("Mesh.Smoothing", 0)
         option("Mesh.LcIntegrationPrecision", 1e-3)
         tips = [tag_of[int(n)] for n in cracks.tips]

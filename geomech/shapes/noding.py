@@ -1,4 +1,5 @@
-"""Outlines and joint traces made a planar graph: crossings become nodes, whatever is nearer than the tolerance meets."""
+"""Outlines and joint traces made a planar graph: crossings become nodes, whatever is nearer than the tolerance
+meets."""
 
 from __future__ import annotations
 
@@ -20,11 +21,13 @@ _CELLS = 256
 
 
 class Mend(NamedTuple):
-    """Something found and mended, by its ``kind``; where, m; ``size`` m (m² of blocks); the ``junction`` that is there now.
+    """Something found and mended, by its ``kind``; where, m; ``size`` m (m² of blocks); the ``junction`` that is there
+    now.
 
-    "near corners"      ends, bends or crossings nearer than the tolerance: made one, at an outline's corner where one is
-    "near miss"         an end or a crossing nearer than that to a trace: an end is moved onto it, the trace is led through
-                        a crossing
+    "near corners"      ends, bends or crossings nearer than the tolerance: made one, at an outline's corner where one
+                        is
+    "near miss"         an end or a crossing nearer than that to a trace: an end is moved onto it, the trace is led
+                        through a crossing
     "duplicate"         traces on one another: the first of them stays
     "dead end"          a trace that goes on beyond its last crossing by less than the shortest crack: taken away
     "sliver"            a block too small: joined to a neighbour across its least important long joint
@@ -108,7 +111,8 @@ def _clipped(start: np.ndarray, end: np.ndarray, corners: np.ndarray, decimals: 
 @dataclass(frozen=True, eq=False)
 class Graph:
     """Noded: edges meet at nodes only. ``source`` (n_edges,) as in `Drawn`, the first where several lie on one another;
-    ``home`` (n_nodes,) the outline edge (a source) that each node lies on, `FREE` off outlines, `CORNER` where two meet."""
+    ``home`` (n_nodes,) the outline edge (a source) that each node lies on, `FREE` off outlines, `CORNER` where two
+    meet."""
 
     nodes: np.ndarray
     edges: np.ndarray
@@ -191,8 +195,8 @@ def _distinct(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, fresh: np.ndarray, roundoff: float):
-    """Pairs of segments, one of them ``fresh`` at least, that cross inside both, and where along each (0 to 1): (one, other,
-    t, u). Outlines that lie on one another but for ``roundoff`` m do not cross."""
+    """Pairs of segments, one of them ``fresh`` at least, that cross inside both, and where along each (0 to 1): (one,
+    other, t, u). Outlines that lie on one another but for ``roundoff`` m do not cross."""
     one, other = _near_pairs(start, end, fresh)
     p, r = start[one], end[one] - start[one]
     q, s = start[other], end[other] - start[other]
@@ -214,8 +218,8 @@ def _crossings(start: np.ndarray, end: np.ndarray, outline: np.ndarray, fresh: n
 
 
 def _near_pairs(start: np.ndarray, end: np.ndarray, fresh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of segments, one of them ``fresh``, whose boxes meet, piece by piece: the box of a long slanting joint would hold
-    half the rock."""
+    """Pairs of segments, one of them ``fresh``, whose boxes meet, piece by piece: the box of a long slanting joint
+    would hold half the rock."""
     import shapely
 
     along = end - start
@@ -241,8 +245,8 @@ def _near_pairs(start: np.ndarray, end: np.ndarray, fresh: np.ndarray) -> tuple[
 
 
 def _vicinity(low: np.ndarray, high: np.ndarray, fresh: np.ndarray, margin: float) -> np.ndarray:
-    """Indices of the boxes from ``low`` to ``high`` (n, 2) that may be within ``margin`` of a ``fresh`` one: those that share
-    a cell of a coarse grid with one."""
+    """Indices of the boxes from ``low`` to ``high`` (n, 2) that may be within ``margin`` of a ``fresh`` one: those that
+    share a cell of a coarse grid with one."""
     if fresh.all() or not fresh.any():
         return np.flatnonzero(fresh)
     corner = low.min(axis=0)
@@ -262,8 +266,8 @@ def _vicinity(low: np.ndarray, high: np.ndarray, fresh: np.ndarray, margin: floa
 
 
 def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, roundoff: float, mends: list[Mend]):
-    """The segments (start, end, source, fresh) after everything within ``tolerance`` of something else was made to meet it;
-    None when nothing was. Edges that are not ``fresh`` have been looked at before."""
+    """The segments (start, end, source, fresh) after everything within ``tolerance`` of something else was made to meet
+    it; None when nothing was. Edges that are not ``fresh`` have been looked at before."""
     import shapely
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -303,8 +307,8 @@ def _met(graph: Graph, fresh: np.ndarray, n_outlines: int, tolerance: float, rou
     fresh = fresh | settled[edges].any(axis=1)
     node, edge = _near_edges(nodes, edges, np.flatnonzero(~settled), fresh, tolerance)
     near = ~(nodes[edges[edge]] == nodes[node][:, None]).all(axis=2).any(axis=1)
-    # A node on an outline divides it wherever round-off has put it; other outlines are led through it only where it lies on
-    # them, as a brick's corner does on the course below.
+    # A node on an outline divides it wherever round-off has put it; other outlines are led through it only where it
+    # lies on them, as a brick's corner does on the course below.
     foreign = np.flatnonzero((source[edge] < n_outlines) & firm[node] & (home[node] != source[edge]))
     lines = shapely.linestrings(nodes[edges[edge[foreign]]])
     near[foreign] &= shapely.distance(shapely.points(nodes[node[foreign]]), lines) <= roundoff

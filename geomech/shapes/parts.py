@@ -33,8 +33,8 @@ JOINT = "joint:"
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """Joints of one kind as drawn: ``lines`` are polylines (n, 2) along which rock parts; ``name`` is what the block edges on
-    both sides are called, as "joint:bedding"."""
+    """Joints of one kind as drawn: ``lines`` are polylines (n, 2) along which rock parts; ``name`` is what the block
+    edges on both sides are called, as "joint:bedding"."""
 
     name: str
     lines: tuple[np.ndarray, ...]
@@ -42,8 +42,8 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """Lines or points of one name that cut nothing: ``name`` is "bolt:NAME", "water", "water:NAME" or "monitor:NAME" (each
-    may be without NAME), ``lines`` (n, 2) arrays, of one row for points."""
+    """Lines or points of one name that cut nothing: ``name`` is "bolt:NAME", "water", "water:NAME" or "monitor:NAME"
+    (each may be without NAME), ``lines`` (n, 2) arrays, of one row for points."""
 
     name: str
     lines: tuple[np.ndarray, ...]
@@ -66,7 +66,8 @@ def is_mark(name: str) -> bool:
 
 
 class Flaw(NamedTuple):
-    """One thing wrong with a drawing: ``part`` is "zones", "cracks", "joints" or "edges", ``index`` its place in that list."""
+    """One thing wrong with a drawing: ``part`` is "zones", "cracks", "joints" or "edges", ``index`` its place in that
+    list."""
 
     part: str
     index: int

@@ -27,7 +27,8 @@ def read_field_file(
 
     ``unit`` is what the file is drawn in, a key of `METRES` (default: what a DXF file says, else metres);
     ``chord_tolerance`` m is how far chords may leave the curves of a DXF file; ``set_property`` the property of GeoJSON
-    features that names their set. Raises FieldFileError with file and line (or feature, entity) for what cannot be read.
+    features that names their set. Raises FieldFileError with file and line (or feature, entity) for what cannot be
+    read.
     """
     path = Path(path)
     if not path.is_file():
@@ -60,9 +61,9 @@ def _text(path: Path) -> str:
 
 
 def _read_csv(path: Path) -> FieldFile:
-    """A table whose first row names its columns: x1, y1, x2, y2 (a trace a row), or id, x, y (a vertex a row, in order); with
-    them a column "set". Columns of other names are left alone. Between columns stands a tab, ";" or ","; with the first two
-    numbers may have decimal commas. "#" at the beginning or after a blank begins a comment."""
+    """A table whose first row names its columns: x1, y1, x2, y2 (a trace a row), or id, x, y (a vertex a row, in
+    order); with them a column "set". Columns of other names are left alone. Between columns stands a tab, ";" or ",";
+    with the first two numbers may have decimal commas. "#" at the beginning or after a blank begins a comment."""
     rows = [(k, _COMMENT.sub("", row).strip(" \r")) for k, row in enumerate(_text(path).splitlines(), 1)]
     rows = [(k, row) for k, row in rows if row.strip()]
     if not rows:

@@ -1,8 +1,8 @@
 """A borehole in unequal stress: what the crack solver alone makes of its wall, without blocks.
 
-Breakout: both remote stresses rise in proportion until the wall fails in shear and a chip comes off. Shear: under stresses
-somewhat above that, in rock that shears more easily than it tears, cracks whose faces rub run into the wall and stop where
-the hole no longer drives them. Mud pressure: the stresses stand, the pressure in
+Breakout: both remote stresses rise in proportion until the wall fails in shear and a chip comes off. Shear: under
+stresses somewhat above that, in rock that shears more easily than it tears, cracks whose faces rub run into the wall
+and stop where the hole no longer drives them. Mud pressure: the stresses stand, the pressure in
 the hole and in what it opens rises until the wall tears, and then only as far as the fracture lets it.
 """
 
@@ -43,8 +43,9 @@ def wall(sides: int = SIDES) -> np.ndarray:
 
 
 def steps(variant: str, sides: int = SIDES, most: int | None = None, increment: float | None = None) -> list:
-    """All steps of a ``variant``, or the first ``most``. Load factors are multiples of the remote stresses in "breakout", MPa in
-    "mud_pressure", one in "shear"; ``sides`` of the polygon for the hole; ``increment`` m, unset each variant's own."""
+    """All steps of a ``variant``, or the first ``most``. Load factors are multiples of the remote stresses in
+    "breakout", MPa in "mud_pressure", one in "shear"; ``sides`` of the polygon for the hole; ``increment`` m, unset
+    each variant's own."""
     remote = -np.array([GREATER, LESSER, 0.0])
     rock, control, options = ROCK, "toughness", {}
     if variant == "breakout":

@@ -31,7 +31,8 @@ def fracture_pressure(length: float) -> float:
 
 
 def chips(run: list) -> tuple[float, float]:
-    """Width, degrees of the wall's turn, and depth, parts of the radius, of the chip that came off first; nan while none has."""
+    """Width, degrees of the wall's turn, and depth, parts of the radius, of the chip that came off first; nan while
+    none has."""
     cracks = last_network(run)
     own = cracks.crack == 0
     nodes = np.unique(cracks.segments[own])

@@ -11,11 +11,13 @@ import numpy as np
 from geomech.model import Cycle
 from geomech.reference import flexural_toppling as published
 
-#: K of slender columns is right to 3e-3 with this mesh; with a coarse one ("topples") to 0.02, and its steps are 0.01 long.
+#: K of slender columns is right to 3e-3 with this mesh; with a coarse one ("topples") to 0.02, and its steps are 0.01
+#: long.
 LOAD_TOLERANCE, COARSE_TOLERANCE = 0.005, 0.03
 #: Columns ten times as long as thick, five of them: their shear, and what bends of the rock below, count besides.
 STACK_TOLERANCE = 0.06
-#: Turning over the toe, as part of the angle: 5e-4 with steps of 5 ms, of first order in them (later the toe slides besides).
+#: Turning over the toe, as part of the angle: 5e-4 with steps of 5 ms, of first order in them (later the toe slides
+#: besides).
 TURN_TOLERANCE = 0.002
 
 
@@ -75,7 +77,8 @@ class Watch:
         return float(k_ii.mean()), load * published.joint_end_factor(self.unit_weight, self.height, 1.0, self.tilt)
 
     def turned(self) -> tuple[float, float]:
-        """Angle (rad, clockwise) by which the piece turned from full gravity to the end, and a rigid body on its toe."""
+        """Angle (rad, clockwise) by which the piece turned from full gravity to the end, and a rigid body on its
+        toe."""
         turns = [each for each in self.turns if each[0] > 1.05 * self.ramp]
         times = np.array([each[0] for each in turns])
         angles = np.unwrap([each[1] for each in turns])

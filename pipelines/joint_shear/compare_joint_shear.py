@@ -1,4 +1,5 @@
-"""Shear force against the box's way, beside friction, the fracture load of a bridge and the strength of one that tears."""
+"""Shear force against the box's way, beside friction, the fracture load of a bridge and the strength of one that
+tears."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ class Sheared:
     """Observer of one test.
 
     rows        way of the box, m; shear force, N/m; length of the cracks, m; whether one grew: a row a cycle
-    start       force at which the bridge starts to break, N/m; ``k`` (2,) K_I and K_II of its ends there (the larger of both)
+    start       force at which the bridge starts to break, N/m; ``k`` (2,) K_I and K_II of its ends there (the larger of
+                both)
     unlike      largest difference of K between the two ends up to then, over K
     kink_deg    the turn that the criterion of tension takes there
     pieces      blocks of rock at the end

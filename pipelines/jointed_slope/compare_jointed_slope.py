@@ -15,10 +15,11 @@ from geomech.reference.base_shaking import sliding_block
 DIP, PLANE = np.radians(22.0), "plane"
 #: The shaking begins, s: before that the slope takes its weight.
 SHAKEN = 0.5
-#: The mean of jointed rock that also leans, turns and breaks, beside a rigid block: 15 % more in whole blocks of the variant "short",
-#: 26 % more where bridges break, 20 % in a thousand whole blocks.
+#: The mean of jointed rock that also leans, turns and breaks, beside a rigid block: 15 % more in whole blocks of the
+#: variant "short", 26 % more where bridges break, 20 % in a thousand whole blocks.
 SIMILAR = 0.35
-#: Until the base is first shaken beyond the yield acceleration, friction holds: the mean sways by no more than this part of the slip.
+#: Until the base is first shaken beyond the yield acceleration, friction holds: the mean sways by no more than this
+#: part of the slip.
 STANDS = 0.06
 #: Cracks and blocks that differ by more than this part of the strain have found no common answer.
 AGREED = 0.1
@@ -93,7 +94,8 @@ class Slide:
 
 
 def check(slide: Slide) -> None:
-    """AssertionError where the rock slides before limit equilibrium lets it, or, once it has slid, otherwise than Newmark's block."""
+    """AssertionError where the rock slides before limit equilibrium lets it, or, once it has slid, otherwise than
+    Newmark's block."""
     table, expected = slide.table, slide.newmark(slide.table[:, 0])
     if expected[-1] == 0.0:
         return

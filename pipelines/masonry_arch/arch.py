@@ -46,9 +46,9 @@ def thinnest(n: int, low: float = 0.09, high: float = 0.12) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Outlines of the springings and voussoirs, and at each joint from the right springing on: its inner and outer corner
-    (n + 1, 2, 2), where the thrust crosses it (n + 1, 2), nan if nothing does, and how far it has turned open, rad
-    (positive: open on the outside)."""
+    """Outlines of the springings and voussoirs, and at each joint from the right springing on: its inner and outer
+    corner (n + 1, 2, 2), where the thrust crosses it (n + 1, 2), nan if nothing does, and how far it has turned open,
+    rad (positive: open on the outside)."""
 
     outlines: list[np.ndarray]
     joints: np.ndarray

@@ -1,4 +1,5 @@
-"""A sliding plane with one rock bridge: the multiple of gravity at which it breaks, against limit equilibrium and fracture mechanics.
+"""A sliding plane with one rock bridge: the multiple of gravity at which it breaks, against limit equilibrium and
+fracture mechanics.
 
 `geomech run pipelines/planar_slope` calls `main`; copy the folder to make a study of your own.
 """

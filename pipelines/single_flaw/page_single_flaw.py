@@ -1,4 +1,5 @@
-"""The study on one page: the wings as they grew, their stress intensity factors beside closed forms, what settings change."""
+"""The study on one page: the wings as they grew, their stress intensity factors beside closed forms, what settings
+change."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ SHORTEST = published.HALF_LENGTH / 6
 
 
 def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path) -> Path:
-    """The page of ``runs`` as ``out/report.html``: all of the first one, the others beside it. ``places`` are run folders."""
+    """The page of ``runs`` as ``out/report.html``: all of the first one, the others beside it. ``places`` are run
+    folders."""
     name, wings = next(iter(runs.items()))
     run = Run(places[name])
     page = Page(

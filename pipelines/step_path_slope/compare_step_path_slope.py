@@ -103,8 +103,8 @@ class StepPath:
 
     @property
     def links(self) -> np.ndarray:
-        """(n_joints − 1,) angle, rad, from the joints' dip to the straight line from each joint's upper end to where its crack
-        meets the next one; nan where none does."""
+        """(n_joints − 1,) angle, rad, from the joints' dip to the straight line from each joint's upper end to where
+        its crack meets the next one; nan where none does."""
         found = np.full(self.n_joints - 1, np.nan)
         for x, y in self.places:
             k = int(np.argmin(np.hypot(*(self.joints[:-1, 1] - (x, y)).T)))
@@ -127,8 +127,8 @@ def _area(loop: np.ndarray) -> float:
 
 
 def _first_load_alone(problem: Problem, outline: np.ndarray, rock) -> float:
-    """The multiple of gravity at which a tip reaches its toughness, from the crack solver with the ground on rollers all along its
-    base, elements of order 6. Friction alone resists, so that K grows in proportion to gravity."""
+    """The multiple of gravity at which a tip reaches its toughness, from the crack solver with the ground on rollers
+    all along its base, elements of order 6. Friction alone resists, so that K grows in proportion to gravity."""
     low = outline[:, 1].min()
     side = next(k for k in range(len(outline)) if max(outline[k, 1], outline[(k + 1) % len(outline), 1]) < low + 1e-6)
     body = ddm.Body(
@@ -142,8 +142,9 @@ def _first_load_alone(problem: Problem, outline: np.ndarray, rock) -> float:
 
 def check(name: str, seen: StepPath) -> None:
     """AssertionError where the path is not what it is held against."""
-    # Blocks press on their base linearly from end to end and hold its ends by friction, an elastic body on rollers as it
-    # will: in ground as deep as it is wide 0.3 to 0.7 % are left of that at the joints (a pinned base makes 4 to 6 %).
+    # Blocks press on their base linearly from end to end and hold its ends by friction, an elastic body on rollers as
+    # it will: in ground as deep as it is wide 0.3 to 0.7 % are left of that at the joints (a pinned base makes 4 to 6
+    # %).
     assert abs(seen.started / seen.alone - 1) < 0.01, f"{name}: the first load is off that of the crack solver alone"
     # Faces in contact: K_I = 0 (a joint's end beside the face of the slope may open a little).
     assert abs(seen.kink - published.KINK) < math.radians(2), f"{name}: the first tip does not leave as in pure shear"

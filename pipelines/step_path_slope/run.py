@@ -1,4 +1,5 @@
-"""Ten en-echelon joints linked to a step path: the loads at which bridges break, and the way that cracks take through them.
+"""Ten en-echelon joints linked to a step path: the loads at which bridges break, and the way that cracks take through
+them.
 
 `geomech run pipelines/step_path_slope` calls `main`; copy the folder to make a study of your own.
 """

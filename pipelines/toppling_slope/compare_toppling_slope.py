@@ -29,8 +29,8 @@ def report(
     modes: list[str],
     safety: tuple[float, float],
 ) -> str:
-    """``table`` = (R, S, P) of the blocks at the limit, ``modes`` of what they do at ``friction``; ``safety``: tan φ of a
-    slope that stands, and its factor of safety."""
+    """``table`` = (R, S, P) of the blocks at the limit, ``modes`` of what they do at ``friction``; ``safety``: tan φ of
+    a slope that stands, and its factor of safety."""
     normal, shear, push = table
     rows = [
         f"least friction that holds the slope: tan φ = {limit:.4f}",

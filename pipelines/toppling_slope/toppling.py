@@ -65,7 +65,8 @@ def factor_of_safety(friction: float) -> float:
 
 
 def forces(result: dda.StepResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(R, S, P), each (16,) kN of blocks 1 … 16: base normal and shear (up the dip), and the push of the block above."""
+    """(R, S, P), each (16,) kN of blocks 1 … 16: base normal and shear (up the dip), and the push of the block
+    above."""
     rows = result.contacts[result.contacts["state"] != OPEN]
     normal = rows["normal"]
     force = rows["normal_force"][:, None] * normal

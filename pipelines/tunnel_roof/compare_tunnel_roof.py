@@ -12,12 +12,14 @@ import numpy as np
 from geomech.model import Cycle
 from geomech.reference import roof_block as published
 
-#: The bridge is a fortieth of the parting, not of half-planes, and the roof above it bends a little: measured 0.1 to 0.4 %.
+#: The bridge is a fortieth of the parting, not of half-planes, and the roof above it bends a little: measured 0.1 to
+#: 0.4 %.
 FORCE_TOLERANCE = 0.006
-#: The bending of the roof shears the bridge (K_II/K_I 0.05 to 0.15): it breaks at up to 1.5 (K_II/K_I)² below the load at which
-#: K_I alone would do it (`maximum tangential stress`), which statics and K_I know nothing of.
+#: The bending of the roof shears the bridge (K_II/K_I 0.05 to 0.15): it breaks at up to 1.5 (K_II/K_I)² below the load
+#: at which K_I alone would do it (`maximum tangential stress`), which statics and K_I know nothing of.
 LOAD_TOLERANCE = 0.04
-#: Way of a block in free fall is exact in the time scheme; sliding friction keeps five digits, less the walls' own springs.
+#: Way of a block in free fall is exact in the time scheme; sliding friction keeps five digits, less the walls' own
+#: springs.
 FALL_TOLERANCE, SLIDE_TOLERANCE = 1e-6, 2e-3
 #: Of a block that is held, m: what springs and rock give under a weight of 23 t.
 HELD = 1e-4

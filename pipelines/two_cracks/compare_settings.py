@@ -53,7 +53,8 @@ def of_family(runs: Mapping[str, Watch], which: str) -> dict[str, Watch]:
 
 
 def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
-    """Initiation loads by reading, by faces and by settings, and what the settings do to K; all from one step of load."""
+    """Initiation loads by reading, by faces and by settings, and what the settings do to K; all from one step of
+    load."""
     found = {}
 
     def at(phi: int, wishes: tuple) -> object:
@@ -143,8 +144,8 @@ _KINDS = ("initiation", "coalescence")
 
 
 def apart(run: Watch, other: Watch) -> float:
-    """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of those that lie beside them: what is
-    beyond a tip is longer, not elsewhere. nan where there are none."""
+    """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of those that lie beside them: what
+    is beyond a tip is longer, not elsewhere. nan where there are none."""
     cracks, against = run.last.cracks, other.last.cracks
     nodes = cracks.nodes[np.unique(cracks.segments[cracks.birth_cycle > 0])]
     if not len(nodes):
@@ -165,7 +166,8 @@ def apart(run: Watch, other: Watch) -> float:
 
 
 def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
-    """One setting varied: loads, what they differ by from the finest rung of the same φ, and how far paths lie apart."""
+    """One setting varied: loads, what they differ by from the finest rung of the same φ, and how far paths lie
+    apart."""
     rungs: dict[int, dict[float, Watch]] = {}
     for name, run in members.items():
         rungs.setdefault(run.phi, {})[float(name.split("_")[1].replace("p", "."))] = run

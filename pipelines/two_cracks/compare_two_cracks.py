@@ -61,8 +61,8 @@ class Watch:
         return next((event.load for event in self.events if event.kind == kind), np.nan)
 
     def load_at(self, length: float) -> float:
-        """Load, Pa, that it takes for the wing from crack 1's upper end to grow on from ``length`` m, the largest so far,
-        between increments linearly; nan beyond the last of them."""
+        """Load, Pa, that it takes for the wing from crack 1's upper end to grow on from ``length`` m, the largest so
+        far, between increments linearly; nan beyond the last of them."""
         if not self.growth:
             return np.nan
         load, grown = np.array(self.growth).T
@@ -95,7 +95,8 @@ def coalescence_angle_deg(cracks: Cracks) -> float:
 
 
 def coalescence_line_deg(run: Watch) -> float:
-    """`coalescence_angle_deg` of a run as Table 3 has it: φ = 90 was published with the axes exchanged, from the vertical."""
+    """`coalescence_angle_deg` of a run as Table 3 has it: φ = 90 was published with the axes exchanged, from the
+    vertical."""
     angle = coalescence_angle_deg(run.last.cracks)
     if run.phi == 90 and np.isfinite(angle):
         angle = (90 - angle) if angle > 0 else (-90 - angle)
@@ -109,8 +110,8 @@ def by_angle(runs: Mapping[str, Watch]) -> dict[int, Watch]:
 
 
 def parts(runs: Mapping[str, Watch]) -> list[Part]:
-    """The comparison of the specimens in ``runs`` (a variant's name → what was watched). Parts that the runs cannot fill
-    are left out: a fit at φ = 0 needs the run with φ = 0, and what the paper says of all four needs all four."""
+    """The comparison of the specimens in ``runs`` (a variant's name → what was watched). Parts that the runs cannot
+    fill are left out: a fit at φ = 0 needs the run with φ = 0, and what the paper says of all four needs all four."""
     by_phi = by_angle(runs)
     found = [_loads(by_phi), _lines(by_phi), _intensities(by_phi)]
     if 0 in by_phi and np.isfinite(by_phi[0].load("initiation")):

@@ -1,4 +1,5 @@
-"""What one step of load already tells of a specimen: K at its tips, and the load at which the first of them begins to grow."""
+"""What one step of load already tells of a specimen: K at its tips, and the load at which the first of them begins to
+grow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The study on one page: paths, tables and figures of the paper beside what was computed, and what the settings carry."""
+"""The study on one page: paths, tables and figures of the paper beside what was computed, and what the settings
+carry."""
 
 from __future__ import annotations
 

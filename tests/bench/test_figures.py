@@ -1,4 +1,5 @@
-"""`geomech bench`: quick is held against quick only, what every part took is told, and other programs' time is not counted."""
+"""`geomech bench`: quick is held against quick only, what every part took is told, and other programs' time is not
+counted."""
 
 from __future__ import annotations
 

@@ -51,7 +51,8 @@ def test_springs_keep_force_and_moment(route, block):
     blocks = Blocks.from_polygons([square, square + [0.25, 1.0]])
     rows = np.zeros(2, CONTACT)
     rows["block"], rows["other"], rows["state"] = [1, 0], [0, 1], SLIP
-    # The upper one's lower left corner on the lower one's top, the lower one's upper right corner on the upper one's base.
+    # The upper one's lower left corner on the lower one's top, the lower one's upper right corner on the upper one's
+    # base.
     rows["vertex"], rows["edge"] = [4, 2], [2, 4]
     rows["point"], rows["normal"] = [[0.25, 1.0], [1.0, 1.0]], [[0.0, 1.0], [0.0, -1.0]]
     rows["normal_force"], rows["shear_force"] = [2.0, 3.0], [0.5, 0.25]
@@ -67,8 +68,8 @@ def test_springs_keep_force_and_moment(route, block):
 
 
 def test_springs_are_point_loads_at_the_corners(problem):
-    """K of the coupled run at 0.2 MPa is that of the crack solver under four point forces σ W/2 (Michell 1902 at corners);
-    1e-6: strains are 1e-5, and lengths are a little different."""
+    """K of the coupled run at 0.2 MPa is that of the crack solver under four point forces σ W/2 (Michell 1902 at
+    corners); 1e-6: strains are 1e-5, and lengths are a little different."""
     k, load = coupled(problem, "springs")
     half = 0.2e6 * 0.03
     forces = np.array([[0.0, -half], [0.0, -half], [0.0, half], [0.0, half]])
@@ -78,9 +79,9 @@ def test_springs_are_point_loads_at_the_corners(problem):
 
 
 def test_kelvin_leaves_most_of_a_corner_force_outside(problem):
-    """In the infinite plane the quarter that is rock takes this much of a force at its corner: the traction of Kelvin's field
-    on an arc about it. K_I under point loads of that size is what the route comes to, within 3 %: of what else happens at
-    the corner, each element's displacement there being its own, little is seen from afar."""
+    """In the infinite plane the quarter that is rock takes this much of a force at its corner: the traction of Kelvin's
+    field on an arc about it. K_I under point loads of that size is what the route comes to, within 3 %: of what else
+    happens at the corner, each element's displacement there being its own, little is seen from afar."""
     k, load = coupled(problem, "kelvin-springs")
     rock = rock_of(problem)
     spots, weights = np.polynomial.legendre.leggauss(20)

@@ -31,8 +31,9 @@ def test_response_reproduces_the_crack_strain_it_was_made_from():
 
 
 def test_no_direction_gives_energy_back():
-    """A face that slides under friction tan 40° answers pressure with less slip, but shear with no opening: half of that is
-    symmetric, and negative somewhere. What is left is positive, the same in whatever axes, and nothing is taken from others."""
+    """A face that slides under friction tan 40° answers pressure with less slip, but shear with no opening: half of
+    that is symmetric, and negative somewhere. What is left is positive, the same in whatever axes, and nothing is taken
+    from others."""
     shear, friction = 2.0, np.tan(np.radians(40.0))
     response = np.array(
         [[0, 0, 0], [0, 1e-3, 0], [0, shear * friction, shear]]

@@ -74,8 +74,9 @@ def last_told(problem: Problem, longest: float = np.inf) -> dict[str, float]:
 
 @pytest.mark.parametrize("dt", [0.4, 0.2])
 def test_sliding_and_wings_under_compression_add_up(dt):
-    """A closed crack at 45° that rubs and grows wings, pressed ever harder: what it stores, rubs off and releases, against
-    the work on it. Whatever the step, what is left over is that of the increment, 1e-3 for a twelfth of the crack."""
+    """A closed crack at 45° that rubs and grows wings, pressed ever harder: what it stores, rubs off and releases,
+    against the work on it. Whatever the step, what is left over is that of the increment, 1e-3 for a twelfth of the
+    crack."""
     told = last_told(loaded(-2e6, 3.4, dt, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0, increment=0.02))
     parts = [told[name] for name in ("crack_elastic", "crack_friction", "fracture_energy")]
     assert min(parts) > 0.1 * sum(parts)
@@ -85,9 +86,9 @@ def test_sliding_and_wings_under_compression_add_up(dt):
 
 @pytest.mark.parametrize("dt", [0.4, 0.1])
 def test_sliding_alone_adds_up_whatever_the_step(dt):
-    """Pressure and slip rise together, so that friction takes half of what its last force would over all of the slip: 5 to 8e-5 of
-    the work is left over with 3 as with 12 steps (of the strain that the load turns and shortens the plate by; taken at the
-    end of steps it was 9 and 3 %)."""
+    """Pressure and slip rise together, so that friction takes half of what its last force would over all of the slip: 5
+    to 8e-5 of the work is left over with 3 as with 12 steps (of the strain that the load turns and shortens the plate
+    by; taken at the end of steps it was 9 and 3 %)."""
     told = last_told(loaded(-2e6, 1.2, dt, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0))
     assert told["fracture_energy"] == 0.0 and told["crack_friction"] > 0.3 * told["crack_elastic"]
     assert abs(told["crack_residual"]) < 2e-4 * told["crack_work"]
@@ -103,9 +104,10 @@ def test_sliding_alone_adds_up_whatever_the_step(dt):
     ],
 )
 def test_a_running_crack_adds_up_in_dynamics(dt, scheme):
-    """A crack across a plate that is pulled within some ten passages of waves runs at 0.4 c_R to three times its length: load
-    work = elastic + kinetic + damping + scheme + stored at cracks + released at tips, whatever the step, its scheme and its
-    damping: 6e-5 of the load's work are left over, of the increment and of the strain that the load turns the plate by."""
+    """A crack across a plate that is pulled within some ten passages of waves runs at 0.4 c_R to three times its
+    length: load work = elastic + kinetic + damping + scheme + stored at cracks + released at tips, whatever the step,
+    its scheme and its damping: 6e-5 of the load's work are left over, of the increment and of the strain that the load
+    turns the plate by."""
     given = loaded(4e8, 2e-2, dt, [[-0.1, 0.0], [0.1, 0.0]], dynamic=1.0, increment=0.02)
     told = last_told(replace(given, dda=replace(given.dda, **scheme)), 0.7)
     names = (
@@ -118,7 +120,8 @@ def test_a_running_crack_adds_up_in_dynamics(dt, scheme):
 
 
 def test_what_parts_sets_free_what_was_stored_at_its_crack():
-    """A plate that an edge-to-edge run cuts through: at the end nothing is stored at cracks, and the columns say where it went."""
+    """A plate that an edge-to-edge run cuts through: at the end nothing is stored at cracks, and the columns say where
+    it went."""
     seen = [c for c in cycles(loaded(1e6, 3.0, 0.25, [[-0.3, 0.0], [0.3, 0.0]])) if c.number]
     assert "split" in [event.kind for event in seen[-1].events]
     before = [c.statistics for c in seen if c.load_step < seen[-1].load_step][-1]

@@ -1,4 +1,5 @@
-"""Steps to the very load at which tips reach their toughness, held against the crack solver alone, fixed steps, closed forms."""
+"""Steps to the very load at which tips reach their toughness, held against the crack solver alone, fixed steps, closed
+forms."""
 
 from dataclasses import replace
 
@@ -62,8 +63,8 @@ def toughness_factor(problem):
 
 
 def test_growth_starts_at_the_load_of_the_crack_solver_alone():
-    """K_eq = K_Ic to 1e-6, and the load to 2e-6 of that of small strain: the steps before have strained the plate by 7e-4, and
-    a load on the block's own ends feels nothing of it but through its rotation."""
+    """K_eq = K_Ic to 1e-6, and the load to 2e-6 of that of small strain: the steps before have strained the plate by
+    7e-4, and a load on the block's own ends feels nothing of it but through its rotation."""
     problem = plate()
     found = first_growth(problem)
     assert found.tips["k_eq"].max() == pytest.approx(ROCK.k_ic, rel=1e-6)
@@ -80,8 +81,8 @@ def test_weight_that_leads_is_that_of_a_column():
 
 
 def test_growth_starts_at_the_same_load_whatever_the_steps():
-    """Loads rising slowly or fast, steps kept short or not: 1e-6, the drive's own tolerance; fixed steps end up to one load
-    step above."""
+    """Loads rising slowly or fast, steps kept short or not: 1e-6, the drive's own tolerance; fixed steps end up to one
+    load step above."""
     expected = -first_growth(plate()).load
     for problem in (
         plate(rate=7 * RATE),
@@ -96,7 +97,8 @@ def test_growth_starts_at_the_same_load_whatever_the_steps():
 
 
 def test_tips_that_are_images_of_one_another_grow_together():
-    """Half a turn maps the plate on itself: both tips start in one cycle, and their paths stay images to 1e-9 of its size."""
+    """Half a turn maps the plate on itself: both tips start in one cycle, and their paths stay images to 1e-9 of its
+    size."""
     problem = plate(stop_at=("daylighting",), growth=GrowthSettings(increment=4e-3))
     seen = [cycle for cycle in cycles(problem) if cycle.tips["grown"].any()]
     assert len({cycle.load for cycle in seen}) == 1  # it runs away at one load
@@ -128,8 +130,8 @@ def test_steps_do_not_pass_the_corners_of_a_history():
 
 
 def test_a_jump_of_the_drive_is_an_event(monkeypatch):
-    """Faces that begin to slip may throw load on a tip at once: the step ends just after the jump, and not where it would
-    have passed the toughness but for it."""
+    """Faces that begin to slip may throw load on a tip at once: the step ends just after the jump, and not where it
+    would have passed the toughness but for it."""
     jump = 41.7
     monkeypatch.setattr(
         event_steps,
@@ -148,8 +150,8 @@ def test_a_jump_of_the_drive_is_an_event(monkeypatch):
 
 
 def test_births_are_events_too():
-    """No crack is there: the load at which two are born at a hole is that of the crack solver alone, to 1e-5 (stress at a point
-    on a surface, after a strain of 2e-4)."""
+    """No crack is there: the load at which two are born at a hole is that of the crack solver alone, to 1e-5 (stress at
+    a point on a surface, after a strain of 2e-4)."""
     rock = replace(ROCK, k_ic=0.3e6, tensile_strength=3e6)
     angle = 2 * np.pi * (np.arange(16) + 0.5) / 16
     hole = 0.006 * np.column_stack([np.cos(angle), -np.sin(angle)])
@@ -177,8 +179,8 @@ def test_dynamic_runs_and_relaxed_ones_are_refused():
 
 
 def test_the_load_does_not_go_back_for_tips_that_still_grow():
-    """Growth that runs away and is stopped after a pass leaves tips driven beyond their toughness: the zero of the drive lies
-    behind, but a load that only rises goes on by whole steps."""
+    """Growth that runs away and is stopped after a pass leaves tips driven beyond their toughness: the zero of the
+    drive lies behind, but a load that only rises goes on by whole steps."""
     growth = GrowthSettings(increment=1e-3, max_passes=1, correct=False)
     times, found = [], cycles(plate(stop_at=(), growth=growth, rate=RATE))
     for cycle in found:

@@ -1,4 +1,5 @@
-"""Contacts and crack faces that change their state: at which load, held against closed forms of statics and friction."""
+"""Contacts and crack faces that change their state: at which load, held against closed forms of statics and
+friction."""
 
 from dataclasses import replace
 
@@ -28,8 +29,9 @@ G = 10.0
 
 
 def standing(angle_deg, pushes, friction_deg=35.0, sizes=None, height=1.0, at=0.5, **run):
-    """Blocks in a row on a plane that dips by ``angle_deg`` to the right, each pushed along it by a force that grows by one of
-    ``pushes`` N/s; ``sizes`` are their widths, m, and ``at`` the part of their height at which they are pushed."""
+    """Blocks in a row on a plane that dips by ``angle_deg`` to the right, each pushed along it by a force that grows by
+    one of ``pushes`` N/s; ``sizes`` are their widths, m, and ``at`` the part of their height at which they are
+    pushed."""
     sizes = np.ones(len(pushes)) if sizes is None else np.asarray(sizes)
     a = np.radians(-angle_deg)
     turn = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
@@ -96,7 +98,8 @@ def test_a_block_that_is_lifted_parts_at_its_weight():
 
 
 def cracked_plate(**run):
-    """A plate under a pressure from the sides and a growing one on its ends, with a closed, rough crack at 45° inside."""
+    """A plate under a pressure from the sides and a growing one on its ends, with a closed, rough crack at 45°
+    inside."""
     polygon = np.array([[-0.03, -0.06], [0.03, -0.06], [0.03, 0.06], [-0.03, 0.06]])
     names = ("load:bottom", "load:right", "load:top", "load:left")
     side = History.table([0.0, 1.0], [[1e6, 0.0], [1e6, 0.0]])
@@ -120,8 +123,8 @@ def cracked_plate(**run):
 
 @pytest.mark.parametrize("longest", [None, 7.0])
 def test_a_crack_slips_at_the_load_of_mohr_and_coulomb(longest):
-    """(σ₁ − σ₃)/2 = c + tan φ (σ₁ + σ₃)/2 at 45°, all along at once: till then the plate is strained as one without a crack. 1e-5 is
-    what the strain before makes of a load that stays where it is."""
+    """(σ₁ − σ₃)/2 = c + tan φ (σ₁ + σ₃)/2 at 45°, all along at once: till then the plate is strained as one without a
+    crack. 1e-5 is what the strain before makes of a load that stays where it is."""
     friction, cohesion, side = np.tan(np.radians(30.0)), 0.4e6, 1e6
     load = (2 * cohesion + side * (1 + friction)) / (1 - friction)
     problem = cracked_plate(longest_step=longest)
@@ -134,7 +137,8 @@ def test_a_crack_slips_at_the_load_of_mohr_and_coulomb(longest):
 
 @pytest.mark.parametrize("failing", [1, 3])
 def test_a_look_without_an_answer_ends_no_run(monkeypatch, failing):
-    """Blocks that find no states at a load on the way: the slip is told where they do, at the end of the step or at its load."""
+    """Blocks that find no states at a load on the way: the slip is told where they do, at the end of the step or at its
+    load."""
     solves, solve = [], EventSteps._solve
 
     def sometimes(self, now, time, free=False):
@@ -160,8 +164,9 @@ def test_one_body_needs_no_search_for_contacts(monkeypatch):
 
 
 def test_a_rush_of_changes_is_taken_together():
-    """Forty blocks alike but for their widths slip at a first corner one soon after the other, at loads in proportion to their widths.
-    The first fifteen are told at their own, the others in groups, and all of them cost few steps more than there are."""
+    """Forty blocks alike but for their widths slip at a first corner one soon after the other, at loads in proportion
+    to their widths. The first fifteen are told at their own, the others in groups, and all of them cost few steps more
+    than there are."""
     sizes = 1.0 + 0.003 * np.arange(40)
     alone = told(standing(0.0, [1000.0], at=0.02, stop_at=("slip",)))[0][0][1]
     events, number = told(standing(0.0, [1000.0] * 40, sizes=sizes, at=0.02, stop_at=(), end_time=1.13 * alone))
@@ -173,7 +178,8 @@ def test_a_rush_of_changes_is_taken_together():
 
 
 def test_loads_of_tips_do_not_depend_on_what_else_is_watched():
-    """A plate whose crack slips long before it grows: the load at which it grows is the same to 1e-6, with fewer steps."""
+    """A plate whose crack slips long before it grows: the load at which it grows is the same to 1e-6, with fewer
+    steps."""
     rock = Material("rock", 17e9, 0.21, 2200.0, 1e6)
     problem = replace(cracked_plate(stop_at=("initiation",), end_time=1000.0), materials=(rock,))
     loads, numbers = [], []

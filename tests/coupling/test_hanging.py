@@ -39,12 +39,14 @@ def edge_crack(ratio: float, aperture: float, block: int) -> Cracks:
 
 
 def softness_by_k(ratio: float) -> float:
-    """E' S_yy of the bar: its stretch across the crack is 2 σ/E' ∫ F² π a da / W (Irwin 1957), F of Tada, Paris & Irwin's strip."""
+    """E' S_yy of the bar: its stretch across the crack is 2 σ/E' ∫ F² π a da / W (Irwin 1957), F of Tada, Paris &
+    Irwin's strip."""
     return 2 * quad(lambda a: edge_crack_strip(a) ** 2 * math.pi * a, 0, ratio)[0] / HEIGHT
 
 
 def falls_on_its_base(ratio: float, aperture: float, steps: int, periods: float) -> Problem:
-    """The bar comes under its weight at once on a fixed base without friction, ``steps`` to the period of its bounce."""
+    """The bar comes under its weight at once on a fixed base without friction, ``steps`` to the period of its
+    bounce."""
     base = np.array([[-1.0, -1.0], [2.0, -1.0], [2.0, 0.0], [-1.0, 0.0]])
     step = period(ratio) / steps
     return Problem(
@@ -67,8 +69,8 @@ def period(ratio: float) -> float:
 
 
 def test_a_hanging_block_bounces_as_its_ligament_s_compliance_has_it():
-    """An edge crack through three quarters, 16 times as soft as the bar: mean and largest strain and the period of the bounce are those
-    of the compliance by K; passes agree at once, and the energy of the motion stays."""
+    """An edge crack through three quarters, 16 times as soft as the bar: mean and largest strain and the period of the
+    bounce are those of the compliance by K; passes agree at once, and the energy of the motion stays."""
     ratio = 0.75
     soft, given = softness_by_k(ratio), falls_on_its_base(ratio, np.inf, 100, 1.6)
     run = Coupling(given)
@@ -90,8 +92,8 @@ def test_a_hanging_block_bounces_as_its_ligament_s_compliance_has_it():
 
 
 def test_at_rest_forces_and_strain_of_a_soft_block_agree_without_taking_it_to_hang():
-    """The bar of the bounce in static steps: it stands on its base as the compliance by K has it, in a few passes, and its cracks answer
-    to the forces that act."""
+    """The bar of the bounce in static steps: it stands on its base as the compliance by K has it, in a few passes, and
+    its cracks answer to the forces that act."""
     ratio = 0.75
     given = falls_on_its_base(ratio, np.inf, 1, 3.0)
     run = Coupling(replace(given, dda=DdaSettings(time_step=given.dda.time_step, dynamic_factor=0.0)))

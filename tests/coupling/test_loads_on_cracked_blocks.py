@@ -1,4 +1,5 @@
-"""Whatever acts on a cracked block arrives at its elastic body: what it leaves is the block's inertia and nothing else."""
+"""Whatever acts on a cracked block arrives at its elastic body: what it leaves is the block's inertia and nothing
+else."""
 
 import numpy as np
 import pytest
@@ -87,8 +88,8 @@ ALL = {
 def test_equilibrium_of_a_cracked_block_closes_under_every_load(name):
     records = list(cycles(problem(ALL[name])))
     assert records[-1].state.time == pytest.approx(2.0)
-    # Forces act where the blocks were as the step began, and are weighed against inertia there. From the second step on contacts are
-    # off the outline by their gaps, of a part in 1e7, at which shear has an arm. The first step is exact.
+    # Forces act where the blocks were as the step began, and are weighed against inertia there. From the second step on
+    # contacts are off the outline by their gaps, of a part in 1e7, at which shear has an arm. The first step is exact.
     first, last = records[1].statistics["traction_imbalance"], records[-1].statistics["traction_imbalance"]
     assert first < 1e-10
     assert last < 1e-6
@@ -113,7 +114,7 @@ def test_a_cracked_block_that_is_taken_out_has_no_tips_any_more():
         ("excavation", 2.0, "cracked is taken out"),
     ]
     by_time = {round(record.state.time, 6): record for record in records}
-    # Without the block above, the slot feels a fifth of the stress there was (0.5 of 2.5 block heights of weight at its place
-    # twice: 1 m of its own, instead of 2 m).
+    # Without the block above, the slot feels a fifth of the stress there was (0.5 of 2.5 block heights of weight at its
+    # place twice: 1 m of its own, instead of 2 m).
     assert 0 < np.abs(by_time[2.0].tips["k_ii"]).max() < 0.7 * np.abs(by_time[1.0].tips["k_ii"]).max()
     assert not len(by_time[4.0].tips) and by_time[4.0].state.removed.tolist() == [False, True, True]

@@ -27,8 +27,8 @@ from geomech.model import (
 
 
 def plates(friction: bool) -> Problem:
-    """Four plates under tension that rises at unlike rates, in dynamics: halves fly apart. The first is cut in two while the others stand, the next one's
-    crack grows a little, that of the third is pressed shut (and may rub)."""
+    """Four plates under tension that rises at unlike rates, in dynamics: halves fly apart. The first is cut in two
+    while the others stand, the next one's crack grows a little, that of the third is pressed shut (and may rub)."""
     w, h = 0.03, 0.06
     left = 0.1 * np.arange(4)
     blocks = Blocks.from_polygons(
@@ -103,8 +103,8 @@ def test_leaving_out_what_has_not_changed_changes_nothing(monkeypatch, friction)
 
 @pytest.mark.parametrize("friction", [False, True])
 def test_the_switch_of_a_scene_changes_nothing_but_the_work(friction):
-    """``run.skip = false``: every body and every answer anew, and the same results to round-off (loads that come again are
-    scaled from unit loads, new ones are solved for; factors grow with cracks, or are made whole)."""
+    """``run.skip = false``: every body and every answer anew, and the same results to round-off (loads that come again
+    are scaled from unit loads, new ones are solved for; factors grow with cracks, or are made whole)."""
     given = plates(friction)
     kept, work, events = results(given)
     done, all_work, all_events = results(replace(given, run=replace(given.run, skip=False)))

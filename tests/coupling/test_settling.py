@@ -17,8 +17,8 @@ from geomech.model import History, Loads, State
 @pytest.mark.parametrize("friction", [0.0, 30.0])
 def test_passes_settle_on_shaken_bricks_with_closed_cracks(friction):
     """Bricks that fall onto each other and are shaken by 0.3 g at 10 Hz, one in three with a closed crack: contacts
-    and crack faces change their states in every step, and passes agree in each. (With tractions that jumped as a contact went, one step in
-    ten never did.)"""
+    and crack faces change their states in every step, and passes agree in each. (With tractions that jumped as a
+    contact went, one step in ten never did.)"""
     given = wall(40, 13)
     times = np.linspace(0.0, 0.1, 401)
     shaking = np.column_stack([3.0 * np.sin(20 * np.pi * times), np.full(401, -9.81)])
@@ -36,7 +36,8 @@ def test_passes_settle_on_shaken_bricks_with_closed_cracks(friction):
 
 
 def test_a_pass_begins_with_the_contact_states_of_the_one_before():
-    """… and ends where it would have ended anyway, at a fraction of the iterations: bricks that come under their weight."""
+    """… and ends where it would have ended anyway, at a fraction of the iterations: bricks that come under their
+    weight."""
     given = wall(60, 20)
 
     def step(like):
@@ -65,8 +66,8 @@ def test_acceleration_solves_a_linear_agreement_in_as_many_passes_as_it_has_unkn
 
 
 def test_answers_that_turn_about_with_the_states_of_faces_are_relaxed():
-    """x = c − 1.3 x of a block whose S is another one in every pass: handing back what was found goes away from the answer
-    for ever; relaxed, it is there to 1e-6 after a few passes. A second block, at peace, is not held back."""
+    """x = c − 1.3 x of a block whose S is another one in every pass: handing back what was found goes away from the
+    answer for ever; relaxed, it is there to 1e-6 after a few passes. A second block, at peace, is not held back."""
     settling, offset = Settling(), np.zeros((2, 3))
     target = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     for n in range(8):
@@ -77,9 +78,9 @@ def test_answers_that_turn_about_with_the_states_of_faces_are_relaxed():
 
 @pytest.mark.slow
 def test_passes_settle_while_cracks_grow_through_shaken_bricks():
-    """Closed rough cracks that grow, meet sides and part bricks under their sudden weight and 0.3 g: faces of nearly cut bricks
-    open in one pass and close in the next (and did so for ever, one growing pass in ten 0.5 to 0.9 off). All passes agree, most of them after
-    three or four."""
+    """Closed rough cracks that grow, meet sides and part bricks under their sudden weight and 0.3 g: faces of nearly
+    cut bricks open in one pass and close in the next (and did so for ever, one growing pass in ten 0.5 to 0.9 off). All
+    passes agree, most of them after three or four."""
     given = wall(100, 10)
     times = np.linspace(0.0, 0.1, 401)
     shaking = np.column_stack([3.0 * np.sin(10 * np.pi * times), np.full(401, -9.81)])
@@ -98,7 +99,8 @@ def test_passes_settle_while_cracks_grow_through_shaken_bricks():
     assert max(cycle.statistics["compliance_mismatch"] for cycle in seen) < 1e-4
     assert np.mean([cycle.statistics["compliance_passes"] for cycle in seen]) < 5
     told = seen[-1].statistics
-    # Blocks spend on their cracks what is there to be spent (by ∫ G da of held forces on ligaments it was three times the weight's work).
+    # Blocks spend on their cracks what is there to be spent (by ∫ G da of held forces on ligaments it was three times
+    # the weight's work).
     spent = told["crack_elastic"] + told["crack_friction"] + told["fracture_energy"]
     assert spent < 0.01 * told["gravity_work"]
     assert abs(told["energy_residual"]) < 1e-5 * told["gravity_work"]

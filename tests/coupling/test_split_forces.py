@@ -1,5 +1,5 @@
-"""Blocks that part along a crack: their contacts begin with what its faces bore. Held against statics of the parts (the stress
-of the whole block is known in closed form), integrals of the face tractions, and the motion before the cut."""
+"""Blocks that part along a crack: their contacts begin with what its faces bore. Held against statics of the parts (the
+stress of the whole block is known in closed form), integrals of the face tractions, and the motion before the cut."""
 
 from dataclasses import replace
 
@@ -43,8 +43,8 @@ def rectangle(x0, y0, x1, y1):
 
 
 def plate(stress, friction, line=None, platen=False, aperture=0.0, **settings):
-    """A plate of 1 × 2 m under ``stress`` (xx, yy) Pa with a crack from its left side that ends just before its right side, with or
-    without a floor that it slides on and a platen that comes down on it, both without friction."""
+    """A plate of 1 × 2 m under ``stress`` (xx, yy) Pa with a crack from its left side that ends just before its right
+    side, with or without a floor that it slides on and a platen that comes down on it, both without friction."""
     polygons, names, fixed = [rectangle(-0.5, -1.0, 0.5, 1.0)], [["bottom", "right", "top", "left"]], [False]
     if platen:
         polygons += [rectangle(-0.6, -1.3, 0.6, -1.0), rectangle(-0.6, 1.0, 0.6, 1.3)]
@@ -109,7 +109,8 @@ def cut(now, end=(0.5, 0.5 * SLOPE)):
 
 
 def on_upper(now, rows=None):
-    """Force (along the crack, across it, N) and its moment about the origin of what the lower part does to the upper one."""
+    """Force (along the crack, across it, N) and its moment about the origin of what the lower part does to the upper
+    one."""
     rows = now.state.contacts if rows is None else rows
     upper = int(np.argmax([now.blocks.area_moments(b)[1][1] for b in (0, 1)]))
     rows = rows[(rows["state"] != OPEN) & np.isin(rows["block"], (0, 1)) & np.isin(rows["other"], (0, 1))]
@@ -143,8 +144,8 @@ def test_faces_that_stick_hand_on_what_they_bear(contact):
 
 
 def test_nothing_moves_when_the_last_of_a_stuck_crack_parts():
-    """The parts are in equilibrium as they are cut: 1e-5 of the elastic shortening, of the stress that quadrature finds in them, is
-    left; from rest no force jumps."""
+    """The parts are in equilibrium as they are cut: 1e-5 of the elastic shortening, of the stress that quadrature finds
+    in them, is left; from rest no force jumps."""
     now = stepped(plate((0.0, -1e6), 0.6))
     shortening = 2.0 * 1e6 / ROCK.plane_modulus
     cut(now)
@@ -159,8 +160,8 @@ def test_nothing_moves_when_the_last_of_a_stuck_crack_parts():
 
 
 def test_faces_that_slide_go_on_sliding():
-    """Faces held by a ligament alone: what contacts bear is the integral of the faces' tractions (polynomials through their nodes,
-    integrated here), friction at its limit."""
+    """Faces held by a ligament alone: what contacts bear is the integral of the faces' tractions (polynomials through
+    their nodes, integrated here), friction at its limit."""
     now = stepped(plate((0.0, -1e6), 0.1))
     solution = now.solutions[0]
     elements, traction = solution.body.faces, solution.faces.traction[:, 1:-1]
@@ -177,7 +178,8 @@ def test_faces_that_slide_go_on_sliding():
     # The faces' axes have turned by strains of 6e-5 since, and shear is a tenth of pressure.
     assert np.abs(rows["shear_force"]) == pytest.approx(0.1 * rows["normal_force"], rel=1e-3)
     assert (np.abs(rows["shear_force"]) <= 0.1 * rows["normal_force"] * (1 + 1e-12)).all()
-    # The ligament presses besides, a thousandth of the length next to a tip: with it the parts are in equilibrium across the crack.
+    # The ligament presses besides, a thousandth of the length next to a tip: with it the parts are in equilibrium
+    # across the crack.
     along, across, _ = on_upper(now)
     assert across == pytest.approx(ACROSS[1] * 1e6, rel=2e-4)
     ligament = across - total[0]
@@ -190,8 +192,8 @@ def test_faces_that_slide_go_on_sliding():
 
 
 def test_a_slot_closes_by_its_width_before_it_bears():
-    """Open faces leave a gap that the geometry has not: aperture less closure. The parts come nearer by as much, and not more than
-    the springs give."""
+    """Open faces leave a gap that the geometry has not: aperture less closure. The parts come nearer by as much, and
+    not more than the springs give."""
     width = 1e-3
     line = [[-0.5, -0.5 * SLOPE], [0.0, 0.0], [0.4, 0.4 * SLOPE]]
     now = stepped(plate((0.0, -0.01e6), 0.6, line=line, aperture=width))
@@ -212,8 +214,8 @@ def test_a_slot_closes_by_its_width_before_it_bears():
 
 
 def test_faces_that_a_thread_held_apart_meet_before_they_lie_in_each_other(monkeypatch):
-    """What a crack has opened by is told, but no more than a part of the blocks' size below what is refused in a drawing: the parts
-    stand face on face, and close by as much. The width of a slot is told, besides."""
+    """What a crack has opened by is told, but no more than a part of the blocks' size below what is refused in a
+    drawing: the parts stand face on face, and close by as much. The width of a slot is told, besides."""
 
     def widest(width):
         now = stepped(plate((0.0, 1e6), 0.6, aperture=width))
@@ -251,8 +253,8 @@ def test_platens_press_on_parts_as_on_the_whole():
 
 
 def test_neighbours_press_on_where_they_did():
-    """Two neighbours whose corners meet on a divided edge, one of them by 1e-5 beyond the other: forces go to the contacts of the one
-    that they are under, whatever their order; nothing is lost, nor a moment."""
+    """Two neighbours whose corners meet on a divided edge, one of them by 1e-5 beyond the other: forces go to the
+    contacts of the one that they are under, whatever their order; nothing is lost, nor a moment."""
     at, neighbour = np.array([0.0, 0.5, 0.5 - 1e-5, 1.0]), np.array([7, 7, 8, 8])
     place = np.array([0.1, 0.4, 0.499, 0.501, 0.9])
     share = split_forces._shares(at, neighbour, place)
@@ -262,8 +264,8 @@ def test_neighbours_press_on_where_they_did():
 
 
 def test_springs_are_charged_by_the_cut():
-    """The energy that the springs of new contacts begin with (½ N²/kₙ, here 0.5 % of the whole) is told as that of the cut; nothing
-    is left over."""
+    """The energy that the springs of new contacts begin with (½ N²/kₙ, here 0.5 % of the whole) is told as that of the
+    cut; nothing is left over."""
     now = stepped(plate((0.0, -1e6), 0.6))
     cut(now)
     budget = now.budget.after(after_a_step(now).energy)
@@ -299,7 +301,8 @@ def moving(now):
 
 
 def test_elements_graded_to_a_corner_are_no_part_of_the_segment_that_leaves_it():
-    """A ligament that breaks from a kink graded to 1e-7 of its length is whole rock before, and the crack's last segment a crack."""
+    """A ligament that breaks from a kink graded to 1e-7 of its length is whole rock before, and the crack's last
+    segment a crack."""
     ends = np.array([[[-1.0, 0.5], [-3e-7, 1e-7]], [[-3e-7, 1e-7], [0.0, 0.0]]])
     nodes = ends[:, :1] + np.array([0.02, 0.5, 0.98])[:, None] * (ends[:, 1:] - ends[:, :1])
     length = np.repeat(np.hypot(*(ends[:, 1] - ends[:, 0]).T) / 3, 3)

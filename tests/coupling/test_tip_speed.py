@@ -61,8 +61,8 @@ def pulled(dt: float, dynamic: float = 1.0, **growth) -> Problem:
 
 @pytest.mark.parametrize("dt", [1e-4, 2e-5, 6e-6])
 def test_a_driven_tip_runs_at_the_limit_and_no_faster(dt):
-    """Driven hard all the time, the tip is where the limit lets it be, to one shortest increment (the last step may go less far); also when a
-    step leaves it less than that, and with steps that leave it several increments."""
+    """Driven hard all the time, the tip is where the limit lets it be, to one shortest increment (the last step may go
+    less far); also when a step leaves it less than that, and with steps that leave it several increments."""
     begun, length, last = None, 0.2, 0.0
     for cycle in cycles(pulled(dt)):
         if not cycle.number:
@@ -99,8 +99,8 @@ def test_statics_know_no_speed():
 
 
 def test_passes_of_a_dynamic_step_end_together_where_growth_calls_for_shorter_ones():
-    """A step of several increments whose later passes find no answer but in parts: time goes on, the speed limit holds, and energy is
-    accounted for as it is by whole passes."""
+    """A step of several increments whose later passes find no answer but in parts: time goes on, the speed limit holds,
+    and energy is accounted for as it is by whole passes."""
     dt, taken = 1e-4, []
 
     def run(most: float):

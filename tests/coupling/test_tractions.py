@@ -80,7 +80,8 @@ def test_end_forces_become_the_linear_pressure_of_their_resultant():
 
 
 def moments_of(load):
-    """Moments of the tractions up to the second, by their exact integrals: two loads apart in them differ in the block."""
+    """Moments of the tractions up to the second, by their exact integrals: two loads apart in them differ in the
+    block."""
     out = np.zeros((2, 6))
     for (a, b), (t_a, t_b) in zip(load.segments, load.tractions):
         for s, weight in zip((0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)):
@@ -93,8 +94,9 @@ def moments_of(load):
 @pytest.mark.parametrize("places", [(0.0, 1.0), (0.0, 0.4, 1.0), (0.3, 0.6, 1.0)])
 @pytest.mark.parametrize("block", [0, 1])
 def test_tractions_do_not_jump_as_a_contact_comes_or_goes(places, block):
-    """The contact at the right end with a force of 1e-9 of the others, and open by 1e-9 of how much they give: what is on
-    the block differs by no more than some 1e-9. With a gap a thousand times what they give it is as if the contact were not."""
+    """The contact at the right end with a force of 1e-9 of the others, and open by 1e-9 of how much they give: what is
+    on the block differs by no more than some 1e-9. With a gap a thousand times what they give it is as if the contact
+    were not."""
     lower = np.array([[0.0, 0.0], [1.0, 0.0], *([x, 1.0] for x in places[::-1]), *([[0.0, 1.0]] if places[0] else [])])
     blocks = Blocks.from_polygons([lower, SQUARE + [0.0, 1.0]])
     bottom = edge_between(blocks, 1, [0.0, 1.0], [1.0, 1.0])
@@ -185,8 +187,8 @@ def test_inertia_balances_what_contacts_leave():
 
 
 def test_inertia_and_viscosity_of_a_strain_are_an_even_stress():
-    """∫σ dV = Σ x ⊗ f + ∫ x ⊗ b: of the load's body force only that of rigid motion, and with the even stress what the whole field of
-    inertia, less the stress that viscosity bears, would make of it. For a block that has turned, too."""
+    """∫σ dV = Σ x ⊗ f + ∫ x ⊗ b: of the load's body force only that of rigid motion, and with the even stress what the
+    whole field of inertia, less the stress that viscosity bears, would make of it. For a block that has turned, too."""
     blocks = two_squares(0.3)
     lower_top = edge_between(blocks, 0, [1.0, 1.0], [0.0, 1.0])
     row = contact(vertex_at(blocks, 1, [0.3, 1.0]), lower_top, 1, 0, [0.3, 1.0], [0, 1], 2.0, 0.7)
@@ -236,8 +238,8 @@ def test_turned_block_sees_its_forces_in_its_own_frame():
 
 @pytest.mark.parametrize("share", [1e-3, 0.02, 0.2])
 def test_a_force_at_the_end_of_a_face_that_is_off_the_grid_keeps_its_moment(share):
-    """Pressures end on a grid; where the resultant is near an end, of which the contact lies off it by up to 1.2e-4 of the side,
-    part of it is a lone force there."""
+    """Pressures end on a grid; where the resultant is near an end, of which the contact lies off it by up to 1.2e-4 of
+    the side, part of it is a lone force there."""
     blocks = Blocks.from_polygons([SQUARE, SQUARE + [0.3333, 1.0]])
     top, bottom = edge_between(blocks, 0, [1, 1], [0, 1]), edge_between(blocks, 1, [0.3333, 1], [1.3333, 1])
     ends = np.array([[0.3333, 1.0], [1.0, 1.0]])
@@ -254,8 +256,9 @@ def test_a_force_at_the_end_of_a_face_that_is_off_the_grid_keeps_its_moment(shar
 
 @pytest.mark.parametrize("beyond", [1e-9, 0.5, 3.0])
 def test_contacts_beyond_the_end_of_a_short_side_keep_force_and_moment(beyond):
-    """Two corners press on a side of 1 cm from beyond its end, by so many lengths of it: they have the moment of where they act, and
-    next to nothing of it is on the short side; what is added has no mean stress but the force's at the end."""
+    """Two corners press on a side of 1 cm from beyond its end, by so many lengths of it: they have the moment of where
+    they act, and next to nothing of it is on the short side; what is added has no mean stress but the force's at the
+    end."""
     cut = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 0.99], [0.99, 1.0], [0.0, 1.0]])
     above = np.array([[0.995, 1.0], [2.0, 0.5], [2.0, 2.0]])
     hole = np.array([[0.4, 0.4], [0.4, 0.6], [0.6, 0.6], [0.6, 0.4]])
@@ -278,8 +281,9 @@ def test_contacts_beyond_the_end_of_a_short_side_keep_force_and_moment(beyond):
 
 
 def test_bonds_that_pull_have_linear_pressure_and_no_jump():
-    """The resultant of two bonded contacts leaves the face: tractions change as little as it does. A face without tensile
-    strength is a triangle, and at last a lone force, before; a bond goes on as the linear pressure it has beyond."""
+    """The resultant of two bonded contacts leaves the face: tractions change as little as it does. A face without
+    tensile strength is a triangle, and at last a lone force, before; a bond goes on as the linear pressure it has
+    beyond."""
     lower = SQUARE
     blocks = Blocks.from_polygons([lower, SQUARE + [0.0, 1.0]])
     bottom = edge_between(blocks, 1, [0.0, 1.0], [1.0, 1.0])
@@ -304,8 +308,9 @@ def test_bonds_that_pull_have_linear_pressure_and_no_jump():
 
 @pytest.mark.parametrize("holds", [False, True])
 def test_shears_off_the_side_and_against_each_other_leave_a_strained_block_in_balance(holds):
-    """A square that is sheared, pulled and turned bears forces at contacts that are pressed in or gape, its shears against each other: in
-    equilibrium where they act, and so nothing is out of balance (1e-3 with the forces on the side: the gaps; 2e-4 without what the shears stretch: the strain)."""
+    """A square that is sheared, pulled and turned bears forces at contacts that are pressed in or gape, its shears
+    against each other: in equilibrium where they act, and so nothing is out of balance (1e-3 with the forces on the
+    side: the gaps; 2e-4 without what the shears stretch: the strain)."""
     blocks, gap = two_squares(), 1e-3
     gradient = np.array([[1.0003, 2e-4], [1e-4, 0.9995]])
     vertices = blocks.vertices.copy()

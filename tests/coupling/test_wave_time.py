@@ -54,9 +54,9 @@ def test_a_falling_block_has_no_stress_at_its_cracks():
 
 
 def test_impact_opens_no_crack_that_it_presses_shut():
-    """In its first microseconds the base pushes on a block without strain yet, whose middle bears what the whole block does on
-    average: no stress at first, and then the pressure that waves bring. (Were the inertia of the strain to come spread over the
-    block, it would open the crack by 1.1e5 Pa √m.)"""
+    """In its first microseconds the base pushes on a block without strain yet, whose middle bears what the whole block
+    does on average: no stress at first, and then the pressure that waves bring. (Were the inertia of the strain to come
+    spread over the block, it would open the crack by 1.1e5 Pa √m.)"""
     height = 2e-5
     seen = [c for c in cycles(dropped(height, 1e-5, np.sqrt(2 * height / 9.81) + 6e-4)) if c.number]
     assert min(c.state.stress[0, 1] for c in seen) < -5e4  # else nothing has knocked
@@ -80,8 +80,8 @@ def one_tip(k_eq: float) -> np.ndarray:
 
 @pytest.mark.parametrize("parts", [1, 7, 50])
 def test_mean_over_the_time_of_a_wave(parts):
-    """Of a tip 0.5 m from its surface: a push of a third of that time counts as a third, whatever the steps; a steady one in
-    full after that time; one that has gone, not at all."""
+    """Of a tip 0.5 m from its surface: a push of a third of that time counts as a third, whatever the steps; a steady
+    one in full after that time; one that has gone, not at all."""
     given = dropped(0.0, 1e-5, 1.0)
     time = 0.5 / ROCK.pressure_wave_speed
     waves, dt = WaveTime(given), time / 3 / parts
@@ -109,9 +109,9 @@ def test_waves_come_from_where_the_block_is_loaded():
 
 
 def test_slow_shaking_is_its_quasi_static_limit():
-    """A block that stands on a rough base, an open slot in its middle, under gravity that swings by 0.3 g at 5 Hz (its own
-    vibration: 900 Hz, so that inertia adds 1e-4): at the first peak K is that of statics under the same pull, to 1 %, which is what the block
-    still rings by."""
+    """A block that stands on a rough base, an open slot in its middle, under gravity that swings by 0.3 g at 5 Hz (its
+    own vibration: 900 Hz, so that inertia adds 1e-4): at the first peak K is that of statics under the same pull, to 1
+    %, which is what the block still rings by."""
 
     def under(dynamic: float, sideways: History, dt: float, end: float):
         given = dropped(0.0, dt, end, k_ic=np.inf)

@@ -65,8 +65,8 @@ def test_a_passive_anchor_takes_what_friction_leaves():
 
 @pytest.mark.parametrize("safety", [0.98, 1.02])
 def test_pretension_across_the_joint_holds_to_its_factor_of_safety(safety):
-    # A tendon at 50° to the slope's normal, T: FoS = tan φ (W cos α + T cos δ) / (W sin α − T sin δ) (Hoek & Bray 1981, ch. 7).
-    # Soft, so that its force stays the pretension's however the block moves.
+    # A tendon at 50° to the slope's normal, T: FoS = tan φ (W cos α + T cos δ) / (W sin α − T sin δ) (Hoek & Bray 1981,
+    # ch. 7). Soft, so that its force stays the pretension's however the block moves.
     angle, delta, tension = np.radians(40), np.radians(50), 9000.0
     need = (WEIGHT * np.sin(angle) - tension * np.sin(delta)) / (WEIGHT * np.cos(angle) + tension * np.cos(delta))
     friction = np.arctan(safety * need)

@@ -26,8 +26,8 @@ GLUE = JointLaw("glue", FRICTION, COHESION, TENSION)
 
 
 def two_blocks(law: JointLaw = GLUE, splits: int = 1, turn: float = 0.0, back: bool = False) -> dda.BlockSystem:
-    """A block of 2 m × 1 m on a fixed one, the face between them cut into ``splits`` by flat vertices; turned by ``turn`` (rad)
-    and, ``back``, numbered the other way."""
+    """A block of 2 m × 1 m on a fixed one, the face between them cut into ``splits`` by flat vertices; turned by
+    ``turn`` (rad) and, ``back``, numbered the other way."""
     x = np.linspace(0.0, FACE, splits + 1)
     lower = np.concatenate([[[-1.0, -1.0], [3.0, -1.0], [3.0, 0.0]], [[s, 0.0] for s in x[::-1]], [[-1.0, 0.0]]])
     upper = np.concatenate([[[s, 0.0] for s in x], [[FACE, 1.0], [0.0, 1.0]]])
@@ -41,15 +41,16 @@ def two_blocks(law: JointLaw = GLUE, splits: int = 1, turn: float = 0.0, back: b
 
 
 def pushed(system: dda.BlockSystem, thrust: float, eccentricity: float, shear: float = 0.0, state: State | None = None):
-    """The step under a force on the upper block, ``thrust`` N onto the face, ``shear`` N along it, through the point of the face
-    at ``eccentricity`` m from its middle."""
+    """The step under a force on the upper block, ``thrust`` N onto the face, ``shear`` N along it, through the point of
+    the face at ``eccentricity`` m from its middle."""
     lower = int(np.flatnonzero(system.blocks.fixed)[0])
     edge = system.blocks.vertices[system.blocks.vertex_start[lower] :][:2]
     along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
     at = (0.5 * FACE + eccentricity) * along
     force = shear * along - thrust * np.array([-along[1], along[0]])
     loads = Loads(point_loads=(PointLoad(1 - lower, tuple(at), History.constant(force)),))
-    # A step in which the block flies off is cut to where inertia, 2 m/dt², bears 1e-5 of what stiff rock and its springs do.
+    # A step in which the block flies off is cut to where inertia, 2 m/dt², bears 1e-5 of what stiff rock and its
+    # springs do.
     return system.step(State.at_rest(system.blocks) if state is None else state, loads, 3e-2)
 
 

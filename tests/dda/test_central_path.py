@@ -15,7 +15,8 @@ STIFFNESS, FRICTION = 4e11, 0.7
 
 
 def centred(gap: np.ndarray, sheared: np.ndarray, epsilon: float) -> CentralPath:
-    """A path centred on contacts (n,) of this gap and stretch of the shear spring (m), where all products are ``epsilon`` J."""
+    """A path centred on contacts (n,) of this gap and stretch of the shear spring (m), where all products are
+    ``epsilon`` J."""
     path, n = object.__new__(CentralPath), len(gap)
     path._g, path._s, path._kn, path._ks = gap, sheared, np.full(n, STIFFNESS), np.full(n, STIFFNESS)
     path._mu, path._base, path._rough = np.full(n, FRICTION), np.zeros(n), np.ones(n, bool)
@@ -26,7 +27,8 @@ def centred(gap: np.ndarray, sheared: np.ndarray, epsilon: float) -> CentralPath
 
 @pytest.mark.parametrize("epsilon", [1e-2, 1e-12, 1e-22])
 def test_the_start_is_central_however_far_off_a_contact_is(epsilon):
-    # Far apart or deep inside, w and N/kₙ differ by all digits there are; sheared far, S is its strength to the last one.
+    # Far apart or deep inside, w and N/kₙ differ by all digits there are; sheared far, S is its strength to the last
+    # one.
     far = np.array([-1e-1, -1e-6, -1e-13, 0.0, 1e-13, 1e-6, 1e-1])
     gap, sheared = (grid.ravel() for grid in np.meshgrid(far, far))
     path = centred(gap, sheared, epsilon)
@@ -38,8 +40,9 @@ def test_the_start_is_central_however_far_off_a_contact_is(epsilon):
 
 @pytest.mark.parametrize("gravity", [(0.0, -9.81), (9.81, -2.0)])
 def test_pebbles_below_a_large_block_bear_it(monkeypatch, gravity):
-    """A weight a million times their own comes onto three layers of pebbles at once, beside a wall: the path carries it through
-    them. (Where contacts had units of their own blocks' load it stopped after five steps, with nothing balanced.)"""
+    """A weight a million times their own comes onto three layers of pebbles at once, beside a wall: the path carries it
+    through them. (Where contacts had units of their own blocks' load it stopped after five steps, with nothing
+    balanced.)"""
     size, layers = 0.01, 3
     square = size * np.array([[0.0, 0.0], [1, 0], [1, 1], [0, 1]])
     pebbles = [square + (x, size * k) for k in range(layers) for x in np.linspace(0.0, 10 - size, 12)]

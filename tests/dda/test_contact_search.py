@@ -94,9 +94,9 @@ def test_a_face_split_by_a_flat_node_keeps_its_length():
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("beside", [0.0, *(way * 10.0**k for k in (-7, -6, -5, -4, -3, -2) for way in (1, -1))])
 def test_a_face_keeps_its_length_while_a_corner_passes_a_flat_node(beside, mirrored):
-    """The length is what a joint's stiffness is multiplied by: a corner that has slid a tenth of a millimetre past a node of
-    the face below stands on no soft spring there. Counted double or not at all is at most where the two are told
-    apart, 1e-4 of an edge of 3 m, on both of its sides."""
+    """The length is what a joint's stiffness is multiplied by: a corner that has slid a tenth of a millimetre past a
+    node of the face below stands on no soft spring there. Counted double or not at all is at most where the two are
+    told apart, 1e-4 of an edge of 3 m, on both of its sides."""
     lower = np.array([[-3, -1], [3, -1], [3, 0], [0, 0], [-3, 0.0]])
     upper = rectangle(beside, 0.0, beside + 2.0, 1.0)
     if mirrored:
@@ -141,7 +141,8 @@ def test_a_short_common_face_is_held_at_both_ends(tilt):
 
 @pytest.mark.parametrize("window", [0.004, 0.05, 0.3])
 def test_faces_that_a_crack_has_left_touch_and_do_not_overlap(window):
-    """A bump of facets shorter than the window in its own imprint: lines of far facets are crossed, their blocks are not."""
+    """A bump of facets shorter than the window in its own imprint: lines of far facets are crossed, their blocks are
+    not."""
     x = np.array([-0.05, -0.03, -0.01, 0.0, 0.01, 0.03, 0.05])
     bump = np.column_stack([x, 1.0 + 0.0026 * (1 - (x / 0.05) ** 2)])
     below = np.vstack([[[-2, 0], [2, 0], [2, 1]], bump[::-1], [[-2, 1]]])

@@ -36,7 +36,8 @@ def regular(corners: int, radius: float, x: float, lowest: float) -> np.ndarray:
     ids=["Shi", "trapezoidal", "alpha", "multipliers"],
 )
 def test_a_block_turns_on_its_corner_as_a_pendulum(settings):
-    """I θ'' = m g r sin θ about the corner, which stays where it is on the floor; a step leaves it where the vertex then is."""
+    """I θ'' = m g r sin θ about the corner, which stays where it is on the floor; a step leaves it where the vertex
+    then is."""
     radius, speed, end = 0.5, 3.0, 0.1
     missed = []
     for dt in (5e-3, 2.5e-3):
@@ -72,8 +73,9 @@ def test_a_block_turns_on_its_corner_as_a_pendulum(settings):
 @pytest.mark.parametrize("corners", [3, 4, 7])
 @pytest.mark.parametrize("short", [2e-2, 1e-3, 2e-4, 1e-4, 1e-6])
 def test_a_corner_that_comes_to_the_end_of_a_face_is_not_pushed_on(short, corners):
-    """Without friction the floor pushes upwards: nothing changes the speed along it before its end is passed, nor is there an
-    overlap to be pushed out of, though the floor's end is behind one of the block's edges by what a step goes."""
+    """Without friction the floor pushes upwards: nothing changes the speed along it before its end is passed, nor is
+    there an overlap to be pushed out of, though the floor's end is behind one of the block's edges by what a step
+    goes."""
     speed, dt, steps = 5.0, 5e-3, 6
     system = above(regular(corners, 0.5, -steps * speed * dt - short, 0.0), 0.0)
     state = State.at_rest(system.blocks)

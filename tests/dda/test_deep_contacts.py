@@ -8,8 +8,8 @@ from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, 
 
 
 def test_contacts_deeper_than_the_window_of_the_search_are_kept():
-    """A block is pressed on a fixed one, slowly, in steps that may move it by 1e-4 of half the height: springs of 1 GPa give by
-    40 times that, force over stiffness and nothing else."""
+    """A block is pressed on a fixed one, slowly, in steps that may move it by 1e-4 of half the height: springs of 1 GPa
+    give by 40 times that, force over stiffness and nothing else."""
     rock, rate = Material("rock", 50e9, 0.2, 2500.0), 1e5
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     blocks = Blocks.from_polygons(

@@ -145,7 +145,8 @@ def test_broken_bonds_release_what_they_held():
 
 
 def test_the_geometry_update_is_all_that_is_left_of_the_budget_of_a_wall_that_falls():
-    # Pushed over by a tilted gravity: joints slide, open and close for a hundred steps, and every step's balance is closed.
+    # Pushed over by a tilted gravity: joints slide, open and close for a hundred steps, and every step's balance is
+    # closed.
     blocks = wall(6, 3)
     settings = DdaSettings(dynamic_factor=1.0, max_displacement_ratio=0.02)
     system = dda.BlockSystem(blocks, [ROCK], [JointLaw("joint", friction_angle=0.6)], settings=settings)
@@ -204,7 +205,8 @@ def test_soft_joints_give_no_energy_to_corners_that_leave_their_faces(stiffness)
     state, budget = marched(system, State.at_rest(blocks), WEIGHT, 4e-3, 0.5)
     travel = np.abs(state.vertices - blocks.vertices).max()
     assert travel > 0.1 and budget.friction > 0.1 * budget.gravity_work
-    # 5e-5 and 4e-6 of what falls; corners as stiff as the solver's own springs, beside soft faces, made 0.4 of it from nowhere.
+    # 5e-5 and 4e-6 of what falls; corners as stiff as the solver's own springs, beside soft faces, made 0.4 of it from
+    # nowhere.
     assert abs(budget.residual) + budget.overlap < 1e-3 * budget.gravity_work
 
 
@@ -222,8 +224,8 @@ def test_a_corner_on_a_soft_joint_is_a_spring():
     steps = 400
     state, budget = marched(system, State.at_rest(blocks), WEIGHT, np.pi / omega / steps, np.pi / omega)
     corner = state.vertices[4:, 1].min()
-    # The trapezoidal rule's period is (ω dt)²/12 too long, 5e-6 here, which at the lowest point is felt squared; the first step
-    # (from where the corner touches, without a spring yet) is a step of free fall: of order dt.
+    # The trapezoidal rule's period is (ω dt)²/12 too long, 5e-6 here, which at the lowest point is felt squared; the
+    # first step (from where the corner touches, without a spring yet) is a step of free fall: of order dt.
     assert corner == pytest.approx(-2 * settlement, rel=1e-3)
     assert budget.last.contact == pytest.approx(0.5 * spring * (2 * settlement) ** 2, rel=2e-3)
     assert abs(budget.residual) < 1e-6 * budget.gravity_work

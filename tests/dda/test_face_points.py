@@ -16,8 +16,8 @@ BED = JointLaw("bed", 0.5, normal_stiffness=STIFFNESS, shear_stiffness=STIFFNESS
 
 
 def rotation_on_a_bed(eccentricity: float, stiffness: float = STIFFNESS) -> float:
-    """Turn of a rigid block on an elastic bed under a thrust (rad): M/(k ℓ³/12) within the kern, beyond it the pressure is a
-    triangle over c = 3 (ℓ/2 − e), so that k θ c²/2 = N."""
+    """Turn of a rigid block on an elastic bed under a thrust (rad): M/(k ℓ³/12) within the kern, beyond it the pressure
+    is a triangle over c = 3 (ℓ/2 − e), so that k θ c²/2 = N."""
     e = abs(eccentricity)
     if e <= FACE / 6:
         turn = THRUST * e / (stiffness * FACE**3 / 12)
@@ -27,8 +27,8 @@ def rotation_on_a_bed(eccentricity: float, stiffness: float = STIFFNESS) -> floa
 
 
 def on_a_bed(law: JointLaw = BED, turn: float = 0.0, back: bool = False, beside: float = 0.0, **settings):
-    """A block of 2 m × 1 m on a fixed one that ends ``beside`` (m) beyond its ends; turned by ``turn`` (rad) and, ``back``,
-    numbered the other way."""
+    """A block of 2 m × 1 m on a fixed one that ends ``beside`` (m) beyond its ends; turned by ``turn`` (rad) and,
+    ``back``, numbered the other way."""
     lower = np.array([[-beside, -1], [FACE + beside, -1], [FACE + beside, 0], [-beside, 0]])
     upper = np.array([[0.0, 0], [FACE, 0], [FACE, 1], [0, 1]])
     c, s = np.cos(turn), np.sin(turn)
@@ -75,8 +75,8 @@ def test_rotation_on_an_elastic_bed_with_and_without_lift_off(turn, back, beside
 
 @pytest.mark.parametrize("gain", [-0.7, -1.0, -2.0])
 def test_parts_that_go_back_and_forth_with_their_neighbours_come_to_rest(gain):
-    """The face ends where gain times what it was taken for says: with a gain of −1 it would go to and fro for ever, with −2 it
-    would be thrown about. To the hundredth that parts are known to, after half a dozen iterations."""
+    """The face ends where gain times what it was taken for says: with a gain of −1 it would go to and fro for ever,
+    with −2 it would be thrown about. To the hundredth that parts are known to, after half a dozen iterations."""
     rest, n = 0.5, 0
     faces = FacePoints(
         np.array([[0, 1]]), np.zeros((2, 7)), np.ones(1), np.array([[0.0, 0.6]]), np.zeros(1, bool), np.full(1, 0.05),
@@ -92,8 +92,9 @@ def test_parts_that_go_back_and_forth_with_their_neighbours_come_to_rest(gain):
 
 @pytest.mark.parametrize("eccentricity", [-0.7, 0.1, 0.7])
 def test_faces_that_do_not_fit_each_other_press_where_they_meet(eccentricity):
-    """A block that stands askew on its bed, by as much as told contacts say that the two faces do not fit: it presses and turns as one
-    on a level bed does. (Had its springs the misfit of their corners where they stand, it would hang on one, open and in the rock.)"""
+    """A block that stands askew on its bed, by as much as told contacts say that the two faces do not fit: it presses
+    and turns as one on a level bed does. (Had its springs the misfit of their corners where they stand, it would hang
+    on one, open and in the rock.)"""
     lower, upper = np.array([[-1.0, -1], [3, -1], [3, 0], [-1, 0]]), np.array([[0.0, 0], [FACE, 0], [FACE, 1], [0, 1]])
     askew = 2e-3
     upper = upper + np.array([[0.0, askew]]) * upper[:, :1]
@@ -197,8 +198,8 @@ def test_a_face_that_goes_back_and_forth_stands_on_its_corners(monkeypatch):
 
 @pytest.mark.parametrize("eccentricity", [0.2, -0.4])
 def test_rows_tell_of_forces_that_hold_the_block(eccentricity):
-    """Springs inside a face that gives and turns: forces at its corners, off the block by what it gives there, are in equilibrium with the
-    thrust where they are said to act."""
+    """Springs inside a face that gives and turns: forces at its corners, off the block by what it gives there, are in
+    equilibrium with the thrust where they are said to act."""
     system, at = on_a_bed(beside=0.5), np.array([FACE / 2 + eccentricity, 1.0])
     push = PointLoad(1, tuple(at), History.constant([0.3 * THRUST, -THRUST]))
     state = State.at_rest(system.blocks)

@@ -117,8 +117,8 @@ def test_points_are_moved_exactly_or_by_springs(stiffness):
 
 
 def test_a_point_goes_round_a_circle():
-    # Velocity of a point on a rigidly turning block, one step after another: the other unknowns find their own way, and the
-    # displacement that is given is met to the square of a step's turn, which the next step makes good.
+    # Velocity of a point on a rigidly turning block, one step after another: the other unknowns find their own way, and
+    # the displacement that is given is met to the square of a step's turn, which the next step makes good.
     blocks = Blocks.from_polygons([rectangle(-1, -1, 1, 1)])
     system = dda.BlockSystem(blocks, [ROCK], settings=DdaSettings(dynamic_factor=1.0, max_displacement_ratio=1.0))
     t = np.linspace(0.0, 1.0, 401)
@@ -192,8 +192,8 @@ def shaken(frame, record, friction, dt, end, slope=0.0):
 
 
 def newmark(record, friction, slope, end, g=9.81, dt=2e-5):
-    """Sliding of a rigid block down the ``slope`` on a base with acceleration ``record`` (Newmark 1965), by small steps;
-    positive up the slope. Normal force and friction with the base's acceleration in both directions."""
+    """Sliding of a rigid block down the ``slope`` on a base with acceleration ``record`` (Newmark 1965), by small
+    steps; positive up the slope. Normal force and friction with the base's acceleration in both directions."""
     c, s = np.cos(slope), np.sin(slope)
     x = v = 0.0
     for i in range(round(end / dt)):
@@ -225,7 +225,8 @@ def test_sliding_on_a_shaken_base_is_newmarks_and_the_same_from_ground_and_base(
     record, friction, slope = History.sinusoid([4.0, 0.0], 1.5, end=0.5 / 1.5), 0.3, np.radians(slope_deg)
     expected = newmark(record, friction, slope, 0.8)
     slides = [shaken(frame, record, friction, 2e-3, 0.8, slope)[1] for frame in ("ground", "base")]
-    # Starts and stops of the slide fall inside steps of the block solver (2 ms) and of the reference (20 µs): 2e-4 of 15 mm found.
+    # Starts and stops of the slide fall inside steps of the block solver (2 ms) and of the reference (20 µs): 2e-4 of
+    # 15 mm found.
     assert abs(expected) > 0.01
     assert slides == pytest.approx([expected, expected], rel=5e-4)
 

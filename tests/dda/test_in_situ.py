@@ -39,8 +39,8 @@ def test_blocks_with_geostatic_stress_do_not_move_in_the_first_step(friction, k0
     # The stress is the field's at every block's centroid …
     assert rest.deviation < 1e-6
     assert rest.state.stress[3] == pytest.approx([-k0 * 2600 * 9.81 * 4.5, -2600 * 9.81 * 4.5, 0.0], rel=1e-6, abs=1.0)
-    # … and dynamic steps under full gravity leave the blocks where they are: 2 pm in 5 m found, a hundred-thousandth of what
-    # they would settle by if gravity were put on them at once.
+    # … and dynamic steps under full gravity leave the blocks where they are: 2 pm in 5 m found, a hundred-thousandth of
+    # what they would settle by if gravity were put on them at once.
     dropped = system_of(blocks, friction, dynamic_factor=1.0).step(State.at_rest(blocks), loads, 0.01)
     settling = np.abs(dropped.state.vertices - blocks.vertices).max()
     state = rest.state
@@ -61,8 +61,8 @@ def test_a_given_tensor_with_gradients():
 
 
 def test_taking_the_upper_courses_out_unloads_what_is_below():
-    # Joints in line and smooth, so that each column stands for itself. Vertically the weight goes; sideways, confined, the
-    # stress follows by ν/(1−ν) of that (Poisson), so that K0 rises: what is left remembers its depth.
+    # Joints in line and smooth, so that each column stands for itself. Vertically the weight goes; sideways, confined,
+    # the stress follows by ν/(1−ν) of that (Poisson), so that K0 rises: what is left remembers its depth.
     blocks, nu, k0 = ground(bond=False), ROCK.poissons_ratio, 0.8
     loads = Loads(gravity=GRAVITY, excavations=(Excavation(0.5, polygon=rectangle(0, 2, 6, 6)),))
     stiff = {"normal_penalty": 1e14, "shear_penalty": 1e14}
@@ -89,8 +89,9 @@ def test_what_cannot_rest_is_said():
 
 @pytest.mark.parametrize("contact", ["penalty", "augmented"])
 def test_blocks_that_nothing_presses_on_come_apart_and_are_at_rest(contact):
-    """A stress without the weight that would bear it, and nothing at the sides: blocks part, and the forces left are what contacts
-    make of rounding, 1e-10 of those that the stress would be (1 MPa on 1 m); no share of them is a force out of balance."""
+    """A stress without the weight that would bear it, and nothing at the sides: blocks part, and the forces left are
+    what contacts make of rounding, 1e-10 of those that the stress would be (1 MPa on 1 m); no share of them is a force
+    out of balance."""
     polygons = [rectangle(-1, -1, 4, 0)] + [rectangle(x, y, x + 1, y + 1) for x in range(3) for y in range(2)]
     blocks = Blocks.from_polygons(polygons, fixed=[True] + [False] * 6)
     field = InSituStress(np.array([-1e6, -0.5e6, 0.1e6]))

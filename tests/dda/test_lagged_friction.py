@@ -14,7 +14,8 @@ GLUE = JointLaw("glue", friction_angle=np.radians(35), cohesion=1e6, tensile_str
 
 @pytest.mark.parametrize("gravity", [[0.0, -9.81], [8.0, -9.81]])
 def test_rounds_come_to_an_end_where_a_block_hangs_on_its_bonds(monkeypatch, gravity):
-    """A block glued below a roof: its bonds pull, and what pulls has no friction, nor is it a change from round to round."""
+    """A block glued below a roof: its bonds pull, and what pulls has no friction, nor is it a change from round to
+    round."""
     asked = []
 
     def settle(*arguments):

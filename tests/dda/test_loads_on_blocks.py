@@ -122,7 +122,8 @@ def test_a_floating_block_displaces_its_own_weight():
 
 
 def test_an_inclined_line_presses_as_a_piezometric_one():
-    # A bent line over a long edge: pressure by its own depth below the line at each x, exactly (pieces split at the bend).
+    # A bent line over a long edge: pressure by its own depth below the line at each x, exactly (pieces split at the
+    # bend).
     blocks = Blocks.from_polygons([rectangle(0, 0, 10, 1)])
     line = np.array([[2.0, 1.0 + 2.0], [6.0, 1.0 + 5.0], [9.0, 1.0 - 1.0]])
     rows = LoadMap(blocks).rows(Loads(water=WaterTable(line)), 0.0, blocks.vertices, np.zeros(1))[1]
@@ -147,8 +148,8 @@ def test_the_level_may_rise_and_edges_may_be_dry():
 
 
 def test_uplift_takes_its_share_of_the_force_on_a_base():
-    # A dam block on its base: water stands 8 m deep on its left, nothing on its right; the line falls through the base. The
-    # contact forces are effective: weight less uplift, and the friction that they can carry with it.
+    # A dam block on its base: water stands 8 m deep on its left, nothing on its right; the line falls through the base.
+    # The contact forces are effective: weight less uplift, and the friction that they can carry with it.
     names = [[[""] * 4], [["base", "", "", "face"]]]
     blocks = Blocks.from_polygons(
         [rectangle(-5, -1, 15, 0), rectangle(0, 0, 6, 10)], fixed=[True, False], edge_names=names
@@ -169,8 +170,8 @@ def test_uplift_takes_its_share_of_the_force_on_a_base():
 
 @pytest.mark.parametrize("drained", [True, False])
 def test_an_excavation_drains_the_faces_it_lays_open(drained):
-    # Block 1 leans on a lower and an upper block, all under 5 m of water: once the lower one is out, the water presses on what
-    # the upper one still covers, and on the other sides.
+    # Block 1 leans on a lower and an upper block, all under 5 m of water: once the lower one is out, the water presses
+    # on what the upper one still covers, and on the other sides.
     blocks = Blocks.from_polygons(
         [rectangle(-5, -1, 5, 0), rectangle(0, 0, 1, 3), rectangle(1, 0, 2, 1.2), rectangle(1, 1.2, 2, 3)],
         fixed=[True, False, False, False],
@@ -191,8 +192,8 @@ def test_an_excavation_drains_the_faces_it_lays_open(drained):
 
 
 def test_plane_failure_with_water_in_its_tension_crack():
-    # Hoek & Bray (1981), ch. 7: a wedge on a plane at ψ, cut off by a vertical tension crack with water z_w deep in it, the
-    # pressure falling from there linearly to the toe: U = ½ γw z_w A, V = ½ γw z_w²;
+    # Hoek & Bray (1981), ch. 7: a wedge on a plane at ψ, cut off by a vertical tension crack with water z_w deep in it,
+    # the pressure falling from there linearly to the toe: U = ½ γw z_w A, V = ½ γw z_w²;
     # F = (W cos ψ − U − V sin ψ) tan φ / (W sin ψ + V cos ψ). The piezometric line says the same.
     slope, depth_of_water, unit = np.radians(35), 4.0, 9810.0
     crack_foot = np.array([10.0, 10.0 * np.tan(slope)])
@@ -211,8 +212,8 @@ def test_plane_failure_with_water_in_its_tension_crack():
     assert water["force"].sum(axis=0) == pytest.approx([-v - u * s, u * c], rel=1e-12)
     weight = 2600 * 9.81 * blocks.areas()[2]
     balance = (weight * s + v * c) / (weight * c - u - v * s)
-    # It holds just above the friction that balances. Just below it slides: a quarter of a metre, until so much of it has left
-    # the water, which stays where its line is, that it holds again.
+    # It holds just above the friction that balances. Just below it slides: a quarter of a metre, until so much of it
+    # has left the water, which stays where its line is, that it holds again.
     for factor, most in ((1.01, 1e-3), (0.99, np.inf)):
         joint = JointLaw("joint", friction_angle=float(np.arctan(factor * balance)))
         system = dda.BlockSystem(blocks, [ROCK], [joint], settings=DdaSettings(max_displacement_ratio=0.5))

@@ -95,7 +95,8 @@ def test_single_precision_is_refined_to_the_same_residual(monkeypatch):
     x = solver.solve(1e50 * data.ravel(), right)
     assert not solver._factors.single
     assert np.abs(1e50 * x - expected).max() <= 1e-8 * np.abs(expected).max()
-    # … until few digits will do: then single precision takes its place, not one beside it, unless it does not serve there either.
+    # … until few digits will do: then single precision takes its place, not one beside it, unless it does not serve
+    # there either.
     x = solver.rough_solution(data.ravel())(right, 1e-4)
     assert solver._factors.single and solver._rough is None
     assert np.abs(solver.multiply(data.ravel(), x) - right).max() <= 1e-4 * np.abs(right).max()

@@ -33,7 +33,8 @@ def brick_wall(rows: int, columns: int, friction_deg: float, dt: float, **law) -
 
 @pytest.mark.parametrize("friction_deg", [10.0, 35.0, 55.0])
 def test_a_wall_under_sudden_weight_settles_at_the_step_asked_for(friction_deg):
-    # 10 ms is ten periods of a brick and the time of a wave through the wall: half the contacts change in the first steps.
+    # 10 ms is ten periods of a brick and the time of a wave through the wall: half the contacts change in the first
+    # steps.
     system = brick_wall(20, 9, friction_deg, 0.01)
     state, table = State.at_rest(system.blocks), []
     for _ in range(15):
@@ -71,8 +72,8 @@ def test_the_central_path_ends_where_contacts_agree(monkeypatch):
 
 
 def test_bonds_break_only_where_they_must():
-    # A cantilever of five bricks glued at its root, twice as strong as the first joint needs in statics: nothing may break
-    # on the way to a consistent state, however the iterations wander.
+    # A cantilever of five bricks glued at its root, twice as strong as the first joint needs in statics: nothing may
+    # break on the way to a consistent state, however the iterations wander.
     polygons = [rectangle(-1, -1, 0, 2)] + [rectangle(k, 0, k + 1, 1) for k in range(5)]
     blocks = Blocks.from_polygons(polygons, fixed=[True] + [False] * 5)
     moment = 2600 * 9.81 * 5 * 2.5

@@ -18,7 +18,8 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
 
 
 def column(moduli: list[float], width: float = 1.0, strain: float = 1e-4):
-    """Blocks of 1 m height on a fixed base, pressed: (shortening over that of the blocks alone) − 1, the step's result."""
+    """Blocks of 1 m height on a fixed base, pressed: (shortening over that of the blocks alone) − 1, the step's
+    result."""
     n = len(moduli)
     polygons = [rectangle(-width, -1, 2 * width, 0)] + [rectangle(0, k, width, k + 1) for k in range(n)]
     names = [[[""] * 4] for _ in range(n)] + [[["", "", "top", ""]]]
@@ -46,7 +47,8 @@ def wall(rows: int, bricks: int, width: float = 1.0) -> Blocks:
 
 
 def iterations(blocks: Blocks, contrast: float, dynamic: float, dt: float, steps: int, penalty=None):
-    """Open–close iterations a step under sudden gravity, and steps cut; every other block is ``contrast`` times softer."""
+    """Open–close iterations a step under sudden gravity, and steps cut; every other block is ``contrast`` times
+    softer."""
     import dataclasses
 
     blocks = dataclasses.replace(blocks, material=np.arange(blocks.n_blocks) % 2)
@@ -64,7 +66,8 @@ def iterations(blocks: Blocks, contrast: float, dynamic: float, dt: float, steps
 
 @pytest.mark.parametrize("aspect", [1.0, 10.0, 1000.0])
 def test_springs_give_way_by_a_hundredth_of_slabs_however_flat(aspect):
-    # Two springs a face, 1/(2 · 40): the same for squares and slabs; the base, which is fixed, gives way by nothing else.
+    # Two springs a face, 1/(2 · 40): the same for squares and slabs; the base, which is fixed, gives way by nothing
+    # else.
     error, _ = column([1e10] * 4, width=aspect)
     assert error == pytest.approx(1 / 80, rel=1e-6)
 
@@ -76,8 +79,8 @@ def test_slender_blocks_have_the_springs_of_squares():
 
 @pytest.mark.parametrize("contrast", [1.0, 12.0, 1e3, 1e6])
 def test_springs_between_unlike_blocks(contrast):
-    # Two springs a joint: the base's of 40 E' (it is fixed), and between the blocks of their geometric mean, or of 32 times
-    # the softer. The hard block's strain is as small as the contrast, and its digits are what is left of sixteen.
+    # Two springs a joint: the base's of 40 E' (it is fixed), and between the blocks of their geometric mean, or of 32
+    # times the softer. The hard block's strain is as small as the contrast, and its digits are what is left of sixteen.
     for moduli in ([1e10, 1e10 / contrast], [1e10 / contrast, 1e10]):
         error, result = column(moduli)
         soft = min(moduli)

@@ -1,4 +1,5 @@
-"""Contact laws with rounded corners: that they are the laws, and that they settle what a blocked central path does not."""
+"""Contact laws with rounded corners: that they are the laws, and that they settle what a blocked central path does
+not."""
 
 from __future__ import annotations
 
@@ -83,8 +84,8 @@ def test_they_lead_to_the_states_that_the_central_path_does(monkeypatch, frictio
 
 @pytest.mark.slow
 def test_a_jointed_slope_keeps_its_time_step():
-    # Sudden weight on blocks that slide and topple. The central path is blocked in the second step; by lagged friction alone
-    # that took 770 solutions and two halvings of the step.
+    # Sudden weight on blocks that slide and topple. The central path is blocked in the second step; by lagged friction
+    # alone that took 770 solutions and two halvings of the step.
     blocks = block_scenes.slope(1000)
     settings = dataclasses.replace(block_scenes.settings(0.01), max_step_cuts=0)
     system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)

@@ -16,7 +16,8 @@ from geomech.model import OPEN, Bolt, JointLaw, State
 @pytest.mark.parametrize(
     "n, law, most",
     [
-        # Without correctors 49 iterations; with them, but not centred again, the path ends early and rounded laws take 107.
+        # Without correctors 49 iterations; with them, but not centred again, the path ends early and rounded laws take
+        # 107.
         (1000, {}, 35),
         # Bonds that break round by round: 412 and 495 where the path lets them yield and knows of none that holds.
         (200, {"cohesion": 20e3}, 170),
@@ -33,7 +34,8 @@ def test_weight_put_on_at_once_is_carried_by_way_of_the_central_path(n, law, mos
     print(f"{n} blocks, {law}: {iterations} iterations")
     assert result.statistics["step_cuts"] == 0
     assert iterations <= most
-    # Forces balance to the round-off of springs 1e5 times as stiff as the inertia, and what no bond holds keeps Coulomb's law.
+    # Forces balance to the round-off of springs 1e5 times as stiff as the inertia, and what no bond holds keeps
+    # Coulomb's law.
     assert result.statistics["unbalanced"] < 1e-8
     loose = result.contacts[(result.contacts["state"] != OPEN) & (result.contacts["bonded"] == 0)]
     largest = 1e-8 * loose["normal_force"].max()
@@ -42,7 +44,8 @@ def test_weight_put_on_at_once_is_carried_by_way_of_the_central_path(n, law, mos
 
 
 def test_stiff_bolts_between_blocks_take_no_more_iterations_than_none():
-    # Bars as stiff as the blocks: equations whose balance leaves out what one end does to the other do not settle without cuts.
+    # Bars as stiff as the blocks: equations whose balance leaves out what one end does to the other do not settle
+    # without cuts.
     blocks = block_scenes.slope(200)
     centre = np.array([part.mean(axis=0) for part in np.split(blocks.vertices, blocks.vertex_start[1:-1])])
     free = np.flatnonzero(~np.asarray(blocks.fixed))

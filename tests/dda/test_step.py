@@ -61,7 +61,8 @@ def imbalance(system: dda.BlockSystem, before: State, result: dda.StepResult) ->
 
 @pytest.mark.parametrize("dynamic_factor", [0.0, 1.0])
 def test_forces_on_every_block_balance_its_inertia(dynamic_factor):
-    # Tilted wall with friction, a point load off centre, a traction and gravity: nothing is symmetric, some contacts slide.
+    # Tilted wall with friction, a point load off centre, a traction and gravity: nothing is symmetric, some contacts
+    # slide.
     polygons = [rectangle(-1, -1, 4, 0), rectangle(0, 0, 1, 1), rectangle(1, 0, 2, 1), rectangle(0.4, 1, 1.6, 1.8)]
     blocks = Blocks.from_polygons(
         [turned(p, 0.25) for p in polygons],
@@ -131,7 +132,8 @@ def test_specimen_between_platens_of_its_own_width(platens):
     assert rows["shear_force"] == pytest.approx(np.zeros(4), abs=1e-9 * force)
     assert rows["gap"] == pytest.approx(np.full(4, -force / 2 / 200e9), rel=1e-7)
     # Hooke's law in plane strain for the logarithmic strain, increments of which the steps add up: −σ (1−ν²)/E. The
-    # mean stress over a step differs from that at its end by the step's own strain, 1e-5, over 60 steps of growing load.
+    # mean stress over a step differs from that at its end by the step's own strain, 1e-5, over 60 steps of growing
+    # load.
     strain = state.stress[1, 1] * (1 - 0.21**2) / 17e9
     assert np.log(stretch) == pytest.approx(strain, rel=2e-5)
     # Left and right stay mirror images to the round-off of a 0.14 m drawing.

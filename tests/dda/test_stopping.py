@@ -41,7 +41,8 @@ def stacked(polygons, speeds, frictions=(FRICTION,), **settings) -> tuple[dda.Bl
 @pytest.mark.parametrize("newmark", [(0.5, 1.0), (0.25, 0.5)])
 @pytest.mark.parametrize("part", [0.1, 0.45, 0.55, 0.9])
 def test_a_block_that_stops_within_a_step_stays_stopped(part, newmark):
-    # It stops ``part`` of a step after some whole ones; before, it was left with a speed of up to μ g dt / 2 and kept it.
+    # It stops ``part`` of a step after some whole ones; before, it was left with a speed of up to μ g dt / 2 and kept
+    # it.
     dt, steps = 0.01, 5
     start = FRICTION * GRAVITY * dt * (steps + part)
     system, state = stacked([rectangle(0, 0, 1, 0.5)], [start], newmark=newmark)

@@ -89,8 +89,8 @@ def test_loads_that_come_again_are_answered_as_new_ones():
 
 
 def test_a_load_that_stands_is_brought_to_the_boundary_once():
-    """From no crack on, past bodies that are not solved and back to fewer elements: the boundary's factors are used again only when
-    the load changes. K as of fresh bodies, 1e-12 of the largest."""
+    """From no crack on, past bodies that are not solved and back to fewer elements: the boundary's factors are used
+    again only when the load changes. K as of fresh bodies, 1e-12 of the largest."""
     body, solved = ddm.Body([SQUARE], NONE, ROCK), []
     body.solve(pressed(-1.0))
     for n, load in ((0, -1.0), (1, -1.0), (2, None), (3, -1.0), (2, -1.0), (3, -2.0), (4, -2.0)):
@@ -221,8 +221,8 @@ def test_fields_are_finite_everywhere():
 
 
 def test_outline_neither_moves_nor_turns_on_average():
-    """Mean displacement and rotation of the outline vanish by Gauss points on it. 1e-6 of the largest: the field's limit at
-    the boundary and the boundary's own unknowns agree to the discretisation error."""
+    """Mean displacement and rotation of the outline vanish by Gauss points on it. 1e-6 of the largest: the field's
+    limit at the boundary and the boundary's own unknowns agree to the discretisation error."""
     sol = ddm.Body([SQUARE], grown(2, aperture=math.inf), ROCK).solve(pressed(-1e6, -2e5))
     b = sol.body.boundary
     x, w = np.polynomial.legendre.leggauss(12)
@@ -284,8 +284,8 @@ def test_crack_strain_is_the_mean_strain_that_the_rock_lacks():
 
 
 def test_kink_is_graded_and_forgotten():
-    """A kinked crack's K with default grading is within 0.3 % of that with four layers more; three increments on, the layers
-    (three at this turn) are gone."""
+    """A kinked crack's K with default grading is within 0.3 % of that with four layers more; three increments on, the
+    layers (three at this turn) are gone."""
 
     def body(n, layers):
         return ddm.Body([], grown(n, aperture=math.inf), ROCK, DdmSettings(grading_layers=layers))
@@ -298,7 +298,8 @@ def test_kink_is_graded_and_forgotten():
 
 
 def test_principal_stresses_are_those_of_the_tensor():
-    """σ₁ ≥ σ₂ with their direction: of simple compression σ₂ = −1 along y, elsewhere the eigenvalues of the tensor (round-off)."""
+    """σ₁ ≥ σ₂ with their direction: of simple compression σ₂ = −1 along y, elsewhere the eigenvalues of the tensor
+    (round-off)."""
     points = np.array([[0.5, 0.4], [-0.8, 0.1], [0.05, -0.3]])
     whole, angle = ddm.Body([SQUARE], NONE, ROCK).solve(pressed(-1.0)).principal_stress(points)
     np.testing.assert_allclose(whole, [[0.0, -1.0]] * 3, atol=1e-9)

@@ -112,8 +112,8 @@ HELD = {
 
 @pytest.mark.parametrize("supports", HELD.values(), ids=HELD)
 def test_held_boundaries_are_solved_as_factored_ones(few, supports):
-    """Pinned, on rollers, in slanted directions, free to slide; sides that move, a hole that nothing holds: the residuals of
-    1e-11 leave 1e-10 in K, displacement, reactions and the functionals."""
+    """Pinned, on rollers, in slanted directions, free to slide; sides that move, a hole that nothing holds: the
+    residuals of 1e-11 leave 1e-10 in K, displacement, reactions and the functionals."""
     points = np.array([[0.1, 0.2], [4.6, 4.1]])
     moved = [(0.0, 1e-4)] + [None] * (len(supports) - 1)
     slides = supports == HELD["free to slide"]

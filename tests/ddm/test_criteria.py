@@ -187,8 +187,8 @@ def test_f_criterion_with_equal_toughnesses_is_the_energy_criterion():
 
 
 def test_f_criterion_tells_shear_from_tension_by_the_toughnesses():
-    """Pure mode II. Straight on, F = (K_II/K_IIc)²; to the side, where k_2 vanishes, F = (1.23 K_II/K_Ic)²: at 77° by the
-    expansion (75.6° where G is largest, 1.51 K_II²/E'). So a tip shears straight on below K_IIc = K_Ic/1.23."""
+    """Pure mode II. Straight on, F = (K_II/K_IIc)²; to the side, where k_2 vanishes, F = (1.23 K_II/K_Ic)²: at 77° by
+    the expansion (75.6° where G is largest, 1.51 K_II²/E'). So a tip shears straight on below K_IIc = K_Ic/1.23."""
     tough, weak = rock_with(6e6), rock_with(1e6)
     angle, k_eq = CRITERIA["f"]([0.0], [1e6], tough)
     assert math.degrees(angle[0]) == pytest.approx(-76.5, abs=1.0) and k_eq[0] == pytest.approx(1.23e6, rel=5e-3)

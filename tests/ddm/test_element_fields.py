@@ -1,7 +1,8 @@
 """Stress, displacement and tractions of single elements against mpmath, and their independence of company.
 
-The reference has the same moments as `test_kernels` checks by quadrature, but by the upward recurrence in 400 digits, where
-it loses nothing that counts, and the fields of Crouch & Starfield (1983, §5.3 and ch. 4) as they are printed there.
+The reference has the same moments as `test_kernels` checks by quadrature, but by the upward recurrence in 400 digits,
+where it loses nothing that counts, and the fields of Crouch & Starfield (1983, §5.3 and ch. 4) as they are printed
+there.
 """
 
 import itertools
@@ -55,8 +56,8 @@ def cauchy(kind, order, z):
 
 
 def printed(kind, order, x, y, force):
-    """(order+1, 2, 5): σxx, σyy, σxy, 2μ u_x, 2μ u_y of unit jumps times 2μ, u⁺ − u⁻ (or of unit line forces) along and across
-    an element from −1 to 1."""
+    """(order+1, 2, 5): σxx, σyy, σxy, 2μ u_x, 2μ u_y of unit jumps times 2μ, u⁺ − u⁻ (or of unit line forces) along and
+    across an element from −1 to 1."""
     out = np.empty((order + 1, 2, 5))
     nu, q = mp.mpf(NU), -1 / (4 * mp.pi * (1 - mp.mpf(NU)))
     sums = cauchy(kind, order, mp.mpc(x, y))
@@ -105,8 +106,8 @@ def points():
 @pytest.mark.parametrize(("kind", "force"), [*((kind, False) for kind in range(4)), (shapes.ORDINARY, True)])
 @pytest.mark.parametrize("order", [0, 4, 5, 10])
 def test_fields_of_one_element(kind, order, force):
-    """1e-10 of stress and displacement, each as a whole, from every monomial, from 1e-12 to 1e6 lengths away (worst seen:
-    2e-11). The element lies from 0 to 2 so that points at its start keep
+    """1e-10 of stress and displacement, each as a whole, from every monomial, from 1e-12 to 1e6 lengths away (worst
+    seen: 2e-11). The element lies from 0 to 2 so that points at its start keep
     their digits."""
     where = points()
     got = np.empty((len(where), order + 1, 2, 5))
@@ -179,8 +180,8 @@ def test_matrices_are_the_stress_of_the_fields(order, force):
 
 
 def test_an_entry_depends_on_its_two_elements_alone(monkeypatch):
-    """To the bit, whatever else is asked for in the same call, in which order and on how many threads: growth keeps entries
-    and adds others to them."""
+    """To the bit, whatever else is asked for in the same call, in which order and on how many threads: growth keeps
+    entries and adds others to them."""
     targets, sources = scattered(71, 4, 4, 8.0), scattered(43, 4, 5, 8.0)
     whole = influence(targets, sources, NU, 1e-9)
     rng = np.random.default_rng(6)

@@ -100,8 +100,8 @@ def test_no_law_is_smooth():
 
 
 def test_history_goes_on_where_faces_are_divided():
-    """A tip that advances makes its old element an ordinary one: the slip stays, and without more load nothing slips but
-    the new piece and what it relieves."""
+    """A tip that advances makes its old element an ordinary one: the slip stays, and without more load nothing slips
+    but the new piece and what it relieves."""
     body = plane([LINE], ROUGH)
     loaded = body.solve(under(0, -20e6, 0))
     d = LINE[1] / np.hypot(*LINE[1])

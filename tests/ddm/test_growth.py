@@ -220,8 +220,9 @@ def pieces_of(cracks, loop=SQUARE[0]):
 @pytest.mark.parametrize("flip", [False, True])
 @pytest.mark.parametrize("third", [False, True])
 def test_a_ring_that_closes_through_a_mouth_gets_two(mouth, flip, third):
-    """Two cracks from one point of the boundary, the end of one growing into the other: the piece would touch the boundary at that
-    point, and the rock around it hang by it. With a third one beside them it is the other mouth that moves."""
+    """Two cracks from one point of the boundary, the end of one growing into the other: the piece would touch the
+    boundary at that point, and the rock around it hang by it. With a third one beside them it is the other mouth that
+    moves."""
     way = np.array([[-0.5, 3.0], [-3.0, 3.0], [-2.0, 1.3]])
     lines = [mouth + np.array([[0.0, 0.0], [-4.0, 2.0]]), mouth + np.array([[0.0, 0.0], *way])]
     if third:
@@ -355,7 +356,8 @@ def random_network(rng):
 
 @pytest.mark.parametrize("seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 40))])
 def test_random_networks_stay_sound(seed):
-    """45 networks (600 with the slow ones) grown by random walks until nothing moves: every invariant holds at every increment."""
+    """45 networks (600 with the slow ones) grown by random walks until nothing moves: every invariant holds at every
+    increment."""
     rng = np.random.default_rng(seed)
     kinds = set()
     for _ in range(15):
@@ -394,7 +396,8 @@ def test_growth_is_deterministic():
 
 
 def test_a_crack_that_the_tip_has_come_past_does_not_draw_it_back():
-    """From just beside a crack away from it at 45°: the end is within reach of the crack (0.42 of 0.5), but the way leads off it."""
+    """From just beside a crack away from it at 45°: the end is within reach of the crack (0.42 of 0.5), but the way
+    leads off it."""
     cracks = Cracks.from_polylines([[[-3.0, 0.0], [3.0, 0.0]], [[-2.0, 1.0], [0.0, 0.02]]])
     tips = only(tips_of(cracks), (0.0, 0.02))
     way = np.array([2.0, -0.98])

@@ -19,8 +19,8 @@ WEIGHTS = {
 
 
 def point_source(z, t, e, b, force):
-    """Stress and 2μ times displacement at z that the surface adds to a jump b across the direction e (times a length), or to a
-    force b, at t: the potentials of the module, with nothing simplified."""
+    """Stress and 2μ times displacement at z that the surface adds to a jump b across the direction e (times a length),
+    or to a force b, at t: the potentials of the module, with nothing simplified."""
     f, kappa, cj = 1 / (4 * mp.pi * (1 - mp.mpf(NU))), 3 - 4 * mp.mpf(NU), mp.conj
     w, s = cj(z) - t, cj(t)
     if force:
@@ -96,7 +96,8 @@ def test_image_holds_ten_digits(kind, force):
 
 @pytest.mark.parametrize("force", [False, True])
 def test_surface_bears_nothing(force):
-    """At the surface, from touching an element's end to a million lengths away, to round-off of the element's own stress."""
+    """At the surface, from touching an element's end to a million lengths away, to round-off of the element's own
+    stress."""
     random = np.random.default_rng(3)
     rock = HalfPlane((3.0, -2.0), (-0.6, 0.8))
     along, out = rock.turn

@@ -51,7 +51,8 @@ def test_overstress_is_one_at_the_strengths():
 
 
 def test_hole_in_tension_cracks_where_kirsch_has_it():
-    """3σ at the ends of the diameter across the pull (Kirsch 1898); of a polygon for the circle, second order in its sides."""
+    """3σ at the ends of the diameter across the pull (Kirsch 1898); of a polygon for the circle, second order in its
+    sides."""
     errors = []
     for n in (24, 48, 96):
         solution = solved(ddm.BodyLoad(remote_stress=[0.0, 5e6, 0.0]), holes=[polygon(n)])
@@ -68,8 +69,8 @@ def test_hole_in_tension_cracks_where_kirsch_has_it():
 
 
 def test_mean_over_a_distance_of_the_kirsch_field():
-    """σ_θθ = σ/2 (2 + ρ² + 3ρ⁴), ρ = R/r, on that diameter; its mean over d from the wall. The polygon's own error at its
-    sides (1 % at 96) is left in the first points."""
+    """σ_θθ = σ/2 (2 + ρ² + 3ρ⁴), ρ = R/r, on that diameter; its mean over d from the wall. The polygon's own error at
+    its sides (1 % at 96) is left in the first points."""
     d = 0.02
     settings = GrowthSettings(increment=5e-3, initiation="surface", initiation_distance=d)
     first = births(solved(ddm.BodyLoad(remote_stress=[0.0, 5e6, 0.0]), holes=[polygon(96)]), ROCK, settings)[0]
@@ -134,7 +135,8 @@ def test_a_pressed_block_fails_along_coulomb_planes():
 
 
 def test_a_face_of_a_crack_can_crack():
-    """Tension along an open crack: T-stress pulls its faces apart lengthwise, and new cracks leave them at right angles."""
+    """Tension along an open crack: T-stress pulls its faces apart lengthwise, and new cracks leave them at right
+    angles."""
     crack = Cracks.from_polylines([[[-0.05, 0.0], [0.05, 0.0]]], aperture=math.inf)
     solution = solved(ddm.BodyLoad(remote_stress=[4e6, 0.0, 0.0]), cracks=crack)
     found = births(solution, ROCK, GrowthSettings(increment=2e-3, initiation="surface"))
@@ -174,10 +176,10 @@ def test_born_cracks_go_on_growing():
 
 
 def test_a_sharp_notch_breaks_at_its_toughness():
-    """A notch of 10° is nearly an edge crack: with stress averaged over the material length it starts when K_I of the crack is
-    K_Ic (Kaya & Erdogan 1987), but for what follows the 1/√r, of the order of d/a: 0.054, 0.024, 0.0085 for d/a = 0.5, 0.22,
-    0.08. The point itself has no stress to go by. The corner is graded in six layers; the default two leave another 1.4 % in
-    the stress within 0.08 a of it."""
+    """A notch of 10° is nearly an edge crack: with stress averaged over the material length it starts when K_I of the
+    crack is K_Ic (Kaya & Erdogan 1987), but for what follows the 1/√r, of the order of d/a: 0.054, 0.024, 0.0085 for
+    d/a = 0.5, 0.22, 0.08. The point itself has no stress to go by. The corner is graded in six layers; the default two
+    leave another 1.4 % in the stress within 0.08 a of it."""
     width, height = 0.1, 0.2
     depth = 0.2 * width
     gap = depth * math.tan(math.radians(5))

@@ -91,7 +91,8 @@ def test_fields_of_point_loads(field):
 
 
 def test_point_loads_inside_and_on_the_boundary_reach_the_support():
-    """Inside, on a side, on a corner: force and moment of the reaction. 3e-5 is what the pinned side's corners leave."""
+    """Inside, on a side, on a corner: force and moment of the reaction. 3e-5 is what the pinned side's corners
+    leave."""
     points, forces = np.array([[0.2, 0.1], [1, 0.3], [-1, 1]]), np.array([[1e6, 2e6], [3e5, -1e5], [0, -2e5]])
     sol = ddm.Body([SQUARE], NONE, ROCK, supports=(ddm.Support(0),)).solve(ddm.BodyLoad(points=points, forces=forces))
     moment = np.sum(points[:, 0] * forces[:, 1] - points[:, 1] * forces[:, 0])
@@ -125,8 +126,8 @@ def test_a_point_load_on_a_hole_is_spread():
 
 
 def test_pressure_in_cracks_by_place():
-    """Hydrostatic, as a function and per segment; a linear pressure p₁x/a on a Griffith crack gives K = ±p₁√(πa)/2 (Tada,
-    Paris & Irwin 2000, 5.11), to the 2e-6 of four elements of order 4."""
+    """Hydrostatic, as a function and per segment; a linear pressure p₁x/a on a Griffith crack gives K = ±p₁√(πa)/2
+    (Tada, Paris & Irwin 2000, 5.11), to the 2e-6 of four elements of order 4."""
     crack = Cracks.from_polylines([np.array([[-1.0, 0], [1, 0]])], aperture=np.inf)
     body = ddm.Body([], crack, ROCK)
     k = body.solve(ddm.BodyLoad(crack_pressure=ddm.Pressure(3e6, (1e6, 0)))).tips["k_i"]

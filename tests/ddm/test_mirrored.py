@@ -11,7 +11,8 @@ NU, TOL = 0.25, 1e-14
 
 
 def scattered(n: int, order: int, height: float, way: tuple[float, float]) -> ElementSet:
-    """``n`` elements of every kind, of lengths 1 : 30, in a unit square whose uppermost is ``height`` below the surface."""
+    """``n`` elements of every kind, of lengths 1 : 30, in a unit square whose uppermost is ``height`` below the
+    surface."""
     rng = np.random.default_rng(0)
     turn, length = rng.uniform(0, 2 * np.pi, n), 0.03 * 30 ** -rng.uniform(0, 1, n)
     start = rng.uniform(0, 1, (n, 2))

@@ -77,8 +77,8 @@ def test_an_arc_goes_on_as_it_went():
 @pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
 @pytest.mark.parametrize("curve", [0.0, 3.0])
 def test_a_remembered_slope_spares_looks(stiffness, curve):
-    """A step along θ ends with start + curve − (1 + κ) θ asked for, and κ is off by a tenth since the last step: by what the last
-    chord ended with, or by what was found then, one look leaves less than the tolerance."""
+    """A step along θ ends with start + curve − (1 + κ) θ asked for, and κ is off by a tenth since the last step: by
+    what the last chord ended with, or by what was found then, one look leaves less than the tolerance."""
     start, before = 2.0, 1.1 * stiffness
 
     def ask(theta):

@@ -103,8 +103,8 @@ def test_a_strip_is_torn_in_two():
 
 
 def test_a_closed_crack_that_rubs_starts_late():
-    """K_II = (|τ| − μ|σ_n|)√(πa) and K_eq = 2/√3 K_II (Erdogan & Sih 1963) at 45° to a pressure; its wings then open, and
-    need more and more. The slip goes on from step to step."""
+    """K_II = (|τ| − μ|σ_n|)√(πa) and K_eq = 2/√3 K_II (Erdogan & Sih 1963) at 45° to a pressure; its wings then open,
+    and need more and more. The slip goes on from step to step."""
     end = HALF * math.sqrt(0.5) * np.ones(2)
     rough = (JointLaw("rough", friction_angle=math.atan(0.3)),)
     load = ddm.BodyLoad(remote_stress=[0.0, -1e6, 0.0])

@@ -111,7 +111,8 @@ def test_what_is_held_decides_which_loads_are_refused():
 
 def test_reciprocity_of_two_loads_on_a_mixed_body():
     """Betti: the work of load A on displacement B is that of B on A, which moves only its reactions on
-    imposed displacements: W(push, move) + W(reaction, move) = 0. The tolerance is the discretisation error at the ends of the pinned piece."""
+    imposed displacements: W(push, move) + W(reaction, move) = 0. The tolerance is the discretisation error at the ends
+    of the pinned piece."""
     held = (Support(((-0.5, -1), (0.6, -1))), Support(((1, -0.2), (1, 0.7)), "normal"))
     body = ddm.Body([SQUARE], NONE, ROCK, supports=held)
     push = ddm.BodyLoad(TOP, [[[0, -1e6], [0, -3e6]]])
@@ -170,8 +171,8 @@ def test_growth_reuses_a_held_boundary():
 
 @pytest.mark.parametrize("hold", ["both", "x", (0.6, 0.8)])
 def test_a_held_hole_holds_the_body(hold):
-    """The hole moves as a linear displacement, the outline carries the uniform stress that goes with it: displacement is
-    absolute, to round-off. What the hole's support leaves free keeps the outline's mean at zero."""
+    """The hole moves as a linear displacement, the outline carries the uniform stress that goes with it: displacement
+    is absolute, to round-off. What the hole's support leaves free keeps the outline's mean at zero."""
     hole = np.array([[-0.2, -0.1], [0.3, -0.2], [0.4, 0.35], [-0.15, 0.4]])
     body = ddm.Body([SQUARE], NONE, ROCK, holes=[hole], supports=tuple(Support(k, hold) for k in range(4, 8)))
     gradient = np.array([[1e-4, 3e-4], [-2e-4, 5e-5]])
@@ -190,8 +191,8 @@ def test_a_held_hole_holds_the_body(hold):
 
 
 def test_a_block_hangs_on_a_bolt():
-    """A pinned hole takes weight, tractions and point loads in whatever form they come, with a crack that grows beside it;
-    against order 7, and from body to body."""
+    """A pinned hole takes weight, tractions and point loads in whatever form they come, with a crack that grows beside
+    it; against order 7, and from body to body."""
     bolt = tuple(Support(k) for k in range(4, 8))
     lines = np.array([[-0.8, 0.5], [-0.5, 0.7], [-0.4, 0.75]])
     loads = (

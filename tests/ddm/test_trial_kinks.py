@@ -63,7 +63,8 @@ def test_confined_cracks_grow_in_shear():
 
 
 def test_tips_without_room_are_judged_by_kinks_of_no_length():
-    """The right tip is nearer to a side than a kink is long; the left one has room, and a fluid's pressure by segments."""
+    """The right tip is nearer to a side than a kink is long; the left one has room, and a fluid's pressure by
+    segments."""
     block = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     cracks = Cracks.from_polylines([[[0.5, 0.1], [0.96, 0.0]]], aperture=math.inf)
     load = ddm.BodyLoad(sides={0: (0.0, -1e6), 2: (0.0, 1e6)}, crack_pressure=[1e5])

@@ -18,7 +18,8 @@ def rectangle(x0, y0, x1, y1) -> np.ndarray:
 
 @pytest.fixture
 def pushed():
-    """A 2 m wide block on a named floor, one on top of it of no name, pushed at 2 kN/m: (blocks, laws, contacts, weight)."""
+    """A 2 m wide block on a named floor, one on top of it of no name, pushed at 2 kN/m: (blocks, laws, contacts,
+    weight)."""
     blocks = Blocks.from_polygons(
         [rectangle(-5, -1, 5, 0), rectangle(0, 0, 2, 1), rectangle(0, 1, 2, 2)], fixed=[True, False, False],
         edge_names=[[["", "", "floor", ""]], [[""] * 4], [[""] * 4]],

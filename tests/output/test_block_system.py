@@ -1,4 +1,5 @@
-"""What `geomech build` leaves: the same blocks in every file, statistics that add up, bridges where the rock is whole."""
+"""What `geomech build` leaves: the same blocks in every file, statistics that add up, bridges where the rock is
+whole."""
 
 import json
 

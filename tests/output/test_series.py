@@ -344,8 +344,8 @@ def test_faces_of_an_open_bent_crack_part_by_opening_and_slip(tmp_path):
         assert np.hypot(*expected) > 0.3 * widest
         # Measured 2.7 % of the widest opening at worst, at the sharp kink.
         assert np.hypot(*(moved[upper] - moved[lower] - expected)) < 0.04 * widest
-    # Stress ends where the mesh does: Williams' field at the centres of the triangles about the tips, of which no in-plane
-    # component exceeds (1.3 K_I + 1.8 K_II) / √(2πr), and not what the nodes' neighbourhood happens to hold.
+    # Stress ends where the mesh does: Williams' field at the centres of the triangles about the tips, of which no
+    # in-plane component exceeds (1.3 K_I + 1.8 K_II) / √(2πr), and not what the nodes' neighbourhood happens to hold.
     corners = grid.points[grid.connectivity.reshape(-1, 3)]
     tip = np.hypot(*(corners - line[-1]).transpose(2, 0, 1)).min(axis=1) < 1e-12
     r = np.hypot(*(corners[tip].mean(axis=1) - line[-1]).T).min()

@@ -1,4 +1,5 @@
-"""Discs with a central crack, run as the command line runs them, against published factors and the criterion by hand."""
+"""Discs with a central crack, run as the command line runs them, against published factors and the criterion by
+hand."""
 
 from __future__ import annotations
 
@@ -36,8 +37,9 @@ def run_pipeline(out: Path, *variants: str, wishes: tuple[str, ...] = ()) -> dic
 
 
 def holds(disc: Pressed) -> None:
-    """Factors, initiation and kink. 0.2 % in K are left by the flats (0.1 %) and by chords in place of arcs (0.13 % of the
-    radius); with order 8, flats of 2° and chords to 0.05 mm N_I of the crack along the load is 1.13556 for 1.13555."""
+    """Factors, initiation and kink. 0.2 % in K are left by the flats (0.1 %) and by chords in place of arcs (0.13 % of
+    the radius); with order 8, flats of 2° and chords to 0.05 mm N_I of the crack along the load is 1.13556 for
+    1.13555."""
     size = np.hypot(*disc.reference)
     assert np.abs(disc.factors - disc.reference).max() < 3e-3 * size
     assert np.abs(disc.factors - disc.series).max() < 3e-3 * size
@@ -57,9 +59,9 @@ def test_factors_and_initiation(tmp_path, name):
 
 @pytest.mark.slow
 def test_discs_split_between_the_platens(tmp_path):
-    """Whatever the crack's direction, its wings run to the middles of the flats and part the disc into halves. A crack along
-    the load, and one that shear closes, run through at the load of their start; wings of the others must first be driven
-    round by a higher one."""
+    """Whatever the crack's direction, its wings run to the middles of the flats and part the disc into halves. A crack
+    along the load, and one that shear closes, run through at the load of their start; wings of the others must first be
+    driven round by a higher one."""
     discs = run_pipeline(tmp_path, "opening", "mixed", "shear", "closing")
     for name, disc in discs.items():
         holds(disc)

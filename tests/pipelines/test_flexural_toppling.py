@@ -1,4 +1,5 @@
-"""The study of flexural toppling, run as the command line runs it; its own check asserts bending theory and the turning piece."""
+"""The study of flexural toppling, run as the command line runs it; its own check asserts bending theory and the turning
+piece."""
 
 from __future__ import annotations
 

@@ -47,8 +47,8 @@ def study(tmp_path_factory):
 
 
 def test_a_bridge_breaks_at_limit_equilibrium_plus_its_fracture_load(study):
-    """1.5755 and 2.1170 g for 1.5853 and 2.1452: the lower end is driven by 0.6 and 1.3 % more than the mean of both, which
-    is the formula's to 0.2 %."""
+    """1.5755 and 2.1170 g for 1.5853 and 2.1452: the lower end is driven by 0.6 and 1.3 % more than the mean of both,
+    which is the formula's to 0.2 %."""
     for name, seen in study[1].items():
         check(name, seen)
         assert seen.started == pytest.approx(seen.expected(), rel=0.01 * (1 if name == "bridge_300" else 2) + 0.002)

@@ -72,7 +72,8 @@ def test_run_ends_as_told_and_writes_its_files(study):
 
 def test_factors_before_growth(study):
     """Of the plate, with elements of order 8: the scene's of order 4 keep three digits. The infinite plane's are lower,
-    by what the sides do to a flaw over 35 % of the width: with √sec, 8 %, K_I is 5 % off and K_II as much the other way."""
+    by what the sides do to a flaw over 35 % of the width: with √sec, 8 %, K_I is 5 % off and K_II as much the other
+    way."""
     first = study.wings
     k = np.abs(first.k[0]) / first.load[0]
     assert np.allclose(k, published.OPEN_SLOT, rtol=1e-3)
@@ -83,8 +84,8 @@ def test_factors_before_growth(study):
 
 
 def test_initiation_at_the_load_that_the_factors_give(study):
-    """K_eq = K_Ic, worked out by hand from the maximum tangential stress along the kink (Erdogan & Sih 1963): 32.98 MPa,
-    to the three digits that elements of the scene's order keep of K."""
+    """K_eq = K_Ic, worked out by hand from the maximum tangential stress along the kink (Erdogan & Sih 1963): 32.98
+    MPa, to the three digits that elements of the scene's order keep of K."""
     k_i, k_ii = -published.OPEN_SLOT[0], published.OPEN_SLOT[1]
     theta = np.radians(np.arange(0, 180, 0.01))
     hoop = np.cos(theta / 2) * (k_i * np.cos(theta / 2) ** 2 + 1.5 * k_ii * np.sin(theta))

@@ -16,7 +16,8 @@ FOLDER = Path(__file__).parents[2] / "pipelines" / "step_path_slope"
 sys.path.insert(0, str(FOLDER))
 from compare_step_path_slope import StepPath, check
 
-#: Blocks' displacements turn and stretch what is worked out on the geometry at the start of a step, by parts in ten thousand.
+#: Blocks' displacements turn and stretch what is worked out on the geometry at the start of a step, by parts in ten
+#: thousand.
 SIMILAR = 1e-3
 
 
@@ -67,8 +68,8 @@ def test_joints_link_from_the_toe_up_and_the_path_cuts_the_slope(four):
 
 @pytest.mark.slow
 def test_loads_go_with_the_toughness(four, tmp_path):
-    """Friction alone: stresses go with gravity, so that a tip of twice the toughness asks for twice the gravity. Here half, which
-    the ramp reaches sooner."""
+    """Friction alone: stresses go with gravity, so that a tip of twice the toughness asks for twice the gravity. Here
+    half, which the ramp reaches sooner."""
     half = run_pipeline(tmp_path, "materials.rock.k_ic_pa_sqrt_m=0.5e6")
     _, seen = four
     assert half.started == pytest.approx(seen.started / 2, rel=SIMILAR)
@@ -104,8 +105,8 @@ def test_loads_do_not_depend_on_the_increment(four, tmp_path):
 
 @pytest.mark.slow
 def test_loads_that_are_followed_have_the_same_peak(four, tmp_path):
-    """Between bridges the load falls back to what the tips just bear; its peak is the dead load's, to what the increments make of
-    paths under another load."""
+    """Between bridges the load falls back to what the tips just bear; its peak is the dead load's, to what the
+    increments make of paths under another load."""
     followed = run_pipeline(tmp_path, 'run.control="toughness"')
     _, seen = four
     assert followed.held == pytest.approx(seen.held, rel=2e-3)
@@ -114,7 +115,8 @@ def test_loads_that_are_followed_have_the_same_peak(four, tmp_path):
 
 @pytest.mark.slow
 def test_ten_joints_go_at_once(tmp_path):
-    """The first bridge takes all others with it: 2.402 g whatever the increment, for 2.420 g by the crack solver alone."""
+    """The first bridge takes all others with it: 2.402 g whatever the increment, for 2.420 g by the crack solver
+    alone."""
     for name in ("increment_300", "increment_150"):
         seen = run_pipeline(tmp_path / name, variant=name)
         assert seen.failed == seen.started == pytest.approx(2.4021, rel=2e-4)

@@ -55,8 +55,8 @@ def specimens(tmp_path_factory):
 
 
 def expected_initiation(phi: int) -> float:
-    """The load at which the strongest tip of the published open slots reaches K_Ic: maximum tangential stress (Erdogan &
-    Sih 1963) searched along the angle."""
+    """The load at which the strongest tip of the published open slots reaches K_Ic: maximum tangential stress (Erdogan
+    & Sih 1963) searched along the angle."""
     theta = np.radians(np.arange(-180, 180, 0.05))[:, None]
     k_i, k_ii = np.array(published.OPEN_SLOT_K_I[phi]), np.array(published.OPEN_SLOT_K_II[phi])
     hoop = np.cos(theta / 2) * (k_i * np.cos(theta / 2) ** 2 - 1.5 * k_ii * np.sin(theta))
@@ -83,8 +83,8 @@ def test_the_two_cracks_coalesce(specimens, phi):
 
 @pytest.mark.parametrize("phi", [0, 90])
 def test_initiation_at_the_load_that_the_factors_give(specimens, phi):
-    """Steps end where K_eq = K_Ic. 2e-4 is what is left of K in the scene's elements (2e-5), and what the strain of 3e-3 makes
-    of a load that stays where it is (`test_coupling`: a tenth of it is allowed there)."""
+    """Steps end where K_eq = K_Ic. 2e-4 is what is left of K in the scene's elements (2e-5), and what the strain of
+    3e-3 makes of a load that stays where it is (`test_coupling`: a tenth of it is allowed there)."""
     load = specimens[f"phi_{phi}"].watch.load("initiation")
     assert load == pytest.approx(expected_initiation(phi), rel=2e-4)
 
@@ -127,7 +127,8 @@ def test_files_are_read_by_pyvista_and_meshio(specimens):
 
 
 def test_the_study_is_on_one_page(specimens):
-    """What was computed stands beside what is printed, pictures and drawings are in the page, and nothing is fetched."""
+    """What was computed stands beside what is printed, pictures and drawings are in the page, and nothing is
+    fetched."""
     page = (specimens["phi_0"].folder.parent / "report.html").read_text(encoding="utf-8")
     for words in (
         "Line of coalescence (Table 3)",
@@ -177,9 +178,9 @@ def test_paths_lie_apart_by_what_one_is_moved(specimens):
 @pytest.mark.slow
 @pytest.mark.parametrize(("phi", "limit", "coarse", "fine"), [(0, 218.11, 0.05, 1e-3), (30, 350.96, 0.1, 5e-3)])
 def test_the_load_of_coalescence_has_a_limit(phi, limit, coarse, fine):
-    """MPa, by increments of 1, ½ and ¼ mm. Loads are known at multiples of the increment only: the peak that the wings pass
-    before they run at each other lies between two of them, by 8 % at most with 1 mm. The last legs are unstable, so the load
-    does not depend on how near tips must come: at 1 or 2 mm the same."""
+    """MPa, by increments of 1, ½ and ¼ mm. Loads are known at multiples of the increment only: the peak that the wings
+    pass before they run at each other lies between two of them, by 8 % at most with 1 mm. The last legs are unstable,
+    so the load does not depend on how near tips must come: at 1 or 2 mm the same."""
 
     def joined(increment: float, length: float) -> float:
         scene = load_scene(
@@ -197,8 +198,8 @@ def test_the_load_of_coalescence_has_a_limit(phi, limit, coarse, fine):
 
 @pytest.mark.slow
 def test_all_four_as_published(tmp_path):
-    """The study as it stands. Of what is published, in kind: specimens with φ = 30 and 60 need more to coalesce than those
-    with 0 and 90 (KB 2023, Figure 16). In numbers: the lines of coalescence of 0 and 90."""
+    """The study as it stands. Of what is published, in kind: specimens with φ = 30 and 60 need more to coalesce than
+    those with 0 and 90 (KB 2023, Figure 16). In numbers: the lines of coalescence of 0 and 90."""
     runs = run_pipeline(tmp_path, [f"phi_{phi}" for phi in published.PHI_DEG])
     assert coalesced(runs["phi_0"])
     assert coalesced(runs["phi_90"])

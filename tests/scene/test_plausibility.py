@@ -85,9 +85,9 @@ def test_sizes_that_are_hardly_in_metres(scene_file, factor, told):
     ("ratio", "at", "too_large"), [(1.0, 0.75, 0.98), (1.0, 0.25, 0.98), (2.0, 0.25, 2.06), (3.0, 0.25, 4.6)]
 )
 def test_how_far_linear_pressure_is_off_under_shallow_blocks(ratio, at, too_large):
-    """K of a slot in a block under a strip load, by the linear pressure that balances it below, over K on a rigid smooth base:
-    the crack solver with the base held (in tension or none is not asked: the slots are open, the base is pressed or hardly
-    pulled). It is what `SHALLOW` goes by."""
+    """K of a slot in a block under a strip load, by the linear pressure that balances it below, over K on a rigid
+    smooth base: the crack solver with the base held (in tension or none is not asked: the slots are open, the base is
+    pressed or hardly pulled). It is what `SHALLOW` goes by."""
     wide, half = ratio, 0.125 * ratio
     outline = np.array([[-wide / 2, 0], [wide / 2, 0], [wide / 2, 1], [half, 1], [-half, 1], [-wide / 2, 1]])
     slot = Cracks.from_polylines([np.array([[0, at - 0.1], [0, at + 0.1]])], aperture=np.inf)

@@ -150,8 +150,8 @@ def test_bad_input_is_named():
 
 
 def network(seed: int) -> list[np.ndarray]:
-    """Random traces, and others that nearly coincide with them: duplicates, ends near lines, shallow crossings (down to 1e-12
-    rad), traces through corners of the rock and through crossings, along the outline; gaps from 1e-12 to 1e-3."""
+    """Random traces, and others that nearly coincide with them: duplicates, ends near lines, shallow crossings (down to
+    1e-12 rad), traces through corners of the rock and through crossings, along the outline; gaps from 1e-12 to 1e-3."""
     rng = np.random.default_rng(seed)
 
     def through(point, half):

@@ -1,4 +1,5 @@
-"""DXF drawings: entities, bulges, blocks, units, hidden layers; held against circles, splines and ezdxf's own arithmetic."""
+"""DXF drawings: entities, bulges, blocks, units, hidden layers; held against circles, splines and ezdxf's own
+arithmetic."""
 
 import math
 import sys

@@ -76,8 +76,8 @@ def test_an_interface_of_two_surfaces_that_is_called_a_joint_is_one(tmp_path):
     ],
 )
 def test_every_file_gives_the_drawing_of_the_model(tmp_path, name, version, binary):
-    """Outlines, names, joints and cracks come back as drawn; the mesh's nodes leave no trace. Sixteen digits are in every
-    file, so that the difference is round-off."""
+    """Outlines, names, joints and cracks come back as drawn; the mesh's nodes leave no trace. Sixteen digits are in
+    every file, so that the difference is round-off."""
     source, copy = tmp_path / "model.geo", tmp_path / name
     source.write_text(CONFORMING)
     with gmsh_session() as gmsh:

@@ -62,7 +62,8 @@ def test_poisson_lines_of_all_directions():
     middle = np.array([[20, 10], [80, 10], [80, 50], [20, 50]], dtype=float)
     areas, p21 = [], []
     for joint in joints[:6]:
-        # Blocks cut off at the edge are left out; larger ones meet it more often, so the rock is twice as large as the part.
+        # Blocks cut off at the edge are left out; larger ones meet it more often, so the rock is twice as large as the
+        # part.
         blocks = cut([Zone("rock", (REGION,))], [joint]).blocks
         centre = blocks.mean_vertices(blocks.vertices)
         areas.append(blocks.areas()[((centre > middle.min(axis=0)) & (centre < middle.max(axis=0))).all(axis=1)])

@@ -81,7 +81,8 @@ def test_what_the_models_draw_is_what_their_sources_say():
     # A wall of two courses of three and four bricks.
     _, cutting = built("brick_wall", courses=2, bricks=3)
     assert cutting.blocks.n_blocks == 3 + 4 + 1
-    # The block between the face, the plane and the tension crack: the strip under the crest less the triangle under the plane.
+    # The block between the face, the plane and the tension crack: the strip under the crest less the triangle under the
+    # plane.
     _, cutting = built("planar_slope")
     brink, far = 30 / math.tan(math.radians(60)), 30 / math.tan(math.radians(60)) + 6
     wedge = 0.5 * brink * 30 + 6 * 30 - 0.5 * far**2 * math.tan(math.radians(35))

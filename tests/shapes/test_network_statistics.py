@@ -1,4 +1,5 @@
-"""Joint sets against what statistics of fractures knows of them: directions, traces of discs, scan-lines, persistence, nodes."""
+"""Joint sets against what statistics of fractures knows of them: directions, traces of discs, scan-lines, persistence,
+nodes."""
 
 from __future__ import annotations
 
@@ -60,7 +61,8 @@ def test_poles_have_fishers_mean_resultant(concentration):
 
 
 def test_traces_of_planes_spread_by_fishers_law():
-    """Poles in the section: angles by von Mises' law, for large κ normal with 1/√κ; aside, as much as the tilt turns them."""
+    """Poles in the section: angles by von Mises' law, for large κ normal with 1/√κ; aside, as much as the tilt turns
+    them."""
     rng = np.random.default_rng(12)
     beside = FisherAngle(math.radians(60), 0.3, 0.3, 400.0)
     angles = beside.sample(rng, 20_000)
@@ -153,7 +155,8 @@ def test_cells_between_poisson_lines_have_four_sides():
         sides.append(np.diff(blocks.vertex_start)[own])
         rims.append(np.array([shapely.Polygon(blocks.loops(b)[0]).length for b in np.flatnonzero(own)]))
     areas, sides, rims = map(np.concatenate, (areas, sides, rims))
-    # Some 1200 cells of a few hundred lines: three per cent is one standard error of the intensity, twice that of areas.
+    # Some 1200 cells of a few hundred lines: three per cent is one standard error of the intensity, twice that of
+    # areas.
     assert sides.mean() == pytest.approx(known["sides"], rel=0.02)
     assert rims.mean() == pytest.approx(known["perimeter"], rel=0.12)
     assert areas.mean() == pytest.approx(known["area"], rel=0.24)

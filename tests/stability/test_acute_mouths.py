@@ -1,4 +1,5 @@
-"""Cracks that leave a surface nearly along it: the blade of rock beside them is as good as loose, and K is what bends it."""
+"""Cracks that leave a surface nearly along it: the blade of rock beside them is as good as loose, and K is what bends
+it."""
 
 import math
 
@@ -16,8 +17,8 @@ PRESSURE = ddm.BodyLoad(crack_pressure=1.0)
 
 
 def below_a_surface(degrees):
-    """K_I, K_II (1, 2) of a crack 1 long at an angle to the surface of a half-plane, under a pressure 1 in it and under a tension 1
-    along the surface, by distributed dislocations."""
+    """K_I, K_II (1, 2) of a crack 1 long at an angle to the surface of a half-plane, under a pressure 1 in it and under
+    a tension 1 along the surface, by distributed dislocations."""
     tip = complex(math.cos(math.radians(degrees)), -math.sin(math.radians(degrees)))
     arms = [Arm(0j, tip, start_is_tip=False, open=True)]
     return [
@@ -44,8 +45,8 @@ def test_mouths_at_the_surface_of_a_half_plane(degrees, tolerance):
 
 @pytest.mark.parametrize("degrees", [3.5, 5])
 def test_short_cracks_beside_a_long_side(degrees):
-    """A twentieth of the side of a block, which is a half-plane to it but for 1e-3. K was 15 to 64 % off where elements ended by the
-    longer of the two faces."""
+    """A twentieth of the side of a block, which is a half-plane to it but for 1e-3. K was 15 to 64 % off where elements
+    ended by the longer of the two faces."""
     t, length, exact = math.radians(degrees), 0.1, np.abs(below_a_surface(degrees)[0])
     block = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]])
     for y in (-0.8, -0.3):

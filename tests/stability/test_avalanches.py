@@ -24,7 +24,8 @@ def turned(points) -> np.ndarray:
 
 
 def avalanche(n: int) -> dda.BlockSystem:
-    """``n`` polygons of three to seven corners, half a metre to a metre across, on a slope above level ground that ends at a wall."""
+    """``n`` polygons of three to seven corners, half a metre to a metre across, on a slope above level ground that ends
+    at a wall."""
     rng = np.random.default_rng(3)
     crest, foot = turned([[-2.0, 0.0], [LENGTH, 0.0]])
     end = foot[0] + GROUND

@@ -130,8 +130,8 @@ def test_block_sliding_without_friction_feels_only_the_weight_across_the_slope()
 
 
 def test_crack_from_a_hole():
-    """A plate with a round hole (32 corners) and a crack from its side, pulled at its ends: as DDM alone, to the size of
-    the strain, 1e-5."""
+    """A plate with a round hole (32 corners) and a crack from its side, pulled at its ends: as DDM alone, to the size
+    of the strain, 1e-5."""
     around = np.linspace(0, 2 * np.pi, 33)[:-1]
     outline = [rectangle(-1, -2, 1, 2), 0.3 * np.column_stack([np.cos(around), -np.sin(around)])]
     pulls = tuple(EdgeTraction(name, History.ramp([0.0, s * 1e5])) for name, s in (("top", 1), ("bottom", -1)))
@@ -148,8 +148,8 @@ def test_crack_from_a_hole():
 
 def test_a_vertex_in_the_straight_side_of_a_base_changes_nothing():
     """A block on a wider base, rubbing on it, with vertices in the base's top where the block's corners stand (the ends
-    of a named piece, say): the same pressure all along, so the same K as on a base without them; 1e-4 is for the other places at which
-    rubbing contacts then stand."""
+    of a named piece, say): the same pressure all along, so the same K as on a base without them; 1e-4 is for the other
+    places at which rubbing contacts then stand."""
     block, base = rectangle(-0.5, 0, 0.5, 2), rectangle(-1, -1, 1, 0)
     line = [[-0.1, 0.5], [0.1, 0.7]]
     plain = last(problem([block, base], [False, True], [line]))

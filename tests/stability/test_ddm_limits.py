@@ -40,7 +40,8 @@ def said(solution):
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-5, 1e-7])
 def test_tips_that_nearly_touch(gap):
-    """Collinear cracks 1 long, down to 1e-7 between them (Willmore 1949): 5e-6 by default, as it says, and to a target."""
+    """Collinear cracks 1 long, down to 1e-7 between them (Willmore 1949): 5e-6 by default, as it says, and to a
+    target."""
     inner, outer = fracture.collinear_pair(1.0, gap / 2, 1.0)
     exact = np.array([[outer, 0], [inner, 0], [inner, 0], [outer, 0]])
     cracks = lines([[-1, 0], [-gap / 2, 0]], [[gap / 2, 0], [1, 0]])
@@ -65,7 +66,8 @@ def crossing(degrees):
 
 
 #: K_I, K_II at the tips of two cracks 2 long that cross in their middle, angle in degrees → tips (1, 0) and (cos, sin)
-#: under `MIXED` (computed: order 8, elements down to 1e-5 at 3° and to 2.5e-3 at 1°; from 5e-3 the latter change by 6e-8).
+#: under `MIXED` (computed: order 8, elements down to 1e-5 at 3° and to 2.5e-3 at 1°; from 5e-3 the latter change by
+#: 6e-8).
 CROSSING = {
     3: [[1.68009645, 0.59966634], [0.73466206, 0.02552407]],
     1: [[1.64079621, 0.62366920], [0.77145144, -0.03227593]],
@@ -83,8 +85,8 @@ def test_cracks_that_cross_at_a_small_angle(degrees):
 
 def test_a_sliver_below_a_surface():
     """A crack 0.8 long at depths of 1/20 and 1/40 of it, its roof pulled up: the clamped beam's edge moment M = qL²/12
-    gives K = √6 M d^(−3/2) with K_I/K_II = tan 52.07° (Hutchinson & Suo 1992, §IV), up to terms d/L, which are extrapolated
-    away (found: 0.1 % and 0.7 %)."""
+    gives K = √6 M d^(−3/2) with K_I/K_II = tan 52.07° (Hutchinson & Suo 1992, §IV), up to terms d/L, which are
+    extrapolated away (found: 0.1 % and 0.7 %)."""
     ratio, size = [], []
     for depth in (0.04, 0.02):
         cracks = lines([[-0.4, 1 - depth], [0.4, 1 - depth]])
@@ -97,7 +99,8 @@ def test_a_sliver_below_a_surface():
 
 @pytest.mark.parametrize("degrees", [10, 5, 4])
 def test_a_mouth_at_a_small_angle(degrees):
-    """A crack 0.8 long that leaves the side nearly along it: default settings against order 8 (found: 2e-4, 4e-4, 8e-4)."""
+    """A crack 0.8 long that leaves the side nearly along it: default settings against order 8 (found: 2e-4, 4e-4,
+    8e-4)."""
     t = math.radians(degrees)
     cracks = lines([[-1, 0], [-1 + 0.8 * math.sin(t), 0.8 * math.cos(t)]], surface=[(True, False)])
     exact = factors(ddm.Body([SQUARE], cracks, ROCK, DdmSettings(order=8, grading_layers=4)).solve(pull(1, 1)))
@@ -131,8 +134,9 @@ def test_a_tip_that_nearly_reaches_the_surface(gap, tolerance):
      (1.0, 0.0, 0.499), (1.0, 0.0, 0.0), (1.0, 1e7, 0.21)],
 )  # fmt: skip
 def test_sizes_offsets_and_poissons_ratios(scale, shift, poisson):
-    """The two-slot specimen from 6e-11 m to 10 km, at 1e7 m from the origin and nearly incompressible: K does not depend on
-    Poisson's ratio, and is 5e-6 from the reference; 2e-5 where 60 mm stand 1e7 m off (coordinates end at 2e-9 m)."""
+    """The two-slot specimen from 6e-11 m to 10 km, at 1e7 m from the origin and nearly incompressible: K does not
+    depend on Poisson's ratio, and is 5e-6 from the reference; 2e-5 where 60 mm stand 1e7 m off (coordinates end at 2e-9
+    m)."""
     w, h = 0.03 * scale, 0.06 * scale
     loop = np.array([[-w, -h], [w, -h], [w, h], [-w, h]]) + shift
     cracks = lines(*[np.array(ends) * scale + shift for ends in two_cracks.crack_ends(0)])
@@ -173,8 +177,9 @@ def test_sharp_folds(caplog):
 
 @pytest.mark.parametrize("degrees", [150, 165, 168, 169.5])
 def test_folds_are_right_to_the_target_of_a_bare_body(degrees):
-    """Coarse grading left faces that nearly meet 10 % off at 165° and anything beyond, whatever the target. Measured over
-    0.03, 0.3 and 1.5 of a length: 1.0 of a target of 1e-2, 0.6 of 1e-3, 6 of 1e-4, as the same order serves both."""
+    """Coarse grading left faces that nearly meet 10 % off at 165° and anything beyond, whatever the target. Measured
+    over 0.03, 0.3 and 1.5 of a length: 1.0 of a target of 1e-2, 0.6 of 1e-3, 6 of 1e-4, as the same order serves
+    both."""
     k = factors(ddm.solve_to([], folded(degrees), ROCK, MIXED, 1e-5))
     for target, part in ((1e-2, 1.5), (1e-3, 1.0), (1e-4, 8.0)):
         solution = ddm.Body([], folded(degrees), ROCK, DdmSettings(target_error=target)).solve(MIXED)
@@ -246,7 +251,8 @@ def test_a_closed_crack_that_leaves_a_blade_settles_and_says_where_it_did_not(ca
 
 
 def test_a_blade_that_was_refused_settles():
-    """Elements ended by the longer of its faces, and no state of contact held over a good part of the crack. Order 6: 4.82327e6."""
+    """Elements ended by the longer of its faces, and no state of contact held over a good part of the crack. Order 6:
+    4.82327e6."""
     body = blade(1.4023862, (-1.0594792, 3.816352), order=3, elements_per_crack=2, elements_per_side=2)
     load = pressed((-675559.0, 935867.0), (935867.0, 68478.0))
     assert body.solve(load).tips["k_ii"][0] == pytest.approx(4.82327e6, rel=1e-3)
@@ -263,7 +269,8 @@ def test_faces_that_find_no_state_over_a_good_part_of_their_crack_are_refused_by
 
 
 def test_faces_that_do_not_settle_name_the_crack_and_what_hangs_by_a_thread(monkeypatch):
-    """A rough crack that leaves 0.3 mm of rock in a block of 2.5 m: what is beyond it rattles, and some loads do not settle."""
+    """A rough crack that leaves 0.3 mm of rock in a block of 2.5 m: what is beyond it rattles, and some loads do not
+    settle."""
     from geomech.ddm import friction
 
     rock = np.array([[10.01109119, 2.59700496], [10.98137512, 3.941], [8.71520101, 3.941], [8.5057194, 3.64990237]])

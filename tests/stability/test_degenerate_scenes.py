@@ -209,7 +209,8 @@ def test_a_run_does_not_write_over_its_scene(tmp_path, capfd):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_broken_off_run_can_be_read(tmp_path, how):
-    """Ctrl-C and SIGTERM end with exit code 3 and a summary; a kill leaves all but the last cycle's files in good order."""
+    """Ctrl-C and SIGTERM end with exit code 3 and a summary; a kill leaves all but the last cycle's files in good
+    order."""
     scene, out = tmp_path / "plate.toml", tmp_path / "out"
     scene.write_text(plate(increment=2e-5))
     process = subprocess.Popen(

@@ -29,12 +29,12 @@ def test_slopes_run_to_their_end(seed):
     assert found.worst["balance"] < 1e-5 and found.worst["energy"] < 1e-3
 
 
-#: What once went wrong: a wing that left a face at less than 3°, a water table that ends where an edge does; bonds that break
-#: within a step, beside others that pull (the step was cut to a thousandth); a tip drawn back to the crack that it had come past,
-#: along it; a load that went back for tips which growth had not brought to rest; forces put beside where moments were taken from; parts
-#: that closed by more than they were apart; moments weighed against the inertia of unstrained blocks; a dynamic step
-#: cut shorter once its cracks had grown; shears of a bond against each other, told of at the corners of their face; a
-#: ring of cracks that closed through the mouth they share.
+#: What once went wrong: a wing that left a face at less than 3°, a water table that ends where an edge does; bonds that
+#: break within a step, beside others that pull (the step was cut to a thousandth); a tip drawn back to the crack that
+#: it had come past, along it; a load that went back for tips which growth had not brought to rest; forces put beside
+#: where moments were taken from; parts that closed by more than they were apart; moments weighed against the inertia of
+#: unstrained blocks; a dynamic step cut shorter once its cracks had grown; shears of a bond against each other, told of
+#: at the corners of their face; a ring of cracks that closed through the mouth they share.
 MENDED = {
     0: "less than 3°", 1: "has no length", 10: "did not settle", 14: "less than 3°", 66: "dt = inf", 74: "balance",
     124: "time goes back", 145: "not inside the outline", 219: "overlap", 231: "balance", 268: "balance",
@@ -131,7 +131,8 @@ def test_many_slopes_are_right_or_say_why_not(seed):
 
 
 def test_a_block_strained_beyond_elasticity_is_told_of_and_ends_the_run(caplog):
-    """A warning as the strain passes a hundredth and whenever it has doubled, an error at a quarter; fixed blocks do not count."""
+    """A warning as the strain passes a hundredth and whenever it has doubled, an error at a quarter; fixed blocks do
+    not count."""
     blocks = Blocks.from_polygons([SQUARE - [0, 3], SQUARE], fixed=[True, False], names=["base", "rock"])
     watch = ElasticRange()
 

@@ -1,4 +1,5 @@
-"""Multipliers in contacts: the same forces and no penetration whatever the penalty, no creep, no energy from nowhere."""
+"""Multipliers in contacts: the same forces and no penetration whatever the penalty, no creep, no energy from
+nowhere."""
 
 from __future__ import annotations
 
@@ -68,7 +69,8 @@ def test_a_column_is_shortened_by_its_blocks_alone(ratio):
 
 @pytest.mark.parametrize("ratio", [1.0, 100.0])
 def test_a_block_that_sticks_does_not_creep(ratio):
-    # On 30°, pushed up and down the slope thirty times; rough enough for the upper contact, which carries least, to stick too.
+    # On 30°, pushed up and down the slope thirty times; rough enough for the upper contact, which carries least, to
+    # stick too.
     angle = np.radians(30)
     blocks = Blocks.from_polygons(
         [turned(rectangle(-5, -1, 5, 0), angle), turned(rectangle(0, 0, 1, 1), angle)], fixed=[True, False]

@@ -1,8 +1,8 @@
 """Meshes made for a target error: they reach it, and what solutions say of their own error is so.
 
-A battery of problems with weak and strong singularities, near tips and surfaces. References: closed forms where there are
-any, else a mesh of order 10 and elements graded for 1e-9 (1e-7 of K where no kink is sharp; checked below by the closed
-forms and published values that some of the problems have).
+A battery of problems with weak and strong singularities, near tips and surfaces. References: closed forms where there
+are any, else a mesh of order 10 and elements graded for 1e-9 (1e-7 of K where no kink is sharp; checked below by the
+closed forms and published values that some of the problems have).
 """
 
 import math
@@ -79,7 +79,8 @@ BATTERY = {
     "near a surface": ([rectangle(1, 1)], lines([[-0.4, 0.95], [0.4, 0.95]]), pull(1, 1)),
     "two slots": ([rectangle(0.03, 0.06)], lines(*two_cracks.crack_ends(0)), pull(0.03, 0.06)),
 }  # fmt: skip
-#: Grading ends at 1e-7 of the extent for round-off's sake; at sharp corners and kinks that is what is left of the error.
+#: Grading ends at 1e-7 of the extent for round-off's sake; at sharp corners and kinks that is what is left of the
+#: error.
 HARDEST = {"kink of 110": 2e-5, "short kink of 45": 1e-5, "re-entrant corner": 1e-4}
 
 
@@ -154,7 +155,8 @@ def test_a_crack_of_one_element_is_exact(order, nodes):
 
 @pytest.mark.parametrize(("order", "tolerance"), [(0, 0.1), (1, 0.04), (2, 3e-3), (3, 2e-4)])
 def test_low_orders_on_bodies(order, tolerance):
-    """Centre and edge crack, six elements a side: the error of constant, linear, … elements (boundary linear at least)."""
+    """Centre and edge crack, six elements a side: the error of constant, linear, … elements (boundary linear at
+    least)."""
     settings = DdmSettings(order=order)
     centre = ddm.Body([rectangle(1, 3)], lines([[-0.5, 0], [0.5, 0]]), ROCK, settings).solve(pull(1, 3))
     expected = fracture.CENTRE_CRACK_HALF[3.0] * fracture.griffith(1, 0.5)

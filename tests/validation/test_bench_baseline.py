@@ -1,7 +1,7 @@
 """The figures of benchmarks: errors that got worse than the stored ones are a failure, times are not looked at.
 
-`geomech bench accuracy dda schemes --quick --out tests/validation/bench_baseline.json` renews what is stored: only with a
-reason, and with the errors' change in view.
+`geomech bench accuracy dda schemes --quick --out tests/validation/bench_baseline.json` renews what is stored: only with
+a reason, and with the errors' change in view.
 """
 
 from __future__ import annotations

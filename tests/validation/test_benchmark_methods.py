@@ -1,4 +1,5 @@
-"""What `geomech bench ddm` compares with must itself be right: constant elements and finite elements on known problems."""
+"""What `geomech bench ddm` compares with must itself be right: constant elements and finite elements on known
+problems."""
 
 import numpy as np
 import pytest

@@ -45,8 +45,8 @@ def test_kirsch_hole_in_the_infinite_plane():
 
 
 def test_water_in_a_hole():
-    """Pressure that grows with depth has a resultant, the water's weight: far away the stress is Kelvin's, 5e-3 at twenty
-    radii (what is left falls like 1/r²)."""
+    """Pressure that grows with depth has a resultant, the water's weight: far away the stress is Kelvin's, 5e-3 at
+    twenty radii (what is left falls like 1/r²)."""
     hole = polygon(64)
     body = ddm.Body([], NONE, ROCK, holes=[hole])
     sol = body.solve(ddm.BodyLoad(hole_pressure=ddm.Pressure(0.0, (0.0, -9.81e3))))
@@ -91,8 +91,8 @@ def test_brazilian_disc_under_point_loads():
 
 @pytest.mark.parametrize("ratio", [0.3, 0.5])
 def test_three_point_bending(ratio):
-    """Span 4W under three point loads: twice the elements of order 6 change 1e-5. Srawley (1976), who states 0.5 %, is 0.5
-    and 0.7 % higher. Rollers of W/50 instead of two of the loads: 3e-3."""
+    """Span 4W under three point loads: twice the elements of order 6 change 1e-5. Srawley (1976), who states 0.5 %, is
+    0.5 and 0.7 % higher. Rollers of W/50 instead of two of the loads: 3e-3."""
     half, end = 2.0, 2.2
     beam = np.array([[-end, 0], [end, 0], [end, 1], [-end, 1]])
     crack = Cracks.from_polylines([np.array([[0.0, 0], [0.0, ratio]])], aperture=np.inf, surface=[(True, False)])
@@ -127,8 +127,8 @@ def test_cracks_from_a_pressurised_hole():
 
 
 def test_cantilever():
-    """Timoshenko & Goodier (1970), §21: P parabolic over the end, the root moved as the beam's own solution moves. Stress
-    and deflection are cubic, so all is round-off and the 1e-9 of functions."""
+    """Timoshenko & Goodier (1970), §21: P parabolic over the end, the root moved as the beam's own solution moves.
+    Stress and deflection are cubic, so all is round-off and the 1e-9 of functions."""
     length, c, load = 4.0, 0.5, 1e6
     inertia, e, nu = 2 * c**3 / 3, 10e9 / (1 - 0.25**2), 0.25 / 0.75
     g = e / (2 * (1 + nu))

@@ -1,4 +1,5 @@
-"""Closed cracks with kinks: no face can slip through one along itself, which makes slip less smooth than at an open kink."""
+"""Closed cracks with kinks: no face can slip through one along itself, which makes slip less smooth than at an open
+kink."""
 
 import math
 from dataclasses import replace
@@ -24,8 +25,8 @@ def kinked(degrees, ratio, longer=0.0):
 
 @pytest.mark.parametrize("ratio", [1.0, 0.1])
 def test_default_meshes_and_their_estimates(ratio):
-    """Against order 9 graded for 1e-7. Graded as open ones are, K of kinks by 5° to 45° was up to 1 % off, and the estimate a
-    thirtieth of the error; ungraded below 5° are 5e-4 at most."""
+    """Against order 9 graded for 1e-7. Graded as open ones are, K of kinks by 5° to 45° was up to 1 % off, and the
+    estimate a thirtieth of the error; ungraded below 5° are 5e-4 at most."""
     for degrees in (3, 6, 12, 19, 30, 45):
         cracks = kinked(degrees, ratio)
         for stress in (SHEARED, [-0.2, -1.0, -0.7]):
@@ -48,7 +49,8 @@ def slip_work(cracks, settings):
 
 
 def test_the_work_of_a_longer_kink_is_its_release_rate():
-    """dW/da = (K_I² + K_II²)/E' at the tip that moves: W knows nothing of how K is read. Central differences, 1e-3 of the kink."""
+    """dW/da = (K_I² + K_II²)/E' at the tip that moves: W knows nothing of how K is read. Central differences, 1e-3 of
+    the kink."""
     step = 2e-4
     (more, _), (less, _) = (slip_work(kinked(12, 0.1, way * step), FINE) for way in (0.5, -0.5))
     rate = (more - less) / step

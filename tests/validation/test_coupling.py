@@ -167,8 +167,8 @@ def test_a_crack_across_a_plate_in_tension_splits_it():
 
 
 def test_a_plate_with_a_hole_cracks_where_its_wall_reaches_the_strength():
-    """No crack is drawn: under rising tension two are born at the ends of the hole's diameter, within a load step of where the
-    crack solver alone has them born, and their growth parts the plate."""
+    """No crack is drawn: under rising tension two are born at the ends of the hole's diameter, within a load step of
+    where the crack solver alone has them born, and their growth parts the plate."""
     w, h, step = 0.05, 0.1, 0.05e6
     rock = Material("rock", 17e9, 0.21, 2200.0, 0.3e6, tensile_strength=3e6)
     angle = 2 * np.pi * (np.arange(32) + 0.5) / 32
@@ -200,8 +200,8 @@ def test_a_plate_with_a_hole_cracks_where_its_wall_reaches_the_strength():
 
 def test_friction_between_crack_faces_is_carried_through_loading_and_unloading():
     """A closed crack at 45° in a specimen that is pressed to 3 MPa and let go to 0.6 MPa: the blocks' run has K_II and
-    friction work of the crack solver alone under the same loads in turn (the blocks stand on their deformed geometry: 2e-4), and
-    more shear stays locked in than if it had only been pressed to 0.6 MPa."""
+    friction work of the crack solver alone under the same loads in turn (the blocks stand on their deformed geometry:
+    2e-4), and more shear stays locked in than if it had only been pressed to 0.6 MPa."""
     rough = JointLaw("rough", friction_angle=np.arctan(0.3))
     peak, end = -3e6, -0.6e6
     base = specimen(platens=False, cracks=[np.array([[-0.01, -0.01], [0.01, 0.01]])])

@@ -37,8 +37,9 @@ def test_closed_crack_with_friction(degrees, order, elements, tolerance):
 
 
 def test_cyclic_shear_makes_the_closed_forms_loop():
-    """Under pressure p and shear ±τ the faces slip when the shear has turned by twice the limit L = μp + c. K_II follows
-    the shear less ±L, and each cycle turns L · 4 (τ − L) · 2πa²/E' into heat (slip volume 2πa² τ/E' of shear τ)."""
+    """Under pressure p and shear ±τ the faces slip when the shear has turned by twice the limit L = μp + c. K_II
+    follows the shear less ±L, and each cycle turns L · 4 (τ − L) · 2πa²/E' into heat (slip volume 2πa² τ/E' of shear
+    τ)."""
     body = straight(0.0, ROUGH, order=4, elements=1)
     limit, top, modulus = FRICTION * 5e6 + COHESION, 8e6, ROCK.plane_modulus
     path = top * np.concatenate([np.linspace(0, 1, 5), np.linspace(1, -1, 9)[1:], np.linspace(-1, 1, 9)[1:]])
@@ -55,7 +56,8 @@ def test_cyclic_shear_makes_the_closed_forms_loop():
 
 
 def along(law, order, elements, remote, gradient):
-    """A crack from −1 to 1 under ``remote`` stress, and a fluid pressure that grows along it from zero in the middle."""
+    """A crack from −1 to 1 under ``remote`` stress, and a fluid pressure that grows along it from zero in the
+    middle."""
     settings = DdmSettings(order=order, elements_per_crack=elements)
     line = Cracks.from_polylines([np.array([[-1.0, 0.0], [1.0, 0.0]])])
     body = ddm.Body([], line, ROCK, settings, face_laws=(law,))
@@ -65,10 +67,10 @@ def along(law, order, elements, remote, gradient):
 
 @pytest.mark.parametrize(("order", "elements", "tolerance"), [(2, 16, 3e-4), (4, 16, 1e-4), (8, 16, 2e-5)])
 def test_crack_that_opens_or_slips_in_part(order, elements, tolerance):
-    """Under s₀ + g x the part of length 2b at the driven end moves, b such that its other end, which is no tip, has K = 0
-    (Bueckner 1958: K = √(πb)(s_m ± g b/2), s_m the stress at its middle): b = 2(s₀ + g a)/3g, and the tip has
-    K = g b √(πb). In mode II the same with s₀ + g x = τ − μ p(x). The end of contact falls between nodes, so the error is
-    one of them: higher orders gain less than for a crack that is open all along."""
+    """Under s₀ + g x the part of length 2b at the driven end moves, b such that its other end, which is no tip, has K =
+    0 (Bueckner 1958: K = √(πb)(s_m ± g b/2), s_m the stress at its middle): b = 2(s₀ + g a)/3g, and the tip has
+    K = g b √(πb). In mode II the same with s₀ + g x = τ − μ p(x). The end of contact falls between nodes, so the error
+    is one of them: higher orders gain less than for a crack that is open all along."""
     normal, gradient = -1.3e6, 4e6
     part = 2 * (normal + gradient) / (3 * gradient)
     sol = along(JointLaw("smooth"), order, elements, [0, normal, 0], gradient)
@@ -83,9 +85,10 @@ def test_crack_that_opens_or_slips_in_part(order, elements, tolerance):
 
 
 def bridged(stress, stiffness, terms=500):
-    """K of a crack of half-length 1 whose faces are held by springs (Pa/m) under ``stress`` all along, by another method:
-    with the opening Σ c_n sin nθ, x = cos θ, the springs' and the rock's traction are in equilibrium at so many points,
-    stress = E'/4 Σ n c_n sin nθ / sin θ + k Σ c_n sin nθ, and K = E'√π/4 Σ n c_n (5e-7 k/10 GPa off with 500 terms)."""
+    """K of a crack of half-length 1 whose faces are held by springs (Pa/m) under ``stress`` all along, by another
+    method: with the opening Σ c_n sin nθ, x = cos θ, the springs' and the rock's traction are in equilibrium at so many
+    points, stress = E'/4 Σ n c_n sin nθ / sin θ + k Σ c_n sin nθ, and K = E'√π/4 Σ n c_n (5e-7 k/10 GPa off with 500
+    terms)."""
     n, modulus = np.arange(1, terms + 1), ROCK.plane_modulus
     theta = n * math.pi / (terms + 1)
     waves = np.sin(np.outer(theta, n))
@@ -96,9 +99,9 @@ def bridged(stress, stiffness, terms=500):
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("stiffness", [1e9, 1e10, 1e11, 1e12])
 def test_filled_joint_embedded_in_rock(stiffness):
-    """Springs of k = 0.02 … 20 E'/a against sine series, and for the stiffest K = σ √(E'/2k), what a long joint tends to
-    because each piece of advance sets free σ²/2k (Rose 1987). Springs make the opening √r + r^{3/2} log r, of which tip
-    elements do not have the last: K is off by 0.007 k h/E' (order 8, h the tip element), of first order in h."""
+    """Springs of k = 0.02 … 20 E'/a against sine series, and for the stiffest K = σ √(E'/2k), what a long joint tends
+    to because each piece of advance sets free σ²/2k (Rose 1987). Springs make the opening √r + r^{3/2} log r, of which
+    tip elements do not have the last: K is off by 0.007 k h/E' (order 8, h the tip element), of first order in h."""
     filling = JointLaw("filling", math.radians(30), math.inf, math.inf, stiffness, stiffness)
     k, errors = bridged(1e6, stiffness), []
     for elements in (8, 16):
@@ -156,9 +159,9 @@ def winged_slot(wing_aperture, order=4, elements=4, layers=2):
 
 
 def test_wing_that_closes_on_itself():
-    """The first part of the wings is pressed shut and pries their tips open: K_I/σ√(πa) = 0.198, where a solution that lets
-    faces pass through each other finds −0.004, no growth at all. Held against other elements, graded deeper: p = 8, and
-    p = 1 in numbers (0.19785 and 0.19781)."""
+    """The first part of the wings is pressed shut and pries their tips open: K_I/σ√(πa) = 0.198, where a solution that
+    lets faces pass through each other finds −0.004, no growth at all. Held against other elements, graded deeper: p =
+    8, and p = 1 in numbers (0.19785 and 0.19781)."""
     root = math.sqrt(math.pi)
     k = winged_slot(0.0).tips["k_i"] / root
     states = winged_slot(0.0).states

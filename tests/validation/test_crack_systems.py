@@ -57,8 +57,8 @@ def test_stars(arms):
 @pytest.mark.parametrize("kink", [0.01, 0.2, 1.0])
 @pytest.mark.parametrize("degrees", [20.0, 45.0, 90.0])
 def test_kinked_crack(kink, degrees):
-    """Main crack 2, kink 0.01 to 1 of it long, in tension and in shear. Default settings: 2e-3 of σ√(πa). With the layers
-    of grading the error falls geometrically (by half a layer at 90°, faster at blunter kinks) to 2e-5 at ten."""
+    """Main crack 2, kink 0.01 to 1 of it long, in tension and in shear. Default settings: 2e-3 of σ√(πa). With the
+    layers of grading the error falls geometrically (by half a layer at 90°, faster at blunter kinks) to 2e-5 at ten."""
     angle = math.radians(degrees)
     crack = slots([[[-2, 0], [0, 0], [kink * math.cos(angle), kink * math.sin(angle)]]])
     for stress in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]):
@@ -72,7 +72,8 @@ def test_kinked_crack(kink, degrees):
 
 
 def test_parallel_cracks():
-    """Two equal ones above one another: they shield each other. Exponential convergence in the order, 1e-8 at p = 10."""
+    """Two equal ones above one another: they shield each other. Exponential convergence in the order, 1e-8 at p =
+    10."""
     for height in (0.25, 1.0):
         ends = [np.array([[-1, 0], [1, 0]]), np.array([[-1, height], [1, height]])]
         exact = crack_arrays.straight_cracks(ends, [0, 1, 0], n=129) / ROOT

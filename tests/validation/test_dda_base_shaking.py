@@ -97,8 +97,8 @@ def test_block_slides_on_a_shaken_base_as_newmark_says(case, frame, contact):
         + ", ".join(f"{e:.1e}" for e in errors)
         + f", order {order:.1f}"
     )
-    # Within a step in which it stops or turns about, the block's way is off by a dt² / 8 (1e-3 at dt = 2 ms where it turns
-    # about six times). On the level the record does that again and again after a few millimetres.
+    # Within a step in which it stops or turns about, the block's way is off by a dt² / 8 (1e-3 at dt = 2 ms where it
+    # turns about six times). On the level the record does that again and again after a few millimetres.
     assert errors[1] < {"El Centro on the level": 0.04, "El Centro on an incline": 0.02}.get(case, 1e-3)
     # There what is left at 10 ms is no more than at 2.5 ms, of turns within one step of the record: 2 % at both.
     assert order > 0.5 or (case == "El Centro on the level" and errors[0] < 0.03)

@@ -35,7 +35,8 @@ def swarm(
 
 
 def momenta(system: dda.BlockSystem, state: State) -> tuple[np.ndarray, float]:
-    """(momentum (2,), angular momentum about the origin) of the blocks' linear velocity fields, per metre of thickness."""
+    """(momentum (2,), angular momentum about the origin) of the blocks' linear velocity fields, per metre of
+    thickness."""
     blocks, v = system.blocks, state.velocity
     rows = block_moments(
         np.ascontiguousarray(state.vertices), np.ascontiguousarray(blocks.next_vertex),

@@ -1,4 +1,5 @@
-"""Statics found by themselves: where blocks come to rest, that they do not where none can, and how many steps it takes."""
+"""Statics found by themselves: where blocks come to rest, that they do not where none can, and how many steps it
+takes."""
 
 from __future__ import annotations
 

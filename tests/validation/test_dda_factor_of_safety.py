@@ -41,7 +41,8 @@ SLAB = 2600 * GRAVITY * 2 * 4 * np.cos(DIP)
 @pytest.mark.parametrize("friction_deg", [20, 40, 60])
 @pytest.mark.parametrize(("penalty", "time_step"), [(None, None), (5e10, 0.3), (5e13, 0.01)])
 def test_plane_failure_with_friction_to_round_off(friction_deg, penalty, time_step):
-    """tan φ / tan α, whatever the penalty and the step: what is out of balance is A − B/F exactly, and two trials give it."""
+    """tan φ / tan α, whatever the penalty and the step: what is out of balance is A − B/F exactly, and two trials give
+    it."""
     found = slab(JointLaw("plane", np.radians(friction_deg)), penalty, time_step=time_step)
     expected = rock_slopes.plane_failure_factor(SLAB, DIP, 4.0, 0.0, np.radians(friction_deg))
     print(f"φ = {friction_deg}°: {found.factor:.10f}, should be {expected:.10f}")
@@ -116,7 +117,8 @@ def test_two_blocks_on_a_bilinear_plane(steep_deg, flat_deg, smooth):
 
 def test_a_column_glued_to_an_incline_topples():
     # Held by the tensile strength σt at the upper edge of its base (Navier), where its weight pulls by
-    # W (3 h sin α / b − cos α)/b: F = σt b / [W (3 h sin α / b − cos α)]. Brittle: no drift points at it, bisection does.
+    # W (3 h sin α / b − cos α)/b: F = σt b / [W (3 h sin α / b − cos α)]. Brittle: no drift points at it, bisection
+    # does.
     dip, width, height, strength = np.radians(25), 1.0, 4.0, 200e3
     polygons = [turned(rectangle(-3, -2, 8, 0), dip), turned(rectangle(2, 0, 2 + width, height), dip)]
     blocks = Blocks.from_polygons(polygons, fixed=[True, False])
@@ -128,8 +130,8 @@ def test_a_column_glued_to_an_incline_topples():
 
 
 def test_toppling_slope_of_goodman_and_bray():
-    # Their limit friction is 0.7855. Coulomb friction leaves the way to it open: weakened step by step the slope goes at
-    # 0.788, with its weight put on at once at 0.783.
+    # Their limit friction is 0.7855. Coulomb friction leaves the way to it open: weakened step by step the slope goes
+    # at 0.788, with its weight put on at once at 0.783.
     blocks = Blocks.from_polygons(toppling_slope.polygons(), fixed=[True] + [False] * 16)
     found = dda.factor_of_safety(
         blocks, [Material("rock", 1e12, 0.25, density=2500.0)], [JointLaw("joint", np.arctan(1.0))],

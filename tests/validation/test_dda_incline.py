@@ -1,4 +1,5 @@
-"""Blocks on an incline: held to the friction angle, sliding, stacked, toppling; `geomech.reference.block_on_incline`."""
+"""Blocks on an incline: held to the friction angle, sliding, stacked, toppling;
+`geomech.reference.block_on_incline`."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ def travel(system, state) -> float:
 @pytest.mark.parametrize("dt", STEPS)
 @pytest.mark.parametrize("excess_deg", [1e-4, 0.1, 5.0])
 def test_a_block_at_rest_stays_to_the_friction_angle_at_every_step(dt, excess_deg):
-    # From static equilibrium: 1e-4° above the incline is 3.5e-6 of tan φ. Nothing moves beyond the round-off of coordinates.
+    # From static equilibrium: 1e-4° above the incline is 3.5e-6 of tan φ. Nothing moves beyond the round-off of
+    # coordinates.
     system = block_on_slope(30 + excess_deg)
     state = settled(system)
     end = march(system, state, WEIGHT, 60 * dt, dt)
@@ -79,8 +81,8 @@ def test_sliding_is_right_at_any_step_and_any_penalty():
 
 
 def test_a_block_pushed_up_the_incline_comes_to_rest_and_stays():
-    # Up the slope friction and weight both stop it: v²/(2g (sin α + cos α tan φ)); then 35° holds it on 30°. It lands on its elastic shear:
-    # a micrometre or a few, 1e-4 of the way, whatever dt.
+    # Up the slope friction and weight both stop it: v²/(2g (sin α + cos α tan φ)); then 35° holds it on 30°. It lands
+    # on its elastic shear: a micrometre or a few, 1e-4 of the way, whatever dt.
     expected = 1.0 / (2 * GRAVITY * (np.sin(SLOPE) + np.cos(SLOPE) * np.tan(np.radians(35))))
     errors = []
     for dt in (4e-3, 1e-3, 2.5e-4):
@@ -127,8 +129,8 @@ def column(slenderness: float, friction: float):
 
 
 def start(slenderness: float, friction: float) -> tuple[float, float]:
-    """(toe's acceleration down the slope, angular acceleration) of a column in the first 50 ms, taken in one step on the
-    geometry at rest, so that nothing has tilted yet."""
+    """(toe's acceleration down the slope, angular acceleration) of a column in the first 50 ms, taken in one step on
+    the geometry at rest, so that nothing has tilted yet."""
     system, dt = column(slenderness, friction), 0.05
     state = system.step(State.at_rest(system.blocks), WEIGHT, dt).state
     toe = (state.vertices - system.blocks.vertices)[4] @ DOWN
@@ -144,7 +146,8 @@ def test_sliding_toppling_map():
             got = start(slenderness, friction)
             worst = max(worst, abs(got[0] - toe) / GRAVITY, abs(got[1] - spin) / GRAVITY)
     print(f"largest difference of starting accelerations over the map: {worst:.1e} g")
-    # Elastic shortening, W/E' ≤ 0.3 µm, over ½ g dt² = 12 mm; the rotation of a column b wide is b times more sensitive.
+    # Elastic shortening, W/E' ≤ 0.3 µm, over ½ g dt² = 12 mm; the rotation of a column b wide is b times more
+    # sensitive.
     assert worst < 2e-3
 
 

@@ -171,5 +171,6 @@ def test_a_voussoir_beam_snaps_through_where_its_arch_is_too_flat():
         stands, falls, last = (trial, falls, found) if found else (stands, trial, last)
     arm = 1 - 2 / 3 * masonry.voussoir_contact(span, 1.0)
     print(f"snaps through at {stands:.3f} of its weight, having sagged {last[1] / arm:.3f} of its arm; 0.423 in theory")
-    # The arm that he counts from shrinks with n, which grows with the load; the last 1 % of it brings a tenth of the sag.
+    # The arm that he counts from shrinks with n, which grows with the load; the last 1 % of it brings a tenth of the
+    # sag.
     assert last[1] / arm == pytest.approx(masonry.SNAP_THROUGH_SAG, rel=0.25)

@@ -33,8 +33,8 @@ DIP = np.radians(35)
 
 
 def slab(law: JointLaw) -> dda.BlockSystem:
-    """A slab 4 m along a plane that dips 35°, 2 m high; its sides are upright, so that its weight passes the middle of its
-    base and presses both ends alike."""
+    """A slab 4 m along a plane that dips 35°, 2 m high; its sides are upright, so that its weight passes the middle of
+    its base and presses both ends alike."""
     along, up = np.array([np.cos(DIP), np.sin(DIP)]), np.array([0.0, 2.0])
     block = np.array([0 * along, 4 * along, 4 * along + up, up])
     return system_of(
@@ -69,8 +69,9 @@ def test_plane_failure_by_strength_reduction(cohesion):
 
 @pytest.mark.parametrize("depth", [0.6, 1.2, 1.8])
 def test_plane_failure_with_water_in_the_plane_and_behind(depth):
-    """Water stands ``depth`` deep in a tension crack behind the slab and drains along the plane to the toe, where it comes
-    out: V = ½ γw z², U = ½ γw z A (Hoek & Bray 1981). The piezometric line is straight from the crack to the toe."""
+    """Water stands ``depth`` deep in a tension crack behind the slab and drains along the plane to the toe, where it
+    comes out: V = ½ γw z², U = ½ γw z A (Hoek & Bray 1981). The piezometric line is straight from the crack to the
+    toe."""
     weight = 2600 * GRAVITY * 2 * 4 * np.cos(DIP)
     toe, heel = np.zeros(2), 4 * np.array([np.cos(DIP), np.sin(DIP)])
     water = WaterTable(np.array([toe, heel + [0.0, depth]]), unit_weight=9810.0)
@@ -100,8 +101,8 @@ def test_two_blocks_on_a_bilinear_plane(steep_deg, flat_deg, interface_deg):
     steep, flat = np.radians(steep_deg), np.radians(flat_deg)
     width, height = 4.0, 6.0
     rear, toe = width * np.tan(steep), -width * np.tan(flat)
-    # Motion to the left: toe of the passive block at x = −width, kink at the origin, back of the active one at +width. The
-    # active block's corner is cut off, or the flat plane would stop it as it goes down the steep one.
+    # Motion to the left: toe of the passive block at x = −width, kink at the origin, back of the active one at +width.
+    # The active block's corner is cut off, or the flat plane would stop it as it goes down the steep one.
     cut = 0.5
     active = np.array(
         [[cut, cut * np.tan(steep)], [width, rear], [width, rear + 1.0], [0, height], [0, 2 * cut * np.tan(steep)]]
@@ -177,7 +178,8 @@ def test_toppling_slope_limit_friction(youngs_modulus):
 
 @pytest.mark.parametrize("friction", [0.77, 0.78])
 def test_toppling_slope_just_below_its_limit_is_told_to_go(friction):
-    # Its columns lean, meet and lean on for metres, in ever shorter steps, before one of them has gone a tenth of the slope.
+    # Its columns lean, meet and lean on for metres, in ever shorter steps, before one of them has gone a tenth of the
+    # slope.
     system = toppling(friction)
     found = dda.equilibrium(system, State.at_rest(system.blocks), TOPPLING_WEIGHT)
     print(f"tan φ = {friction}: {found.reason}; {len(found.history)} steps")

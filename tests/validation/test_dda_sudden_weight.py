@@ -42,8 +42,8 @@ def travel(system, state, down) -> float:
 
 @pytest.mark.parametrize("dt", [0.1, 0.01, 1e-3, 5e-4, 1e-4, 5e-5, 2e-5, 1e-5])
 def test_the_block_holds_still_at_every_step(dt):
-    # With the default damping. While it vibrates it slips once or twice, by the size of its elastic shortening, W/E' ≈ 2 µm;
-    # ten periods later (1 ms each) it stands still: a hundredth of a micrometre in as long again.
+    # With the default damping. While it vibrates it slips once or twice, by the size of its elastic shortening, W/E' ≈
+    # 2 µm; ten periods later (1 ms each) it stands still: a hundredth of a micrometre in as long again.
     system, state, down = on_an_incline()
     half = max(1e-2, 30 * dt)
     state = marched(system, state, half, dt)
@@ -55,9 +55,9 @@ def test_the_block_holds_still_at_every_step(dt):
 
 
 def test_creep_of_a_block_that_is_hardly_damped_is_that_of_independent_integration():
-    # At 5 % of critical damping the vibration goes on, fed by the slip itself, and the block creeps by millimetres a second
-    # although its friction would hold it at rest: friction is lost whenever the normal force is. That is no error of the step:
-    # it tends to the explicit integration, with the first order of the scheme.
+    # At 5 % of critical damping the vibration goes on, fed by the slip itself, and the block creeps by millimetres a
+    # second although its friction would hold it at rest: friction is lost whenever the normal force is. That is no
+    # error of the step: it tends to the explicit integration, with the first order of the scheme.
     end, modulus = 5e-3, ROCK.plane_modulus
     expected = creep_of_a_sudden_weight(
         end, 5e-7, 1, INCLINE, FRICTION, 0.05, PENALTY_RATIO * modulus, 10e9, 0.25, DENSITY, GRAVITY

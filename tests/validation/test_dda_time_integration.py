@@ -91,7 +91,8 @@ def test_the_alpha_scheme_damps_short_waves_and_not_long_ones():
 
 @pytest.mark.parametrize(("name", "decay_order"), [("Shi", 1), ("trapezoidal", None), ("damped", 1)])
 def test_decay_and_period_of_a_block_on_a_joint_have_their_orders(name, decay_order):
-    """The joint is the spring. Measured over five periods, held against λ of the scheme, and the orders of its errors."""
+    """The joint is the spring. Measured over five periods, held against λ of the scheme, and the orders of its
+    errors."""
     newmark = SCHEMES[name]
     found = []
     for n in (20, 40, 80):
@@ -234,7 +235,8 @@ def test_angular_momentum_in_free_flight_is_kept_to_round_off(name):
 
 
 def test_stress_turns_with_the_block_whatever_the_axes():
-    """Objectivity: the same spinning, vibrating block drawn at another angle has the same history, turned by that angle."""
+    """Objectivity: the same spinning, vibrating block drawn at another angle has the same history, turned by that
+    angle."""
     polygon = np.array([[0, 0], [2, 0.2], [1.6, 1.1], [0.3, 0.9]])
     angle = 0.7
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

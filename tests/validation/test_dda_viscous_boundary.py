@@ -1,4 +1,5 @@
-"""Edges that absorb waves: a pulse along a row of blocks, its echo at a viscous, a free and a fixed end; a braked block."""
+"""Edges that absorb waves: a pulse along a row of blocks, its echo at a viscous, a free and a fixed end; a braked
+block."""
 
 from __future__ import annotations
 
@@ -33,8 +34,8 @@ def row(newmark, *, last_fixed=False, penalty=None) -> dda.BlockSystem:
 
 
 def wave(system: dda.BlockSystem, dt: float, right: bool) -> tuple[np.ndarray, np.ndarray, dda.EnergyBudget]:
-    """Time (n,) in units of a block's transit, speed (n,) at the row's middle over that of the pulse that enters on the left,
-    and the energy budget."""
+    """Time (n,) in units of a block's transit, speed (n,) at the row's middle over that of the pulse that enters on the
+    left, and the energy budget."""
     t = np.linspace(0, PULSE / SPEED, 401)
     pulse = History(t, np.stack([1e-3 * np.sin(np.pi * t * SPEED / PULSE) ** 2, 0 * t], axis=1))
     quiet = (ViscousBoundary("left", pulse), *([ViscousBoundary("right")] if right else []))
@@ -55,8 +56,8 @@ def echo(times: np.ndarray, speeds: np.ndarray) -> float:
 
 def test_a_pulse_goes_in_along_and_out():
     times, speeds, budget = wave(row((0.25, 0.5)), 2e-4, right=True)
-    # The wave that the left edge lets in is the one asked for, at the speed of P-waves in the rock: springs between blocks,
-    # 1/80 of a block's compliance E' each, slow it by 0.7 %.
+    # The wave that the left edge lets in is the one asked for, at the speed of P-waves in the rock: springs between
+    # blocks, 1/80 of a block's compliance E' each, slow it by 0.7 %.
     assert speeds.max() == pytest.approx(1.0, abs=2e-3)
     arrival = times[speeds.argmax()] - 0.5 * PULSE
     assert arrival == pytest.approx((BLOCKS / 2 + 0.5) * 1.007, abs=0.25)

@@ -34,7 +34,8 @@ def struck(system: dda.BlockSystem, speed: np.ndarray, strain_rate: np.ndarray |
 
 @pytest.mark.parametrize("mode", [1, 10, 20, 30, 39])
 def test_standing_waves_have_the_frequencies_of_the_chain(mode):
-    # u ∝ cos q(k+½)h and e ∝ sin q(k+½)h are modes of a row with free ends. The trapezoidal rule makes tan(ω'dt/2) = ω dt/2.
+    # u ∝ cos q(k+½)h and e ∝ sin q(k+½)h are modes of a row with free ends. The trapezoidal rule makes tan(ω'dt/2) = ω
+    # dt/2.
     n = 40
     q = mode * np.pi / n
     omega = exact.dispersion(np.array([q]), *CHAIN)[0, 0]
@@ -73,8 +74,8 @@ def test_a_pulse_runs_and_comes_back_from_the_end(fixed_end):
     got = state.velocity[-n:, 0]
     assert got == pytest.approx(velocity[::2], abs=2e-9)
     assert moved(system, state)[-n:, 0] == pytest.approx(displacement[::2], abs=2e-6 * np.abs(displacement).max())
-    # Against the continuum, d'Alembert: at a free end velocity comes back as it went, at a fixed one reversed. (The left
-    # half, reflected at the free left end, has met it there.)
+    # Against the continuum, d'Alembert: at a free end velocity comes back as it went, at a fixed one reversed. (The
+    # left half, reflected at the free left end, has met it there.)
     travelled = speed * end
 
     def half(x0):

@@ -20,8 +20,8 @@ def solution(order, elements=4):
 
 
 def exact(points, side=1.0):
-    """On the crack's line the reference gives the upper face, so the lower one is the mirror image's upper one, in which
-    shear turns its sign."""
+    """On the crack's line the reference gives the upper face, so the lower one is the mirror image's upper one, in
+    which shear turns its sign."""
     if side > 0:
         return crack_fields.griffith_field(points, 1.0, REMOTE, ROCK.shear_modulus, ROCK.poissons_ratio)
     mirror = REMOTE * [1, 1, -1]
@@ -31,8 +31,8 @@ def exact(points, side=1.0):
 
 @pytest.mark.parametrize(("order", "tolerance"), [(4, 4e-5), (6, 4e-7), (8, 1e-8)])
 def test_about_a_tip_at_any_distance(order, tolerance):
-    """Relative to the stress there, a few times the error of K at its order (2e-5 and 3e-9 seen at p = 4 and 8), from 1e-9 to 1e3
-    crack lengths: the √r of tip elements holds at any distance."""
+    """Relative to the stress there, a few times the error of K at its order (2e-5 and 3e-9 seen at p = 4 and 8), from
+    1e-9 to 1e3 crack lengths: the √r of tip elements holds at any distance."""
     sol = solution(order)
     for r in (1e-9, 1e-7, 1e-5, 1e-3, 0.03, 0.3, 3.0, 30.0, 1e3):
         angle = np.linspace(-math.pi, math.pi, 24)[1:-1]
@@ -66,8 +66,8 @@ def test_on_either_face():
 
 @pytest.mark.parametrize(("order", "tolerance"), [(4, 3e-3), (8, 5e-5)])
 def test_beside_inner_ends_of_elements(order, tolerance):
-    """Where elements go straight on the field passes through their ends as it should; with a point moved aside instead it
-    was 3e-2 off at every order."""
+    """Where elements go straight on the field passes through their ends as it should; with a point moved aside instead
+    it was 3e-2 off at every order."""
     sol = solution(order)
     assert 0.5 in sol.body.faces.start[:, 0]
     for side in (1.0, -1.0):

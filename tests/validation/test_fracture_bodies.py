@@ -101,8 +101,8 @@ def test_remote_stress_on_a_body_is_tractions_on_its_boundary():
 
 
 def test_remote_stress_leaves_holes_free():
-    """As in the infinite plane: it is the tractions on the outline, and K of a crack beside the hole is theirs. The crack is
-    added afterwards as well, as growth does."""
+    """As in the infinite plane: it is the tractions on the outline, and K of a crack beside the hole is theirs. The
+    crack is added afterwards as well, as growth does."""
     hole = 0.3 * np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
     stress, cracks = np.array([1.0, 2.0, 0.5]), line([0.45, -0.1], [0.7, 0.2], aperture=OPEN)
     load = ddm.BodyLoad(remote_stress=stress)
@@ -149,7 +149,8 @@ def test_block_under_its_own_weight_on_a_base_pressure():
 
 
 def test_crack_in_a_heavy_block_feels_the_local_stress():
-    """A short vertical stress gradient over a small horizontal slot: K_I = σ_yy √(πa) at its depth, 1e-3 for a/W = 0.02."""
+    """A short vertical stress gradient over a small horizontal slot: K_I = σ_yy √(πa) at its depth, 1e-3 for a/W =
+    0.02."""
     weight = 2600 * 9.81
     load = ddm.BodyLoad(segments=[[[-1, -1], [1, -1]]], tractions=[[[0, 2 * weight]] * 2], body_force=[0, -weight])
     sol = ddm.Body([rectangle(1, 1)], line([-0.02, 0.2], [0.02, 0.2], aperture=OPEN), ROCK).solve(load)
@@ -202,8 +203,8 @@ def test_partly_loaded_sides_transmit_their_resultant():
 @pytest.mark.parametrize(("order", "tolerance"), [(4, 1e-4), (8, 1e-5)])
 @pytest.mark.parametrize("half", [0.01, 0.1, 0.3])
 def test_a_short_load_between_nodes_of_a_side_transmits_its_force(half, order, tolerance):
-    """Beside it the elements are as long as its own: mirror images, of which what is singular at the load's ends cancels.
-    Measured 4e-5 and 4e-6 at most; beside longer neighbours it was 3e-3 and 1e-3."""
+    """Beside it the elements are as long as its own: mirror images, of which what is singular at the load's ends
+    cancels. Measured 4e-5 and 4e-6 at most; beside longer neighbours it was 3e-3 and 1e-3."""
     outline = np.array([[-2, -1], [2, -1], [2, 1], [half, 1], [-half, 1], [-2, 1]], dtype=float)
     load = ddm.BodyLoad(sides={3: (0.0, -1.0), 0: (0.0, half / 2)})
     sol = ddm.Body([outline], Cracks.from_polylines([]), ROCK, DdmSettings(order=order)).solve(load)
@@ -213,7 +214,8 @@ def test_a_short_load_between_nodes_of_a_side_transmits_its_force(half, order, t
 
 @pytest.mark.parametrize("off", [1e-7, 1e-3, 0.02, 0.05, 0.1, 0.2, 0.33, 0.4])
 def test_k_does_not_depend_on_where_a_load_ends_on_an_element(off):
-    """Default mesh against order 8 and four times the elements, the load ending anywhere on them: 5e-4 (2e-6 at an end)."""
+    """Default mesh against order 8 and four times the elements, the load ending anywhere on them: 5e-4 (2e-6 at an
+    end)."""
     square, crack = rectangle(1, 1), line([-0.3, 0], [0.3, 0.1], aperture=OPEN)
     y = 1 - off
     load = ddm.BodyLoad([[[-y, -1], [y, -1]], [[y, 1], [-y, 1]]], [[[0, -1.0]] * 2, [[0, 1.0]] * 2])
@@ -223,8 +225,8 @@ def test_k_does_not_depend_on_where_a_load_ends_on_an_element(off):
 
 
 def test_crack_across_a_bending_stress_closes_by_a_third():
-    """Frictionless contact with an unknown edge: closure point and K_I in closed form. The plate is 40 crack lengths wide;
-    the closure point is known to a node's spacing, K_I to 1 %."""
+    """Frictionless contact with an unknown edge: closure point and K_I in closed form. The plate is 40 crack lengths
+    wide; the closure point is known to a node's spacing, K_I to 1 %."""
     w = 20.0
     load = ddm.BodyLoad(
         segments=[[[-w, -w], [w, -w]], [[w, w], [-w, w]]],

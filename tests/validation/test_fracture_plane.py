@@ -97,7 +97,8 @@ def test_three_armed_star():
 
 
 def test_arc_converges_with_first_order():
-    """A polyline through the arc has the wrong tip direction by O(1/n): halving with each doubling is the order there is."""
+    """A polyline through the arc has the wrong tip direction by O(1/n): halving with each doubling is the order there
+    is."""
     exact = fracture.circular_arc(1.0, 1.0, math.pi / 4)
     errors = []
     for n in (10, 20, 40):

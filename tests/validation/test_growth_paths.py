@@ -36,8 +36,9 @@ def grown(cracks, load, increment, length, loops=(), **settings):
 
 @pytest.mark.parametrize("beta", [15, 30, 45, 60, 75])
 def test_first_angle_of_a_slanted_crack_in_tension(beta):
-    """Erdogan & Sih (1963): sin θ + cot β (3 cos θ − 1) = 0 at β from the pull, solved here by bisection. The factors of a
-    straight crack are right to 4e-5 (p = 4), the angles by as much; as one element it is exact, and so are they."""
+    """Erdogan & Sih (1963): sin θ + cot β (3 cos θ − 1) = 0 at β from the pull, solved here by bisection. The factors
+    of a straight crack are right to 4e-5 (p = 4), the angles by as much; as one element it is exact, and so are
+    they."""
     cot = 1 / math.tan(math.radians(beta))
     root = brentq(lambda t: math.sin(t) + cot * (3 * math.cos(t) - 1), 1e-9 - math.acos(1 / 3), -1e-9, xtol=1e-14)
     (step,) = grown(slanted(90 - beta), TENSION, 1e-3, 0, correct=False)
@@ -48,9 +49,9 @@ def test_first_angle_of_a_slanted_crack_in_tension(beta):
 
 @pytest.mark.parametrize(("degrees", "load", "aperture"), [(60, TENSION, math.inf), (45, COMPRESSION, 0.0)])
 def test_paths_do_not_depend_on_the_increment(degrees, load, aperture):
-    """How far the end of a 16 mm wing moves when the increment is halved from 8 to 0.5 mm (printed with ``-s``), without bends
-    to 1 mm; in compression the crack and parts of its wings are closed. Bent steps are of order 3/2 at least; 2e-5 m is
-    0.1 % of the path."""
+    """How far the end of a 16 mm wing moves when the increment is halved from 8 to 0.5 mm (printed with ``-s``),
+    without bends to 1 mm; in compression the crack and parts of its wings are closed. Bent steps are of order 3/2 at
+    least; 2e-5 m is 0.1 % of the path."""
     moves = {}
     for correct in (True, False):
         ends = [
@@ -76,8 +77,9 @@ def test_wings_of_a_closed_crack_start_at_the_hoop_stress_angle():
 
 @pytest.mark.parametrize("ratio", [0.3, 1.0, 3.0])
 def test_straight_wings_of_a_closed_crack(ratio):
-    """Horii & Nemat-Nasser (1986), an approximation: wings along the load at a closed crack of 45°. It is 5 to 8 % above
-    what is solved here, for all lengths; solutions of order 8 with six graded layers agree with these to 0.2 %."""
+    """Horii & Nemat-Nasser (1986), an approximation: wings along the load at a closed crack of 45°. It is 5 to 8 %
+    above what is solved here, for all lengths; solutions of order 8 with six graded layers agree with these to 0.2
+    %."""
     end = HALF / math.sqrt(2) * np.ones(2)
     wing = np.array([0.0, ratio * HALF])
     cracks = Cracks.from_polylines([np.array([-end - wing, -end, end, end + wing])])
@@ -107,9 +109,9 @@ def test_wings_release_the_energy_that_their_factors_say():
 
 @pytest.mark.parametrize("degrees", [20, 45, 70])
 def test_the_first_increment_has_the_factors_of_a_kink(degrees):
-    """As growth makes it: one element in default grading, a hundredth of the half-length, no stress along the crack, against
-    the expansion of Amestoy & Leblond (1992) for a kink of no length. The next term of K is of the order of the kink's
-    ratio, 1e-2."""
+    """As growth makes it: one element in default grading, a hundredth of the half-length, no stress along the crack,
+    against the expansion of Amestoy & Leblond (1992) for a kink of no length. The next term of K is of the order of the
+    kink's ratio, 1e-2."""
     theta, ratio = math.radians(degrees), 0.01
     kink = [HALF + ratio * HALF * math.cos(theta), ratio * HALF * math.sin(theta)]
     cracks = Cracks.from_polylines([[[-HALF, 0], [HALF, 0], kink]], aperture=math.inf)
@@ -126,9 +128,10 @@ def test_the_first_increment_has_the_factors_of_a_kink(degrees):
 
 
 def test_two_edge_cracks_pass_and_hook_around_each_other():
-    """Parallel edge cracks from opposite sides, offset across the pull: their paths first turn away from one another, pass,
-    and then turn in and close the eye between them (as Melin 1983 explains and many photographs show). The pair is its own
-    image by half a turn, and stays so; the place after 24 mm moves by less than 0.1 mm when the increment is halved."""
+    """Parallel edge cracks from opposite sides, offset across the pull: their paths first turn away from one another,
+    pass, and then turn in and close the eye between them (as Melin 1983 explains and many photographs show). The pair
+    is its own image by half a turn, and stays so; the place after 24 mm moves by less than 0.1 mm when the increment is
+    halved."""
     half, high, offset, length = 0.05, 0.1, 0.01, 0.03
     plate = np.array([[-half, -high], [half, -high], [half, high], [-half, high]])
     line = np.array([[-half, offset / 2], [length - half, offset / 2]])

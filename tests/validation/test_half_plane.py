@@ -1,4 +1,5 @@
-"""The half-plane: cracks at, near and up to a free surface that has no elements, holes, weight and point loads below it."""
+"""The half-plane: cracks at, near and up to a free surface that has no elements, holes, weight and point loads below
+it."""
 
 import math
 from itertools import pairwise
@@ -63,8 +64,8 @@ def test_target_error(target):
 
 @pytest.mark.parametrize("angle_deg", [30.0, 60.0, 120.0])
 def test_slanted_edge_crack(angle_deg):
-    """Against distributed dislocations, which share nothing with displacement discontinuities. Mouths that are not upright
-    are singular; 1e-6 is asked for."""
+    """Against distributed dislocations, which share nothing with displacement discontinuities. Mouths that are not
+    upright are singular; 1e-6 is asked for."""
     a = math.radians(-angle_deg)
     tip = np.array([math.cos(a), math.sin(a)])
     arms = [Arm(0j, complex(*tip), start_is_tip=False, open=True)]
@@ -93,8 +94,9 @@ def test_pressurised_crack_parallel_to_the_surface(depth):
 
 
 def test_thin_cover_is_a_beam():
-    """The cover of a pressurised crack is a clamped beam with the edge moment M = p L²/12, which gives K = √6 M d^(−3/2) and
-    K_I/K_II = tan 52.07° (Hutchinson & Suo 1992, § IV), up to terms of d/L (2.5 % at 0.01), which are extrapolated away."""
+    """The cover of a pressurised crack is a clamped beam with the edge moment M = p L²/12, which gives K = √6 M
+    d^(−3/2) and K_I/K_II = tan 52.07° (Hutchinson & Suo 1992, § IV), up to terms of d/L (2.5 % at 0.01), which are
+    extrapolated away."""
     ratio, size = [], []
     for depth in (0.02, 0.01):
         k_i, k_ii = np.abs(
@@ -142,8 +144,8 @@ def circle(n, centre, radius=1.0):
 
 
 def test_shallow_tunnel_by_series():
-    """The reference itself: Jeffery's (1920) closed forms of a pressurised hole, on the surface and on the wall, to round-off; under
-    weight a wall without traction and terms enough; Kirsch's hole in the deep."""
+    """The reference itself: Jeffery's (1920) closed forms of a pressurised hole, on the surface and on the wall, to
+    round-off; under weight a wall without traction and terms enough; Kirsch's hole in the deep."""
     x, angle = np.linspace(-3, 3, 7), np.linspace(0.1, 3.0, 6)
     for depth in (1.25, 2.0, 5.0):
         found = shallow_tunnel.stress(np.column_stack([x, 0 * x]), depth, pressure=1.0)
@@ -163,9 +165,9 @@ def test_shallow_tunnel_by_series():
 
 @pytest.mark.parametrize("loads", ["pressure", "tension", "weight"])
 def test_tunnel_near_the_surface(loads):
-    """A hole a quarter of its radius, and one radius, below the surface: the stress on the surface and about it against the series
-    (Mindlin 1940; Jeffery 1920). Excavating takes the weight of what was in it, so that Poisson's ratio counts. The polygon's
-    error is second order or better."""
+    """A hole a quarter of its radius, and one radius, below the surface: the stress on the surface and about it against
+    the series (Mindlin 1940; Jeffery 1920). Excavating takes the weight of what was in it, so that Poisson's ratio
+    counts. The polygon's error is second order or better."""
     rock = Material("rock", youngs_modulus=40e9, poissons_ratio=0.4)
     load, known = {
         "pressure": (ddm.BodyLoad(hole_pressure=1.0), {"pressure": 1.0}),
@@ -294,8 +296,8 @@ def test_pressure_on_the_surface(half_plane):
 
 
 def test_sizes_offsets_and_poissons_ratios():
-    """From 1 mm to 10 km, at 1e7 m from the origin (where coordinates end at 2e-9 m) and nearly incompressible: K/√size stays,
-    to round-off or what coordinates leave."""
+    """From 1 mm to 10 km, at 1e7 m from the origin (where coordinates end at 2e-9 m) and nearly incompressible: K/√size
+    stays, to round-off or what coordinates leave."""
     exact = None
     for scale, shift, poisson, tolerance in (
         (1, 0, 0.25, 0), (1e-3, 0, 0.25, 1e-12), (1e4, 0, 0.25, 1e-12), (1, 1e7, 0.25, 1e-5), (1, 0, 0.499, 1e-12)
@@ -315,7 +317,8 @@ def test_sizes_offsets_and_poissons_ratios():
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])
 def test_a_tip_that_nearly_reaches_the_surface(gap):
-    """Default settings against a mesh for 1e-5; what is left to break grows by much, the far tip is as that of an edge crack."""
+    """Default settings against a mesh for 1e-5; what is left to break grows by much, the far tip is as that of an edge
+    crack."""
     ends, load = ((0, -gap), (0, -1 - gap)), ddm.BodyLoad(remote_stress=[1, 0, 0])
     k = factors(body(slot(*ends), 4).solve(load))[:, 0]
     fine = factors(ddm.solve_to([], slot(*ends), ROCK, load, 1e-5, half_plane=SURFACE))[:, 0]
@@ -325,8 +328,8 @@ def test_a_tip_that_nearly_reaches_the_surface(gap):
 
 
 def test_closed_faces_below_the_surface():
-    """A joint that dips 60° slips in ground with K0 = 0.2: faces shut and rub, K_I is zero, and the traction on them obeys
-    Coulomb. So deep that the surface is far, K_II is that of the plane in the local stress, with its gradient."""
+    """A joint that dips 60° slips in ground with K0 = 0.2: faces shut and rub, K_I is zero, and the traction on them
+    obeys Coulomb. So deep that the surface is far, K_II is that of the plane in the local stress, with its gradient."""
     weight, k0, depth = 2.5e4, 0.2, 400.0
     law = JointLaw("faces", friction_angle=math.radians(25))
     way = np.array([math.cos(math.radians(60)), -math.sin(math.radians(60))])
@@ -344,7 +347,8 @@ def test_closed_faces_below_the_surface():
 
 
 def test_crack_grows_up_to_the_surface():
-    """A pressurised crack below the surface turns up and daylights; what is unchanged is reused to the bit of a fresh body."""
+    """A pressurised crack below the surface turns up and daylights; what is unchanged is reused to the bit of a fresh
+    body."""
     crack = Cracks.from_polylines([np.array([[-1.0, -0.8], [1.0, -0.8]])])
     growth = GrowthSettings(increment=0.15, min_increment=0.15)
     steps = list(
@@ -367,8 +371,8 @@ def test_crack_grows_up_to_the_surface():
 
 
 def test_all_loads_together():
-    """Weight, remote stress, fluid in cracks and hole, a footing, point loads: the surface and the hole's wall bear what they
-    are to bear, and K is the same as a functional of the loads."""
+    """Weight, remote stress, fluid in cracks and hole, a footing, point loads: the surface and the hole's wall bear
+    what they are to bear, and K is the same as a functional of the loads."""
     hole = circle(24, (0.0, -2.0), 0.7)
     cracks = Cracks.from_polylines(
         [np.array([[1.5, 0.0], [1.2, -0.8]]), np.array([[-1.5, -1.0], [-2.0, -2.0]])],
@@ -405,8 +409,8 @@ def test_energy_release_rate():
 
 
 def test_a_crack_is_born_at_the_surface():
-    """Above a pressurised crack the cover bends up: it tears from the surface, in the middle, at the load at which the stress
-    there is the strength, and straight down."""
+    """Above a pressurised crack the cover bends up: it tears from the surface, in the middle, at the load at which the
+    stress there is the strength, and straight down."""
     rock = Material("rock", youngs_modulus=40e9, poissons_ratio=0.25, k_ic=1e9, tensile_strength=2e6)
     crack = Cracks.from_polylines([np.array([[-1.0, -0.5], [1.0, -0.5]])])
     growth = GrowthSettings(increment=0.05, min_increment=0.05, initiation="surface")
@@ -423,7 +427,8 @@ def test_a_crack_is_born_at_the_surface():
 
 
 def test_many_cracks_are_iterated_on():
-    """A hundred cracks that shield and feel each other and the surface: the compressed operator against the dense matrix."""
+    """A hundred cracks that shield and feel each other and the surface: the compressed operator against the dense
+    matrix."""
     lines = [line - [0.0, 21.0] for line in crack_arrays.random_cracks(100, spacing=2.0)]
     cracks = Cracks.from_polylines(lines, aperture=math.inf)
     load = ddm.BodyLoad(remote_stress=[1, 0, 0])

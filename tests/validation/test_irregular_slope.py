@@ -1,4 +1,5 @@
-"""A slope cut by two irregular joint sets, from its scene: the slab on the steeper bedding decides, as in limit equilibrium."""
+"""A slope cut by two irregular joint sets, from its scene: the slab on the steeper bedding decides, as in limit
+equilibrium."""
 
 from __future__ import annotations
 
@@ -59,7 +60,8 @@ def slope(tmp_path):
 
 
 def test_sudden_weight_on_irregular_blocks_settles_without_cutting_the_step(slope):
-    """77 blocks and some 480 contacts, many of them corners that meet corners; friction 40° lets none of the slabs go."""
+    """77 blocks and some 480 contacts, many of them corners that meet corners; friction 40° lets none of the slabs
+    go."""
     rough = [replace(joint, friction_angle=math.radians(40)) for joint in slope.joints]
     system = dda.BlockSystem(
         slope.blocks, slope.materials, rough, slope.joint_index, replace(slope.dda, dynamic_factor=0.0, time_step=0.01)

@@ -31,9 +31,9 @@ SEAT = rectangle(-1, -0.5, 2, 0)
 def direct_shear(
     law: JointLaw, pressure=1e6, travel=0.02, n=100, wall=None, back=False, seat=SEAT, contact="penalty", seen=None
 ):
-    """A 1 m block pressed on a joint and pushed along it by a heavy ram of constant speed, against a frictionless ``wall``
-    (Pa/m) above it if one is given; a second ram pushes it ``back`` by as much in as many steps more. ``seat`` is the polygon
-    below the joint; ``seen``, a list, gets the joint's contacts.
+    """A 1 m block pressed on a joint and pushed along it by a heavy ram of constant speed, against a frictionless
+    ``wall`` (Pa/m) above it if one is given; a second ram pushes it ``back`` by as much in as many steps more. ``seat``
+    is the polygon below the joint; ``seen``, a list, gets the joint's contacts.
 
     Per step: shear and normal force N, slip, wear, lift, gap m; and the mean of the iterations.
     """
@@ -148,8 +148,8 @@ def test_direct_shear_with_dilation_up_to_a_critical_slip(wall):
     (shear, normal, slip, _, lift, gap), _ = direct_shear(law, wall=wall)
     assert lift == pytest.approx(slope * np.minimum(slip, 8e-3), rel=1e-7)
     assert shear == pytest.approx(math.tan(ANGLE) * normal, rel=1e-8)
-    # The wall is pressed by the lift less the closure of the joint's own springs, N/k. The block's inertia, though light,
-    # is a millionth of the load.
+    # The wall is pressed by the lift less the closure of the joint's own springs, N/k. The block's inertia, though
+    # light, is a millionth of the load.
     wall = wall or 0.0
     assert normal == pytest.approx((1e6 + wall * lift) / (1 + wall / PENALTY), rel=2e-6)
     assert gap == pytest.approx(-normal / PENALTY, rel=1e-6)
@@ -255,8 +255,8 @@ def test_hyperbolic_closure():
 
 
 def test_plane_failure_with_residual_strength():
-    # A slab on 35°: held by its peak while (cA + W cos α tan φ) / (W sin α) > 1 (Hoek & Bray 1981); once broken, it slides
-    # at g sin α − g cos α tan φr − cr A/m.
+    # A slab on 35°: held by its peak while (cA + W cos α tan φ) / (W sin α) > 1 (Hoek & Bray 1981); once broken, it
+    # slides at g sin α − g cos α tan φr − cr A/m.
     slope, gravity = math.radians(35), 9.81
     mass = 2600.0 * 10 * 0.1
     turn = np.array([[math.cos(slope), math.sin(slope)], [-math.sin(slope), math.cos(slope)]])

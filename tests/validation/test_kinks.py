@@ -56,8 +56,8 @@ def factors(degrees, ratio, stress, **settings):
 
 @pytest.mark.parametrize("ratio", [1.0, 0.1, 0.01])
 def test_kinks_are_graded_for_one_error_whatever_their_turn(ratio):
-    """Default mesh against distributed dislocations: 5e-4 is what it is graded for, and two layers more quarter that, but for
-    the short arm that is as long as an element of the long one. (Two layers for all turns: 3e-3 at 60°.)"""
+    """Default mesh against distributed dislocations: 5e-4 is what it is graded for, and two layers more quarter that,
+    but for the short arm that is as long as an element of the long one. (Two layers for all turns: 3e-3 at 60°.)"""
     worst, finer = 0.0, 0.0
     for degrees in (10, 20, 30, 45, 60, 75, 90, 100, 110, 120):
         for stress in REMOTE:
@@ -73,7 +73,8 @@ def test_kinks_are_graded_for_one_error_whatever_their_turn(ratio):
 
 @pytest.mark.parametrize("degrees", [135, 150, 160, 168])
 def test_folds_are_right_to_a_thousandth(degrees):
-    """Against order 9 on a mesh graded finely, which itself agrees with order 10 to 2e-6; dislocations do not resolve a fold."""
+    """Against order 9 on a mesh graded finely, which itself agrees with order 10 to 2e-6; dislocations do not resolve a
+    fold."""
     for ratio in (1.0, 0.1):
         for stress in REMOTE:
             fine = factors(degrees, ratio, stress, order=9, grading_layers=9)

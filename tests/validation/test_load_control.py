@@ -1,4 +1,5 @@
-"""Loads that follow the cracks, and platens that are moved: load, displacement and energy at every increment of growth."""
+"""Loads that follow the cracks, and platens that are moved: load, displacement and energy at every increment of
+growth."""
 
 import numpy as np
 import pytest
@@ -32,7 +33,8 @@ def rectangle(x0, y0, x1, y1):
 
 
 def pulled(half_height, half_length, increment, control):
-    """A plate 2W wide with a crack across its middle, glued between two stiff platens of which the upper is moved up."""
+    """A plate 2W wide with a crack across its middle, glued between two stiff platens of which the upper is moved
+    up."""
     w, h = W, half_height
     polygons = [rectangle(-w, -h, w, h), rectangle(-w, h, w, h + 0.01), rectangle(-w, -h - 0.01, w, -h)]
     names = [[[""] * 4], [["", "", "load:top", ""]], [[""] * 4]]
@@ -60,7 +62,8 @@ def k_alone(blocks, cracks):
 
 
 def grown(problem):
-    """Half-length m, tension Pa and displacement m of the platen in every cycle in which the crack grew, and the load step."""
+    """Half-length m, tension Pa and displacement m of the platen in every cycle in which the crack grew, and the load
+    step."""
     rows = []
     for cycle in cycles(problem):
         if len(cycle.tips) and cycle.tips["grown"].any():
@@ -69,15 +72,16 @@ def grown(problem):
 
 
 def released(tension, displacement):
-    """Energy, J/m, that the plate has given up between one increment and the next: the triangle between the two lines from
-    no load to (displacement, load) of a plate that is linear between them."""
+    """Energy, J/m, that the plate has given up between one increment and the next: the triangle between the two lines
+    from no load to (displacement, load) of a plate that is linear between them."""
     force = 2 * W * tension
     return 0.5 * (force[:-1] * displacement[1:] - force[1:] * displacement[:-1])
 
 
 def test_the_load_that_follows_a_crack_across_a_tall_plate():
-    """At every increment σ = K_Ic/(F √(πa)), with F by boundary collocation; elements of order 4 keep 2e-5 of K. The load falls
-    all the way, and the platen goes back: under a displacement that only rises the crack would run through."""
+    """At every increment σ = K_Ic/(F √(πa)), with F by boundary collocation; elements of order 4 keep 2e-5 of K. The
+    load falls all the way, and the platen goes back: under a displacement that only rises the crack would run
+    through."""
     length, tension, displacement, _ = grown(pulled(3 * W, 0.1 * W, 0.2 * W, "toughness"))
     ratio, factor = np.array(list(CENTRE_CRACK_PLATE[3.0].items())).T
     expected = ROCK.k_ic / (factor * np.sqrt(np.pi * ratio * W))
@@ -88,8 +92,9 @@ def test_the_load_that_follows_a_crack_across_a_tall_plate():
 
 @pytest.mark.parametrize("increment", [2e-3, 1e-3])
 def test_a_load_that_follows_the_crack_releases_its_fracture_energy(increment):
-    """A short plate: the displacement falls (snap-back), then rises. Work less stored energy is K_Ic²/E' a metre of crack at each
-    of two tips, of second order in the increment (0.86 % and 0.21 % are found); K is that of the crack solver alone."""
+    """A short plate: the displacement falls (snap-back), then rises. Work less stored energy is K_Ic²/E' a metre of
+    crack at each of two tips, of second order in the increment (0.86 % and 0.21 % are found); K is that of the crack
+    solver alone."""
     problem = pulled(0.02, 8e-3, increment, "toughness")
     length, tension, displacement, _ = grown(problem)
     early = length < 24e-3
@@ -104,15 +109,16 @@ def test_a_load_that_follows_the_crack_releases_its_fracture_energy(increment):
 
 
 def test_a_platen_that_is_moved_makes_the_crack_run_stop_and_go_on():
-    """The same plate under a displacement that only rises. The crack runs at one displacement, past where a load that follows
-    it would have come back to that displacement, and stops; from then on it grows a step at a time, at the same loads and
-    displacements as under the load that follows it."""
+    """The same plate under a displacement that only rises. The crack runs at one displacement, past where a load that
+    follows it would have come back to that displacement, and stops; from then on it grows a step at a time, at the same
+    loads and displacements as under the load that follows it."""
     increment = 2e-3
     follow = grown(pulled(0.02, 8e-3, increment, "toughness"))
     length, tension, displacement, step = grown(pulled(0.02, 8e-3, increment, "load"))
     burst = step == step[0]
     assert np.ptp(displacement[burst]) == 0 and tension[burst][0] == pytest.approx(follow[1][0], rel=1e-6)
-    # It stops at the first length that needs more displacement than it has: from there on its energy release is too small.
+    # It stops at the first length that needs more displacement than it has: from there on its energy release is too
+    # small.
     first_stable = np.flatnonzero((follow[2] > follow[2][0]) & (follow[0] > follow[0][0]))[0]
     stopped = length[~burst][0]
     assert stopped == pytest.approx(follow[0][first_stable], abs=1e-9)
@@ -124,8 +130,8 @@ def test_a_platen_that_is_moved_makes_the_crack_run_stop_and_go_on():
 
 
 def test_the_coupled_run_grows_cracks_as_the_crack_solver_alone():
-    """Two cracks under compression, load and path of `ddm.propagate` with control "toughness": four increments, the load going
-    up and down. Loads agree to what the search leaves (1e-6), paths to what that moves them by."""
+    """Two cracks under compression, load and path of `ddm.propagate` with control "toughness": four increments, the
+    load going up and down. Loads agree to what the search leaves (1e-6), paths to what that moves them by."""
     w, h = 0.03, 0.06
     ends = (("load:top", -0.2e6), ("load:bottom", 0.2e6))
     growth = GrowthSettings(increment=2e-3)

@@ -18,8 +18,8 @@ def solved(ends, stress, order=4, aperture=0.0, pressure=0.0):
 
 
 def test_a_long_row_becomes_the_periodic_one():
-    """The middle one of N cracks in a row, 9/10 of it cracked: as 1/N to Irwin's formula, within 5e-6 of it when extrapolated
-    from 25 to 201 cracks, the last ones 17 000 unknowns (from 51 to 401: 4e-7)."""
+    """The middle one of N cracks in a row, 9/10 of it cracked: as 1/N to Irwin's formula, within 5e-6 of it when
+    extrapolated from 25 to 201 cracks, the last ones 17 000 unknowns (from 51 to 401: 4e-7)."""
     half, period = 0.45, 1.0
     exact = crack_arrays.collinear_array(1.0, half, period)
     sizes, found = np.array([25, 51, 101, 201]), []
@@ -63,7 +63,8 @@ def test_hundreds_of_closed_cracks_settle():
 
 @pytest.mark.slow
 def test_twenty_thousand_unknowns():
-    """529 cracks of lengths 1 : 6, 21 000 unknowns: seconds, a few percent of the dense matrix, K as with higher order."""
+    """529 cracks of lengths 1 : 6, 21 000 unknowns: seconds, a few percent of the dense matrix, K as with higher
+    order."""
     ends = crack_arrays.cracks_in_cells(23)
     start = time.perf_counter()
     sol = solved(ends, [0.3, 1.0, 0.2], aperture=np.inf)

@@ -32,9 +32,9 @@ def turns(beta):
 
 
 def test_slanted_cracks_start_where_they_were_seen_to():
-    """Erdogan & Sih (1963), six means of measured angles. The largest hoop stress and the local minimum of S come within
-    1.3° of them on average, the energy release rate, which turns farther, within 2.2°: less than single cracks scatter. The
-    sheet's width changes the angles by less than 0.8°."""
+    """Erdogan & Sih (1963), six means of measured angles. The largest hoop stress and the local minimum of S come
+    within 1.3° of them on average, the energy release rate, which turns farther, within 2.2°: less than single cracks
+    scatter. The sheet's width changes the angles by less than 0.8°."""
     found = {beta: turns(beta) for beta in plates.MEASURED_TURN}
     names = list(next(iter(found.values())))
     print("\n  β   measured   plane (mts)  " + "".join(f"{name:>8}" for name in names))

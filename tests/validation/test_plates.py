@@ -95,7 +95,8 @@ def test_three_point_bending(ratio):
     assert k == pytest.approx(exact, rel=1.2e-2)
 
 
-#: Degrees between crack and load at which a crack of a/R = 0.5 is in pure shear (the root of `brazilian_disc.atkinson`'s N_I).
+#: Degrees between crack and load at which a crack of a/R = 0.5 is in pure shear (the root of
+#: `brazilian_disc.atkinson`'s N_I).
 PURE_SHEAR = 22.891084
 
 

@@ -22,8 +22,8 @@ def griffith_error(stress=(0, 1.0, 0), **settings):
 
 
 def test_shape_functions_are_the_published_ones():
-    """The quadratic element in the usual form (Crouch & Starfield 1983): N_1 = ξ(ξ − 2)/8, N_2 = −(ξ² − 4)/4, N_3 = ξ(ξ + 2)/8 with nodes at −2, 0
-    and 2, ξ in sub-element half lengths; the tip element carries √r, r√r and r²√r."""
+    """The quadratic element in the usual form (Crouch & Starfield 1983): N_1 = ξ(ξ − 2)/8, N_2 = −(ξ² − 4)/4, N_3 = ξ(ξ
+    + 2)/8 with nodes at −2, 0 and 2, ξ in sub-element half lengths; the tip element carries √r, r√r and r²√r."""
     xi = np.linspace(-3, 3, 13)
     published = np.column_stack([xi * (xi - 2) / 8, -(xi**2 - 4) / 4, xi * (xi + 2) / 8])
     assert np.allclose(shapes.at("equal", 2, shapes.ORDINARY, xi / 3), published, atol=1e-14)

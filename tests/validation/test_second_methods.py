@@ -53,7 +53,8 @@ def test_dislocations_in_a_junction_converge():
 
 @pytest.mark.parametrize("degrees", [20, 45, 90])
 def test_dislocations_of_a_short_kink_tend_to_the_published_limit(degrees):
-    """Amestoy & Leblond (1992): the kink of length s sees F·K + O(√s); extrapolated from s and s/4 it is 1e-3 at 1e-4."""
+    """Amestoy & Leblond (1992): the kink of length s sees F·K + O(√s); extrapolated from s and s/4 it is 1e-3 at
+    1e-4."""
     angle, f = math.radians(degrees), kink_factors(math.radians(degrees))
     for column, stress in enumerate(([1.0, 1.0, 0.0], [0.0, 0.0, 1.0])):
         k = [branched.kinked(2.0, s, angle, stress)[1] / math.sqrt(math.pi) for s in (4e-4, 1e-4)]
@@ -61,15 +62,16 @@ def test_dislocations_of_a_short_kink_tend_to_the_published_limit(degrees):
 
 
 def test_stack_of_cracks():
-    """Long cracks above one another: √(h/2) (1e-7 at h = a/2); far apart: a single one (the pull of its neighbours falls
-    like (a/h)², 0.3 % left)."""
+    """Long cracks above one another: √(h/2) (1e-7 at h = a/2); far apart: a single one (the pull of its neighbours
+    falls like (a/h)², 0.3 % left)."""
     assert crack_arrays.stacked_array(1.0, 0.5) == pytest.approx(crack_arrays.stacked_array_limit(1.0, 0.5), rel=1e-6)
     assert crack_arrays.stacked_array(1.0, 40.0) == pytest.approx(math.sqrt(math.pi), rel=5e-3)
 
 
 def test_brazilian_disc_against_its_series():
-    """The series of Atkinson, Smelser & Sanchez (1982) with factors by boundary collocation against dislocations in the whole
-    field: 1e-6 with ten terms (of the order of (a/R)^20 are left out); with their five what they leave out, of order (a/R)^10."""
+    """The series of Atkinson, Smelser & Sanchez (1982) with factors by boundary collocation against dislocations in the
+    whole field: 1e-6 with ten terms (of the order of (a/R)^20 are left out); with their five what they leave out, of
+    order (a/R)^10."""
     for ratio in (0.2, 0.4):
         for angle in (0.0, 0.1, 0.3, 0.5, 0.9, 1.3):
             found = np.abs(brazilian_disc.normalised(brazilian_disc.central_crack(ratio, angle), ratio))
@@ -79,9 +81,9 @@ def test_brazilian_disc_against_its_series():
 
 
 def test_factors_of_powers_in_a_disc():
-    """T_i and S_i by two methods that share nothing, boundary collocation and dislocations: 1e-10. In a large disc they are those
-    of the plane, (2j)!/(4^j j!²); T_1, T_2 and S_1 of a/R = 0.3 as Atkinson, Smelser & Sanchez (1982) are quoted: to their digits
-    (T_2 is quoted 2e-5 off)."""
+    """T_i and S_i by two methods that share nothing, boundary collocation and dislocations: 1e-10. In a large disc they
+    are those of the plane, (2j)!/(4^j j!²); T_1, T_2 and S_1 of a/R = 0.3 as Atkinson, Smelser & Sanchez (1982) are
+    quoted: to their digits (T_2 is quoted 2e-5 off)."""
     for ratio in (0.3, 0.5, 0.7):
         found = brazilian_disc.power_factors(ratio, 4)
         for column in (0, 1):
@@ -110,8 +112,8 @@ def test_brazilian_disc_with_a_small_crack():
 
 @pytest.mark.parametrize("cracks", [1, 2])
 def test_cracks_from_a_hole_against_bowie(cracks):
-    """Bowie's mapping was cut after few terms, and his factors are known by a fit: they differ by up to 2.3 % at 0.1 < L/R < 5.
-    The polynomial in use for one crack agrees to 2.5e-3. Both limits of ours are exact:
+    """Bowie's mapping was cut after few terms, and his factors are known by a fit: they differ by up to 2.3 % at 0.1 <
+    L/R < 5. The polynomial in use for one crack agrees to 2.5e-3. Both limits of ours are exact:
     3 · 1.1215 for short cracks, and a crack as long as hole and cracks together for long ones."""
     for ratio in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
         found = cracked_hole.factor(ratio, cracks, [0.0, 1.0, 0.0])
