@@ -26,6 +26,7 @@ from .cracked_blocks import CrackedBlocks
 from .elastic_range import ElasticRange
 from .event_steps import SETTLED, TOGETHER, EventSteps
 from .growing import births, growth_of_tips, initiations, part_here, take_growth
+from .load_balance import LoadBalance
 from .record import event, record
 from .tips_in_time import TipsInTime
 
@@ -84,7 +85,7 @@ class Coupling:
         #: What the growth that ended the last load step brought, where the load follows the cracks.
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
-        self.range = ElasticRange()
+        self.range, self.balance = ElasticRange(), LoadBalance()
         self.under_way: UnderWay | None = None
         self.between: Callable[[], None] = _go_on
 
@@ -169,7 +170,8 @@ class Coupling:
                 return True
             result, solutions = found.result, found.solutions
             if now.bodies:
-                self.range.check(now.motion(result.state), now.blocks, result.state.time)
+                strain = self.range.check(now.motion(result.state), now.blocks, result.state.time)
+                self.balance.check(now.loads, now.blocks, strain, result.state.time)
             if static:
                 # The passes of a step share its load, also when one of them has to take a shorter step.
                 load_time = result.state.time

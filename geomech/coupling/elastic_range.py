@@ -23,8 +23,9 @@ class ElasticRange:
     def __init__(self) -> None:
         self.told = 0.5 * BEYOND
 
-    def check(self, motion: Motion, blocks: Blocks, time: float) -> None:
-        """Log a warning that names the block, where the strain is large. Raises `dda.NotConverged` beyond `REFUSED`."""
+    def check(self, motion: Motion, blocks: Blocks, time: float) -> float:
+        """The largest strain; logs a warning that names the block, where it is large. Raises `dda.NotConverged` beyond
+        `REFUSED`."""
         gradient = motion.gradient
         strain = 0.5 * np.abs(gradient.transpose(0, 2, 1) @ gradient - np.eye(2)).max(axis=(1, 2))
         strain[blocks.fixed] = 0.0
@@ -41,3 +42,4 @@ class ElasticRange:
                 "t = %g s: %s is strained by %.3g %%, beyond the elastic range of rock: what its cracks do is a guess",
                 time, name, 100 * most,
             )  # fmt: skip
+        return most
