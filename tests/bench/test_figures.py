@@ -48,7 +48,7 @@ def test_every_part_s_time_and_the_whole_are_told(one_topic, capsys):
     assert set(rows) == {"many", "kernels", "all"}
     spent = json.loads((one_topic / "outputs/bench/figures.json").read_text())["spent"]
     # The system counts a process's time in hundredths of a second.
-    assert min(took["of processor"] for took in spent.values()) >= 0.01
+    assert min(took["of processor"] for took in spent.values()) > 0.009
     assert rows["all"] == pytest.approx(sum(took["of processor"] for took in spent.values()), abs=0.06)
 
 
