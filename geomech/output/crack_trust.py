@@ -11,16 +11,23 @@ from geomech.model import Cycle
 
 #: Bodies whose K are solved for on a finer mesh, those with the hardest driven tips: as much work again as they took.
 ESTIMATED = 10
+#: Residuals below this are round-off, of which the last digits follow from where arrays happen to lie in memory.
+ROUND_OFF = 1e-12
 _log = logging.getLogger(__name__)
 
 
+def _three_digits(number: float) -> float:
+    """More of an estimate means nothing, and a run that is gone on with is to tell the same."""
+    return float(f"{number:.2e}")
+
+
 def crack_trust(cycle: Cycle) -> dict[str, Any]:
-    """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction,
-    ``condition`` of the equations, and the estimated error of K relative to the largest K of its block, with the block
+    """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction
+    (at least `ROUND_OFF`), ``condition`` of the equations, and the estimated error of K relative to the largest K of its block, with the block
     it is of."""
     told: dict[str, Any] = {
-        "residual": max(float(body.residual) for body in cycle.bodies.values()),
-        "condition": max(float(body.condition) for body in cycle.bodies.values()),
+        "residual": _three_digits(max(ROUND_OFF, *(float(body.residual) for body in cycle.bodies.values()))),
+        "condition": _three_digits(max(float(body.condition) for body in cycle.bodies.values())),
     }
     drive = {b: float(cycle.tips["k_eq"][cycle.tips["block"] == b].max(initial=0.0)) for b in cycle.bodies}
     for block in sorted(drive, key=lambda b: (-drive[b], b))[:ESTIMATED]:
@@ -35,4 +42,6 @@ def crack_trust(cycle: Cycle) -> dict[str, Any]:
             continue
         if error > told.get("k_error", -1.0):
             told["k_error"], told["k_error_block"] = error, cycle.blocks.names[block]
+    if "k_error" in told:
+        told["k_error"] = _three_digits(told["k_error"])
     return told

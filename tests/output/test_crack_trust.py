@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import TIP, Cracks, DdmSettings, Material
-from geomech.output.crack_trust import crack_trust
+from geomech.output.crack_trust import ROUND_OFF, crack_trust
 
 SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]])
 
@@ -28,8 +28,8 @@ def cycle(bodies):
 def test_the_worst_block_is_told():
     coarse, fine = solved(0.5, order=1, elements_per_side=2), solved(0.3, order=6)
     told = crack_trust(cycle({1: coarse, 2: fine}))
-    assert told["residual"] == max(coarse.residual, fine.residual)
-    assert told["condition"] == max(coarse.condition, fine.condition)
+    assert max(coarse.residual, fine.residual) < told["residual"] == ROUND_OFF
+    assert told["condition"] == pytest.approx(max(coarse.condition, fine.condition), rel=5e-3)  # three digits
     assert told["k_error_block"] == "left"
     off = abs(coarse.tips["k_i"] / solved(0.5, order=8).tips["k_i"] - 1).max()
     assert 0.5 * off < told["k_error"] < 4 * off
@@ -46,5 +46,5 @@ def test_what_has_no_estimate_is_left_out():
     told = crack_trust(cycle({1: other, 2: fine}))
     assert told["residual"] == 1e-3 and told["condition"] == 1e9
     assert told["k_error_block"] == "right" and told["k_error"] == pytest.approx(
-        fine.tip_errors.max() / fine.tips["k_i"].max()
+        fine.tip_errors.max() / fine.tips["k_i"].max(), rel=5e-3
     )
