@@ -16,7 +16,7 @@ DIP, PLANE = np.radians(22.0), "plane"
 #: The shaking begins, s: before that the slope takes its weight.
 SHAKEN = 0.5
 #: The mean of jointed rock that also leans, turns and breaks, beside a rigid block: 15 % more in whole blocks of the
-#: variant "short", 26 % more where bridges break, 20 % in a thousand whole blocks.
+#: variant "short", 18 % more where bridges break, 20 % in a thousand whole blocks.
 SIMILAR = 0.35
 #: Until the base is first shaken beyond the yield acceleration, friction holds: the mean sways by no more than this
 #: part of the slip.
