@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..reference.base_shaking import sliding_block
 from ..reference.block_motion import column_shortening
 from . import block_scenes
 from .block_scenes import GRAVITY, ROCK, WEIGHT
-from .figures import Measured, stopwatch
+from .figures import Measured, Point, stopwatch
 
 #: Where the picture and the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_schemes")
@@ -35,17 +35,6 @@ SCHEMES = {
     AUGMENTED: {"contact": "augmented"},
 }
 METHODS = tuple(SCHEMES)
-
-
-@dataclass(frozen=True)
-class Point:
-    """``size`` is what was varied: the time step, s, or the penalty over Young's modulus."""
-
-    problem: str
-    method: str
-    size: float
-    error: float
-    seconds: float
 
 
 def measure(quick: bool = False) -> Measured:

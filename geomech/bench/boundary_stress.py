@@ -13,7 +13,7 @@ down.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ import numpy as np
 from ..model import Cycle, DdmSettings, Problem
 from ..output.summary import write_json
 from ..reference.two_cracks import PHI_DEG
-from .figures import Measured, stopwatch
+from .figures import Measured, Point, stopwatch
 
 #: Where the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_boundary")
@@ -93,17 +93,6 @@ def errors(phi_deg: int, stress: float) -> dict[str, list[float]]:
         out[route] = (np.abs(factors(last.tips) - reference).max(axis=1) / size).tolist()
     out[NO_BLOCK] = (np.abs(without_block(problem, last) - reference).max(axis=1) / size).tolist()
     return out
-
-
-@dataclass(frozen=True)
-class Point:
-    """``size`` is the order of the elements, ``error`` the larger of both modes'."""
-
-    problem: str
-    method: str
-    size: int
-    error: float
-    seconds: float
 
 
 def by_order(phi_deg: int, orders: Sequence[int] = (2, 3, 4, 6)) -> list[Point]:

@@ -37,6 +37,18 @@ PACKAGES = ("geomech", "numpy", "scipy", "numba", "shapely", "gmsh", "vtk", "pyv
 
 
 @dataclass(frozen=True)
+class Point:
+    """A point of a work–precision curve: the ``error`` (relative) and ``seconds`` of a ``method`` for a ``problem``, at
+    that ``size`` of what is varied."""
+
+    problem: str
+    method: str
+    size: float
+    error: float
+    seconds: float
+
+
+@dataclass(frozen=True)
 class Figure:
     """``name`` is one of a kind within its topic; ``value`` is finite and ≥ 0."""
 

@@ -7,11 +7,10 @@ events find the load itself, whatever the longest step.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 from ..output.summary import write_json
-from .figures import Measured, stopwatch
+from .figures import Measured, Point, stopwatch
 
 #: Where the numbers go, below the working folder.
 FOLDER = Path("outputs/bench_steps")
@@ -21,17 +20,6 @@ VARIANT = "phi_0"
 FIXED_STEPS, EVENTS, LEAST = "fixed steps", "from event to event", 1e-6
 #: Fixed steps, s (0.2 MPa each); longest steps from event to event, s (None: as long as blocks may move in one).
 FIXED, LONGEST = (16.0, 8.0, 4.0, 2.0, 1.0), (None, 20.0, 5.0)
-
-
-@dataclass(frozen=True)
-class Point:
-    """``size`` is the step, s; nan: as long as it may be."""
-
-    problem: str
-    method: str
-    size: float
-    error: float
-    seconds: float
 
 
 def of_run(overrides: list[str], repeats: int) -> dict:

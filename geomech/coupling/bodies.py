@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -169,17 +169,7 @@ def threads_for(bodies: dict[int, Body]) -> int | None:
 
 
 #: What of a `BoundaryLoad` is a load.
-_ASKED = (
-    "segments",
-    "tractions",
-    "body_force",
-    "body_force_gradient",
-    "about",
-    "remote_stress",
-    "points",
-    "forces",
-    "kelvin",
-)
+_ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name != "imbalance")
 
 
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:

@@ -36,8 +36,8 @@ class ContactSet:
     wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they
                                have to come nearer than the geometry says to meet)
     stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact
-                               does not
-                count yet: what multipliers have left of it, and what given motion makes of it in the step
+                               does not count yet: what multipliers have left of it, and what given motion makes of it
+                               in the step
     inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
     unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than
                          at the corners

@@ -23,8 +23,8 @@ def _three_digits(number: float) -> float:
 
 def crack_trust(cycle: Cycle) -> dict[str, Any]:
     """The worst over the cracked blocks of ``cycle``: ``residual`` of equilibrium relative to the largest traction
-    (at least `ROUND_OFF`), ``condition`` of the equations, and the estimated error of K relative to the largest K of its block, with the block
-    it is of."""
+    (at least `ROUND_OFF`), ``condition`` of the equations, and the estimated error of K relative to the largest K of
+    its block, with the block it is of."""
     told: dict[str, Any] = {
         "residual": _three_digits(max(ROUND_OFF, *(float(body.residual) for body in cycle.bodies.values()))),
         "condition": _three_digits(max(float(body.condition) for body in cycle.bodies.values())),

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geomech.conventions import VTK_STRESS
+from geomech.model import CHANGES
 
 
 @dataclass(frozen=True)
@@ -177,7 +178,7 @@ REACTIONS: dict[str, str] = {
 
 #: Columns of ``events.csv``.
 EVENTS: dict[str, str] = {
-    "kind": "initiation, coalescence, daylighting, split, arrest, failure …; opening, parting, closure, slip, sliding, stick, debonding",
+    "kind": f"initiation, coalescence, daylighting, split, arrest, failure …; {', '.join(CHANGES)}",
     "cycle": "-",
     "time": "s",
     "load": "Pa",
