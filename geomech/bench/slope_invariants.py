@@ -10,7 +10,7 @@ import numpy as np
 from .. import dda
 from ..dda.energy import GAIN
 from ..dda.overlap import REFUSED, deepest_overlap
-from ..ddm.validity import inside
+from ..ddm.rock import inside
 from ..model import OPEN, Cycle, Problem
 
 

@@ -123,7 +123,8 @@ def _quadrature(sources: ElementSet) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 def _roomiest(loop: np.ndarray) -> tuple[np.ndarray, float]:
     """A point (2,) inside ``loop`` far from its edges, and how far."""
-    from .validity import _to_segments, inside
+    from .rock import inside
+    from .validity import _to_segments
 
     low, size = loop.min(axis=0), np.ptp(loop, axis=0)
     grid = np.stack(np.meshgrid(*[np.linspace(0.02, 0.98, 49)] * 2), axis=-1).reshape(-1, 2)

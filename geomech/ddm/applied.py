@@ -147,7 +147,7 @@ def _particular(load: BodyLoad, body: Body) -> Particular | GrowingWithDepth:
 
 def _point(out: Applied, body: Body, k: int, point, force, segments: list, tractions: list) -> None:
     """Add point load ``k`` as what it is where it stands."""
-    from .validity import inside
+    from .rock import inside
 
     edges, loop, rock = body.mesh.edges, body.mesh.edge_loop, body.half_plane
     if rock is not None:

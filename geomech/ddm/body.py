@@ -39,11 +39,12 @@ from .kept_rows import KeptRows
 from .loads import BodyLoad
 from .mesh import Mesh, mesh, outline_edges
 from .placing import OFF
+from .rock import outlined
 from .solution import Solution
 from .supports import Holds, Support, called, marks, place, values_at
 from .tip_elements import tip_elements
 from .unit_loads import UnitLoad, UnitLoads, on_elements
-from .validity import check_cracks, check_outline, new_segments, outlined
+from .validity import check_cracks, check_outline, new_segments
 from .work import Work
 
 _log = logging.getLogger(__name__)

@@ -28,8 +28,8 @@ from ..conventions import normal_of, traction
 from ..model import Cracks, GrowthSettings, Material
 from . import shapes
 from .network import Network, Point, nearest_on
+from .rock import inside
 from .solution import Solution
-from .validity import inside
 
 #: Where cracks are looked for, by the names that scenes use.
 PLACES = ("", "surface", "everywhere")

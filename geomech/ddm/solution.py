@@ -18,6 +18,7 @@ from .face_laws import FaceStates
 from .influence import add_fields
 from .placing import OFF, onto_boundary, sides_for
 from .reactions import Reactions, reactions
+from .rock import onto_rock
 
 if TYPE_CHECKING:
     from .body import Body
@@ -212,8 +213,9 @@ class Solution:
     def stress(self, points: np.ndarray, side: float = 1.0) -> np.ndarray:
         """(n, 3) total stress at ``points`` (n, 2), Pa.
 
-        Above the surface of a half-plane there is none: zero. On a boundary it is the rock's, on a crack that of the
-        upper face (left of its segment), or the lower with ``side`` −1. At crack tips it is that a fiftieth of the
+        Where there is no rock, outside the outline, in a hole and above the surface of a half-plane, it is nan, and so
+        are the displacement and all else. On a boundary, and nearer to it than a millionth of the body's extent, it is
+        the rock's; on a crack that of the upper face (left of its segment), or the lower with ``side`` −1. At crack tips it is that a fiftieth of the
         element's length beside, and so it is nearer than that to other ends of elements (corners, crack nodes): the
         discrete field has no value there.
         """
@@ -242,6 +244,7 @@ class Solution:
         body = self.body
         points = np.ascontiguousarray(points, dtype=float).reshape(-1, 2)
         n = len(points)
+        points, out = onto_rock(body.loops, points, OFF * body._extent, body._tol)
         where, double = self._ends.aside(points, side)
         stress, shift = np.zeros((len(where), 3)), np.zeros((len(where), 2))
         nu, net = body.nu, sum((p.force for p in self._applied.kelvin), np.zeros(2))
@@ -275,11 +278,10 @@ class Solution:
             shift += net * (3 - 4 * nu) * np.log(body._extent) / (4 * np.pi * (1 - nu))
         shift /= 2 * body.material.shear_modulus
         stress, shift = stress + self._applied.stress(where), shift + self._applied.displacement(where)
-        if body.half_plane is not None:
-            outside = body.half_plane.frame(where)[:, 1] > 2 * OFF * body._extent
-            stress[outside] = shift[outside] = 0.0
+        above = body.half_plane is not None and body.half_plane.frame(points)[:, 1] > 2 * OFF * body._extent
         for field in (stress, shift):
             field[double] = 0.5 * (field[double] + field[n:])
+            field[out] = field[:n][above] = np.nan
         return stress[:n], shift[:n]
 
     @cached_property

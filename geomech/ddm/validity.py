@@ -8,6 +8,7 @@ import numpy as np
 
 from ..model import Cracks
 from ..model.polygon import signed_area
+from .rock import inside
 
 #: Coordinates must resolve a segment to this part of its length: K is off by some fifty times that (its elements are
 #: shorter).
@@ -20,11 +21,6 @@ SHARPEST_FOLD, SHARPEST_MOUTH = np.radians(10.0), np.radians(3.0)
 #: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two
 #: thousand.
 _PAIRS_AT_ONCE = 4_000_000
-
-
-def outlined(loops: list[np.ndarray]) -> bool:
-    """Whether the first loop is an outline; if not, all are holes in the infinite plane."""
-    return bool(loops) and signed_area(loops[0]) > 0
 
 
 def check_outline(loops: list[np.ndarray], holes: Sequence[np.ndarray] = ()) -> list[np.ndarray]:
@@ -224,19 +220,6 @@ def _to_pairs(points: np.ndarray, segments: np.ndarray) -> np.ndarray:
     rel = points - a
     s = np.clip(np.sum(rel * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
     return np.hypot(*(rel - s[:, None] * d).T)
-
-
-def inside(loops: list[np.ndarray], points: np.ndarray) -> np.ndarray:
-    """(n,) whether points lie inside the outline, if there is one, and outside the holes (even–odd rule)."""
-    points = np.asarray(points, dtype=float)
-    count = np.zeros(len(points), int)
-    for loop in loops:
-        a, b = loop[:, None], np.roll(loop, -1, axis=0)[:, None]
-        x, y = points[None, :, 0], points[None, :, 1]
-        spans = (a[..., 1] > y) != (b[..., 1] > y)
-        rise = np.where(spans, b[..., 1] - a[..., 1], 1.0)
-        count += (spans & (x < a[..., 0] + (y - a[..., 1]) * (b[..., 0] - a[..., 0]) / rise)).sum(axis=0)
-    return count % 2 == (1 if outlined(loops) else 0)
 
 
 def _near(segment) -> str:

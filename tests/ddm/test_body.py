@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 
 from geomech import ddm
 from geomech.model import SLIP, Cracks, DdmSettings, Material
@@ -218,6 +219,27 @@ def test_fields_are_finite_everywhere():
     assert np.array_equal(stress, sol.stress(ends)) and np.array_equal(displacement, sol.displacement(ends))
     whole = ddm.Body([SQUARE], NONE, ROCK).solve(pressed(-1.0))
     assert np.allclose(whole.stress(np.vstack([SQUARE, whole.body.boundary.start])), [0, -1, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("bounded", [True, False])
+def test_there_is_no_stress_where_there_is_no_rock(bounded):
+    """Random points against Shapely's polygons; a hair's breadth beyond a side it is still that of the side."""
+    turn = np.linspace(0, 2 * np.pi, 9)[:-1]
+    hole = 0.3 * np.column_stack([np.cos(turn), np.sin(turn)]) * (1 + 0.3 * (np.arange(8) % 2))[:, None] + [0.3, -0.5]
+    load = pressed(-1.0) if bounded else ddm.BodyLoad(remote_stress=[0, -1, 0])
+    body = ddm.Body([SQUARE] if bounded else [], grown(0), ROCK, holes=[hole])
+    sol = body.solve(load)
+    points = np.random.default_rng(1).uniform(-1.3, 1.3, (3000, 2))
+    sheet = shapely.Polygon(SQUARE if bounded else 9 * SQUARE, [hole])
+    rock = shapely.contains_xy(sheet, *points.T)
+    assert 100 < rock.sum() < 2900
+    for field in (*sol.fields(points), sol.principal_stress(points)[0]):
+        assert np.array_equal(np.isfinite(field).all(axis=1), rock)
+        assert np.array_equal(np.isnan(field).all(axis=1), ~rock)
+    at = 0.3 * hole[2] + 0.7 * hole[3]
+    out = 1e-7 * (hole.mean(axis=0) - at)
+    assert np.allclose(sol.stress([at + out]), sol.stress([at]), atol=1e-5)
+    assert np.isnan(sol.stress([at + 1e3 * out])).all()
 
 
 def test_outline_neither_moves_nor_turns_on_average():

@@ -133,7 +133,7 @@ def test_surface_of_a_cracked_half_plane_is_free():
     assert np.abs(stress[:, 1:]).max() < 1e-11
     assert np.allclose(sol.stress([[1e5, -1e5]]), [[1, 0, 0]], atol=1e-9)
     # Nothing is told of what is not there.
-    assert not np.any(sol.stress([[0.0, 1.0]])) and not np.any(sol.displacement([[0.0, 1.0]]))
+    assert np.isnan(sol.stress([[0.0, 1.0]])).all() and np.isnan(sol.displacement([[0.0, 1.0]])).all()
 
 
 def circle(n, centre, radius=1.0):
