@@ -1,4 +1,5 @@
-"""Blocks that nothing holds: static equilibrium sought and not found, or a block gone out of reach."""
+"""Blocks that nothing holds: static equilibrium sought and not found, blocks that slide on and on, or one gone out of
+reach."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import numpy as np
 from .. import dda
 from ..model import Event, State
 from .cracked_blocks import CrackedBlocks
+from .mechanism import Mechanism
 from .record import event
 
 log = logging.getLogger(__name__)
@@ -43,3 +45,20 @@ def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
     detail = f"nothing holds {name}: it has moved {moved[farthest]:.3g} m"
     log.warning("t = %g s: %s; the run ends", state.time, detail)
     return (event(now, "collapse", state, now.blocks.vertices[farthest], detail),)
+
+
+def unheld(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> tuple[Event, ...]:
+    """A mechanism, when blocks of a static run go on without bound after the load step of ``result``."""
+    found = mechanism.check(result, now.blocks)
+    if found is None:
+        return ()
+    block, detail = found
+    told = event(now, "mechanism", result.state, now.blocks.vertices[int(now.blocks.vertex_start[block])], detail)
+    load = f" and a load of {told.load / 1e6:.4g} MPa" if told.load else ""
+    log.warning(
+        "cycle %d, t = %g s%s: %s. What they move by from here on means nothing in a static run: follow it with "
+        "dda.dynamic_factor = 1, find its limit with `geomech safety`, or end here: "
+        'run.stop_at = ["mechanism"]',
+        now.number, result.state.time, load, detail,
+    )  # fmt: skip
+    return (told,)

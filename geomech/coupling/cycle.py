@@ -21,12 +21,13 @@ from ..dda.blas_threads import alike, asked_for, blas_threads
 from ..dda.excavation import until_next_event
 from ..model import TIP, Cycle, Event, Problem
 from .balance import Balance, balanced
-from .collapse import lost, relax
+from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .elastic_range import ElasticRange
 from .event_steps import SETTLED, TOGETHER, EventSteps
 from .growing import births, growth_of_tips, initiations, part_here, take_growth
 from .load_balance import LoadBalance
+from .mechanism import Mechanism
 from .record import event, record
 from .tips_in_time import TipsInTime
 
@@ -85,7 +86,7 @@ class Coupling:
         #: What the growth that ended the last load step brought, where the load follows the cracks.
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
-        self.range, self.balance = ElasticRange(), LoadBalance()
+        self.range, self.balance, self.mechanism = ElasticRange(), LoadBalance(), Mechanism()
         self.under_way: UnderWay | None = None
         self.between: Callable[[], None] = _go_on
 
@@ -193,7 +194,8 @@ class Coupling:
             if growth is None and static and not stops:
                 # Not before growth has ended: a block that hangs by a thread is strained beyond measure until it parts.
                 collapse = lost(now, result.state)
-                events, stops = events + collapse, bool(collapse)
+                told = collapse or unheld(now, result, self.mechanism)
+                events, stops = events + told, bool(collapse) or self._stops(told)
             if growth is not None:
                 tips["grown"] = growth.grown
                 if self.tips is not None:

@@ -132,7 +132,7 @@ class GrowthSettings:
 #: sticks any more, one sticks again, one loses its bond.
 CHANGES = ("opening", "parting", "closure", "slip", "sliding", "stick", "debonding")
 #: Kinds of events that may end a run, of which `RunSettings.stop_at` names some.
-STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", *CHANGES)
+STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", "mechanism", *CHANGES)
 
 
 @dataclass(frozen=True)

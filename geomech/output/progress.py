@@ -18,7 +18,7 @@ from . import checkpoint
 from .condition import closing, told
 
 #: So many warnings of a run are shown at its end, each this long at most.
-SHOWN_WARNINGS, WIDTH = 3, 240
+SHOWN_WARNINGS, WIDTH = 3, 400
 
 
 class Warned(logging.Handler):

@@ -8,7 +8,7 @@ from ..model import CHANGES, Blocks
 from ..shapes import cutting_cracks
 from .edges import check_edges
 from .errors import Check
-from .held_blocks import check_holding, fixed_blocks
+from .held_blocks import check_borne, check_holding, fixed_blocks
 from .joints import check_joints
 from .locator import Path
 from .tables import SceneTables
@@ -29,6 +29,7 @@ def check(c: Check) -> None:
     if c.drawing is not None and c.drawing.blocks is not None:
         _whole(c)
         check_holding(c)
+        check_borne(c)
         check_edges(c)
         _points(c)
         _toughness(c)
@@ -349,9 +350,13 @@ def _toughness(c: Check) -> None:
                 f"crack {cracks.names[k]!r} lies in the fixed {_block_or_zone(t, zone)}, which is not strained",
                 "let it move, or leave the crack out",
             )
+    joints = set() if t.geometry is None else {joint.name for joint in (*t.geometry.joints, *t.geometry.joint_sets)}
     for name, crack in needy.items() if t.growth.enabled else ():
+        dead_end = crack.rpartition(" ")[0] in joints
         c.refuse(
             ("materials", name, "k_ic_pa_sqrt_m"),
-            f"material {name!r} has no fracture toughness, and crack {crack!r} in it may grow",
-            "add k_ic_pa_sqrt_m, or set growth.enabled = false",
+            f"material {name!r} has no fracture toughness, and crack {crack!r} in it may grow"
+            + (' (joints that end in rock are cracks: geometry.dead_ends = "cracks")' if dead_end else ""),
+            f"add k_ic_pa_sqrt_m to [materials.{name}], Pa √m (1e6 to 2.5e6 for most rocks), or set growth.enabled = false"
+            + (', or geometry.dead_ends = "trim"' if dead_end else ""),
         )

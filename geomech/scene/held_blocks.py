@@ -54,3 +54,26 @@ def check_holding(c: Check) -> None:
                 f"edges are called {name!r}, and along what their blocks are guided is not said",
                 'call them "guided:x" or "guided:y"',
             )
+
+
+def check_borne(c: Check) -> None:
+    """Weight wants something that bears it: without it all blocks fall together, and nothing else happens."""
+    t, blocks = c.tables, c.drawing.blocks
+    if t.loads is None or t.zones is None or not any(t.loads.gravity_m_s2):
+        return
+    loads = t.loads
+    pushed = (
+        loads.tractions or loads.forces or loads.motions or loads.point_motions or loads.bolts
+        or loads.viscous_boundaries or loads.water is not None
+    )  # fmt: skip
+    if pushed or fixed_blocks(t, c.drawing).any() or held_unknowns(t, c.drawing) is not None:
+        return
+    lowest = int(blocks.vertex_block[np.argmin(blocks.vertices @ -np.array(loads.gravity_m_s2))])
+    others = blocks.n_blocks - 1
+    falls = f" and {others} more blocks" if others > 1 else " and the other block" if others else ""
+    c.refuse(
+        ("loads", "gravity_m_s2"),
+        f"nothing bears the weight of {blocks.names[lowest]!r}{falls}: no block is fixed or guided, and no load, motion, "
+        "bolt or water holds them",
+        "say `fixed = true` in the [zones.NAME] of what they stand on, or draw it and call its edges `fixed`",
+    )

@@ -71,6 +71,24 @@ def field_of(table: type[BaseModel], key: str | int) -> FieldInfo | None:
     return next((f for name, f in table.model_fields.items() if key in (name, f.alias)), None)
 
 
+def places_of_keys() -> dict[str, list[str]]:
+    """Key → where it may stand, dotted, as "run.end_time_s", "materials.NAME.density_kg_m3" or
+    "loads.tractions[].edge"; variants, which hold any of them, left out."""
+    found: dict[str, list[str]] = {}
+
+    def walk(table: type[BaseModel], prefix: str) -> None:
+        for name, field in table.model_fields.items():
+            key = field.alias or name
+            found.setdefault(key, []).append(prefix + key)
+            kind, what = kind_of(field.annotation)
+            inner_kind, inner = kind_of(what) if kind in ("map", "list") else (kind, what)
+            if inner_kind == "table" and key != "variants":
+                walk(inner, prefix + key + {"table": ".", "map": ".NAME.", "list": "[]."}[kind])
+
+    walk(SceneTables, "")
+    return found
+
+
 def description_at(path: tuple[str | int, ...]) -> str:
     """What the key at ``path`` (or the nearest one above it that has a description) means."""
     for n in range(len(path), 0, -1):

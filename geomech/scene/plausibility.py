@@ -8,7 +8,7 @@ from ..conventions import outward_normal_of
 from .actions import traction_history
 from .checks import material_of
 from .errors import Check
-from .held_blocks import fixed_blocks, held_unknowns
+from .held_blocks import fixed_blocks
 from .tables import SceneTables
 from .tables.loads import TractionTable
 
@@ -68,22 +68,12 @@ def _materials(c: Check) -> None:
 
 
 def _gravity(c: Check) -> None:
-    """Weight that points to the sky, or that nothing bears."""
+    """Weight that points to the sky."""
     loads, place = c.tables.loads, ("loads", "gravity_m_s2")
     if not any(loads.gravity_m_s2):
         return
     if loads.gravity_m_s2[1] > 0:
         c.warn(place, "gravity points upwards", "y runs up: the weight of rock is gravity_m_s2 = [0, -9.81]")
-    pushed = (
-        loads.tractions or loads.forces or loads.motions or loads.point_motions or loads.bolts
-        or loads.viscous_boundaries or loads.water is not None
-    )  # fmt: skip
-    if not pushed and not fixed_blocks(c.tables, c.drawing).any() and held_unknowns(c.tables, c.drawing) is None:
-        c.warn(
-            place,
-            "no block is fixed or guided, and nothing else bears their weight: all of them fall together",
-            "say `fixed = true` in the [zones.NAME] of what they stand on",
-        )
 
 
 def _increment(c: Check) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from .errors import Fault
-from .keys import description_at, expected_of, field_of, keys_of, kind_of, table_at, written
+from .keys import description_at, expected_of, field_of, keys_of, kind_of, places_of_keys, table_at, written
 from .locator import Path
 from .tables import SceneTables
 
@@ -58,6 +58,17 @@ def nearest(name: str, known: list[str]) -> str:
     return f"there is {', '.join(known)}" if known else "there is none"
 
 
+def _meant(key: str, known: list[str]) -> str:
+    """ "did you mean …? ": a key of the ``known`` ones of the table, or of another table, that reads like ``key``."""
+    everywhere = places_of_keys()
+    close = difflib.get_close_matches(key, known, 1, cutoff=0.8)
+    close = close or everywhere.get(key, [])[:3]
+    if not close:
+        close = [place for near in difflib.get_close_matches(key, everywhere, 1, 0.85) for place in everywhere[near][:3]]
+    close = close or difflib.get_close_matches(key, known, 1, cutoff=0.65)
+    return f"did you mean {' or '.join(map(repr, close))}? " if close else ""
+
+
 def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
     path: Path = tuple(item["loc"])
     kind, given, context = item["type"], item.get("input"), item.get("ctx", {})
@@ -71,9 +82,9 @@ def _fault(item: dict[str, Any], place: Callable[[Path], str]) -> Fault:
 
     if kind == "extra_forbidden":
         known = keys_of(table) if table else []
-        close = difflib.get_close_matches(str(path[-1]), known, 1, cutoff=0.5)
-        way = (f"did you mean {close[0]!r}? " if close else "") + f"keys here are {', '.join(known)}"
-        return Fault(place(path), f"unknown key {path[-1]!r}", way)
+        return Fault(
+            place(path), f"unknown key {path[-1]!r}", _meant(str(path[-1]), known) + f"keys here are {', '.join(known)}"
+        )
     if kind == "missing" and isinstance(path[-1], str):
         return Fault(place(path), f"{path[-1]!r} is missing", f"add {_header(path)}: {meaning}")
     if kind in ("missing", "too_long", "too_short"):

@@ -10,7 +10,7 @@ from scene_texts import GOOD
 
 from geomech import ddm
 from geomech.model import Cracks, Material
-from geomech.scene import load_scene
+from geomech.scene import SceneError, load_scene
 
 PIPELINES = Path(__file__).parents[2] / "pipelines"
 
@@ -248,7 +248,6 @@ end_time_s = 1.0
     ("overrides", "told"),
     [
         ([], []),
-        (["zones.ground.fixed=false"], ["all of them fall together"]),
         (["loads.gravity_m_s2=[0, 9.81]"], ["gravity points upwards"]),
         (["zones.ground.fixed=false", 'zones.ground.guided="x"'], []),
         (["zones.ground.fixed=false", "loads.gravity_m_s2=[0, 0]"], []),
@@ -257,6 +256,11 @@ end_time_s = 1.0
 def test_weight_that_nothing_bears_is_told(scene_file, overrides, told):
     found = load_scene(scene_file(STANDING.format(x=0.5)), overrides).warnings
     assert [w.message[-len(message) :] for w, message in zip(found, told, strict=True)] == told
+
+
+def test_blocks_that_nothing_bears_are_refused_by_name(scene_file):
+    with pytest.raises(SceneError, match="nothing bears the weight of 'ground 1' and 3 more blocks"):
+        load_scene(scene_file(STANDING.format(x=0.5)), ["zones.ground.fixed=false"])
 
 
 @pytest.mark.parametrize(("x", "told"), [(0.5, 0), (500.0, 1)])

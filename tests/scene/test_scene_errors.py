@@ -550,3 +550,19 @@ def test_a_drawing_is_not_a_scene(tmp_path):
     drawing.write_text("Point(1) = {0, 0, 0};\n")
     with pytest.raises(SceneError, match=r'drawing, not a scene[^\n]*\n?[^\n]*model = "slope\.geo"'):
         load_scene(drawing)
+
+
+def test_a_key_of_another_table_is_named_with_it(errors_of):
+    found = errors_of(overrides=["end_time_s=1", "dda.k_ic_pa_sqrt_m=1", "dynamicfactor=1", "quite_other=1"])
+    meant = [error.way_out.partition("? ")[0] for error in found]
+    assert meant[0] == "did you mean 'run.end_time_s'"
+    assert meant[1] == "did you mean 'materials.NAME.k_ic_pa_sqrt_m'"
+    assert meant[2] == "did you mean 'dda.dynamic_factor'"
+    assert meant[3].startswith("keys here are")
+
+
+def test_dead_ends_that_may_grow_say_where_toughness_belongs(errors_of):
+    joints = '[[geometry.joint_sets]]\nname = "cross"\nangle_deg = 70\nspacing_m = 0.3\nlength_m = 0.4\ngap_m = 0.1\n'
+    found = errors_of(("k_ic_pa_sqrt_m = 1e6", ""), add=joints)
+    (error,) = [error for error in found if "fracture toughness" in error.message]
+    assert "[materials.rock]" in error.way_out

@@ -1,0 +1,75 @@
+"""Blocks of a static run that nothing holds are told of, once, by name; those that rest are not."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+from geomech.coupling import cycles
+from geomech.model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+)
+
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def on_a_slope(angle_deg: float, friction_deg: float, gravity=None, **run) -> Problem:
+    """A block on a base whose top is level, and a weight that is turned instead; a second block is walled in."""
+    tilt = np.radians(angle_deg)
+    weight = History.constant(9.81 * np.array([np.sin(tilt), -np.cos(tilt)])) if gravity is None else gravity
+    base = np.array([[-1, -2], [6, -2], [6, 1], [5, 1], [5, 0], [-1, 0]], float)
+    blocks = Blocks.from_polygons(
+        [base, SQUARE, SQUARE + [4, 0]], fixed=[True, False, False], names=["base", "slider", "walled in"]
+    )
+    return Problem(
+        title="slope",
+        blocks=blocks,
+        cracks=Cracks.from_polylines([], block=[]),
+        materials=(Material("rock", 5e9, 0.25, density=2600.0),),
+        joints=(JointLaw("joint", friction_angle=np.radians(friction_deg)),),
+        loads=Loads(gravity=weight),
+        dda=DdaSettings(time_step=0.01),
+        run=RunSettings(end_time=0.2, **run),
+    )
+
+
+def test_a_sliding_block_is_named_once(caplog):
+    with caplog.at_level(logging.WARNING, "geomech"):
+        found = [event for cycle in cycles(on_a_slope(30.0, 20.0)) for event in cycle.events]
+    assert [event.kind for event in found] == ["mechanism"]
+    assert "nothing holds slider: " in found[0].detail
+    # Of its weight and the base's push, what Coulomb leaves over: sin 30° − cos 30° tan 20°, over 1 + cos 30°/cos 20°.
+    left_over = 0.5 - np.sqrt(0.75) * np.tan(np.radians(20))
+    expected = 100 * left_over / (1 + np.sqrt(0.75) / np.cos(np.radians(20)))
+    assert float(found[0].detail.split(": ")[1].split()[0]) == pytest.approx(expected, rel=0.03)
+    (warning,) = [record.getMessage() for record in caplog.records]
+    assert f"cycle {found[0].cycle}, t = {found[0].time:g} s" in warning and "dda.dynamic_factor" in warning
+
+
+def test_a_run_may_end_at_a_mechanism():
+    seen = list(cycles(on_a_slope(30.0, 20.0, stop_at=("mechanism",))))
+    assert seen[-1].number < 10 and seen[-1].events[-1].kind == "mechanism"
+
+
+@pytest.mark.parametrize("friction_deg", [31.0, 40.0])
+def test_what_friction_holds_is_no_mechanism(friction_deg):
+    assert not [event for cycle in cycles(on_a_slope(30.0, friction_deg)) for event in cycle.events]
+
+
+def test_a_mechanism_begins_with_the_load_that_makes_it():
+    """The weight turns steadily from 0° to 60° in the run: friction of 30° gives way half-way."""
+    times = np.linspace(0, 0.2, 41)
+    turned = np.radians(60) * times / 0.2
+    gravity = History(times, 9.81 * np.stack([np.sin(turned), -np.cos(turned)], axis=1))
+    (told,) = [event for cycle in cycles(on_a_slope(0.0, 30.0, gravity)) for event in cycle.events]
+    assert 0.1 < told.time < 0.17 and "slider" in told.detail
