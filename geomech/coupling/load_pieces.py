@@ -113,9 +113,14 @@ def add_corner_force(pieces: Pieces, blocks: Blocks, vertex: int, force: Sequenc
     start, end = (x - reach * bx, y - reach * by), (x + reach * ax, y + reach * ay)
     fx, fy = (float(part) / reach for part in force)
     if abs(turn) < math.sin(FACE_ANGLE):
-        # The corner is as good as flat: its two edges cannot resolve a force across them; treat it as one edge.
-        t = (fx / 2, fy / 2)
+        # The corner is as good as flat: its two edges cannot resolve a force across them. Half of it goes on each; the
+        # middle of the two halves is off the corner, and what moment that makes one half, across, gives the other.
+        sx, sy = ax + bx, ay + by
+        cross = ((ax - bx) * fy - (ay - by) * fx) / (2 * (sx * sx + sy * sy))
+        ox, oy = -cross * sy, cross * sx
+        t = (fx / 2 + ox, fy / 2 + oy)
         pieces.add(start, (x, y), t, t)
+        t = (fx / 2 - ox, fy / 2 - oy)
         pieces.add((x, y), end, t, t)
         return
     on_before, on_after = (fx * ay - fy * ax) / turn, (bx * fy - by * fx) / turn

@@ -173,6 +173,21 @@ def test_lone_vertex_keeps_force_and_moment_on_both_blocks(place):
         assert moment == pytest.approx(arm[0] * f[1] - arm[1] * f[0], abs=1e-13)
 
 
+@pytest.mark.parametrize("bend_deg", [-9.0, -1e-6, 1e-6, 6.6, 9.9, 10.1])
+@pytest.mark.parametrize("direction_deg", [0.0, 65.0, 90.0])
+def test_a_force_on_a_corner_that_is_nearly_flat_keeps_its_moment(bend_deg, direction_deg):
+    """About the corner it has none, whichever way it points and however unlike the corner's edges are."""
+    apex = np.array([0.4, 1.0])
+    side = np.tan(np.radians(bend_deg))
+    roof = Blocks.from_polygons([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0 - 0.6 * side], apex, [0.0, 1.0]])])
+    way = np.radians(direction_deg)
+    row = contact(3, 9, 0, 1, apex, [np.cos(way), np.sin(way)], 3.0, 2.0)
+    load = load_of(0, roof, [row])
+    force, moment, _ = resultants(load.segments, load.tractions, apex)
+    assert np.hypot(*force) == pytest.approx(np.hypot(3.0, 2.0), rel=1e-14)
+    assert abs(moment) < 1e-14
+
+
 def test_inertia_balances_what_contacts_leave():
     """A block pushed on one side accelerates: the body force must cancel force and moment of the tractions."""
     blocks = two_squares(0.3)
