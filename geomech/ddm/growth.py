@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Cracks, GrowthSettings
+from .approach import longest_advance
 from .network import Network, Obstacle, Point, Row, nearest_on, passage
 from .shared_mouths import beside, chain_between, own_mouth_at, part_mouths
 
@@ -102,8 +103,9 @@ def advance(
     ``loops_of(block)`` gives the block's outline and holes in reference coordinates ([] for an infinite plane);
     ``tips`` are TIP rows with ``k_eq`` and ``angle`` filled; ``k_ic`` (n_tips,) Pa √m; ``cycle`` is the birth cycle of
     new segments. The increment is settings.increment times (K_eq/K_Ic) over its largest value, but no less than
-    settings.min_increment, and no more than ``longest`` (n_tips,) m; where that is 0 the tip stands. New segments carry
-    aperture 0 and continue their crack's direction and place in the list. Tips are served in the order given. Raises
+    settings.min_increment, and no more than ``longest`` (n_tips,) m; where that is 0 the tip stands. Near other cracks
+    it is shorter (`approach`). New segments carry aperture 0 and continue their crack's direction and place in the
+    list. Tips are served in the order given. Raises
     ValueError for a tip row that is no tip of the network, or whose angle is not finite.
     """
     k_ic = np.broadcast_to(np.asarray(k_ic, dtype=float), (len(tips),))
@@ -115,7 +117,7 @@ def advance(
     loose = set(cracks.tips.tolist())
     drive = tips["k_eq"][growing] / k_ic[growing]
     lengths = np.clip(settings.increment * drive / drive.max(), settings.min_increment, settings.increment)
-    lengths = np.minimum(lengths, longest[growing])
+    lengths = np.minimum(lengths, np.minimum(longest, longest_advance(cracks, tips, settings))[growing])
     steps = []
     for row, length in zip(growing, lengths):
         tip = tips[row]

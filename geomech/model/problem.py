@@ -97,6 +97,8 @@ class GrowthSettings:
     (0: the stress at the point), ``initiation_spacing`` m is the least distance between births (0: five increments).
     ``speed_limit`` is the part of the Rayleigh speed above which no tip runs in a dynamic run: 0.4, for cracks in rock
     and glass stay below half of it (Ravi-Chandar & Knauss 1984).
+    Where a tip is nearer to another crack than ``approach_steps`` increments, all tips of the block take shorter ones,
+    so many to what is left (0: they do not).
     ``trial_kink`` m: the criterion "f" tries kinks of this length in all directions, faces in contact (0: kinks of no
     length, on which nothing presses).
     """
@@ -113,6 +115,7 @@ class GrowthSettings:
     initiation_spacing: float = 0.0
     trial_kink: float = 0.0
     speed_limit: float = 0.4
+    approach_steps: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 < self.increment < math.inf:
@@ -121,7 +124,7 @@ class GrowthSettings:
             raise ValueError(
                 f"min_increment must be a length of at most the increment of {self.increment:g} m, got {self.min_increment!r} m"
             )
-        for name in ("join_distance", "initiation_distance", "initiation_spacing"):
+        for name in ("join_distance", "initiation_distance", "initiation_spacing", "approach_steps"):
             if not 0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)!r}")
         if self.join_length is not None and not 0 < self.join_length < math.inf:

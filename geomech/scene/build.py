@@ -252,6 +252,7 @@ def _growth(tables: SceneTables, cracks: Cracks) -> GrowthSettings:
         initiation_spacing=g.initiation_spacing_m,
         trial_kink=g.trial_kink_m,
         speed_limit=g.speed_limit,
+        approach_steps=g.approach_steps,
     )
 
 

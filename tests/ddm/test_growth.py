@@ -108,6 +108,17 @@ def test_tips_below_toughness_stand_and_increments_have_a_floor():
     assert nothing.cracks is cracks and not nothing.grown.any()
 
 
+@pytest.mark.parametrize(("gap", "steps", "length"), [(5.0, 0, 1.0), (5.0, 12, 5 / 12), (5.0, 4, 1.0), (0.7, 12, 0.1)])
+def test_steps_are_shorter_near_another_crack(gap, steps, length):
+    """So many to the nearest one, for the far tip too; no shorter than the floor. The other block's tip is not
+    asked."""
+    cracks = Cracks.from_polylines([[[-2, 0], [2, 0]], [[2 + gap, -3], [2 + gap, 3]], [[-2, 0.1], [2, 0.1]]])
+    cracks = replace(cracks, block=np.array([0, 0, 1]))
+    tips = only(tips_of(cracks), [-2, 0], [2, 0])
+    growth = advance(cracks, lambda b: [], tips, replace(SETTINGS, approach_steps=steps), np.ones(len(tips)), 3)
+    assert growth.grown[tips["k_eq"] > 0] == pytest.approx([length, length], rel=1e-12)
+
+
 def test_aperture_and_law_are_kept_by_the_slot_and_its_halves():
     lines = [[[-2, 0], [2, 0]], [[0, 3], [0, 0.7]]]
     cracks = Cracks.from_polylines(lines, aperture=[math.inf, 1e-3], law=[1, 2])

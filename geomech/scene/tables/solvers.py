@@ -130,6 +130,11 @@ class GrowthTable(Table):
         description="the same in metres, such as a grain of the rock: loads at which cracks join and cut through then do not "
         "depend on the increment (unset: join_distance)",
     )
+    approach_steps: NotNegative = Field(
+        0.0,
+        description="where a tip comes nearer to another crack than so many increments, all tips of its block take shorter ones, so many "
+        "to what is left; 12 lets loads at which cracks join depend hardly on the increment (0: they do not)",
+    )
     max_passes: Annotated[int, Field(ge=1)] = Field(200, description="growth passes at one load")
     correct: bool = Field(
         True, description="predict each step, then bend it towards where it would go on: paths of second order"
