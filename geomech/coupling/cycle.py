@@ -88,6 +88,8 @@ class Coupling:
         self.tips = None if self.static else TipsInTime(problem)
         self.range, self.balance, self.mechanism = ElasticRange(), LoadBalance(), Mechanism()
         self.under_way: UnderWay | None = None
+        #: s, when the present load step began.
+        self.began = self.now.state.time
         self.between: Callable[[], None] = _go_on
 
     def __getstate__(self) -> dict[str, Any]:
@@ -141,6 +143,7 @@ class Coupling:
         begun, self.under_way = self.under_way, None
         if begun is None:
             now.load_step += 1
+            self.began = now.state.time
             dt = min(self.length.dt, self.problem.run.end_time - now.state.time)
             begun, self._brought = UnderWay(dt, None, (), self._brought + self._excavated(), 0), ()
         dt, load_time, pending, stops = begun.dt, begun.load_time, begun.pending, self._stops(begun.told)
@@ -209,6 +212,10 @@ class Coupling:
             dug = result.state.removed is not now.state.removed
             budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
+            gone_by = result.state.time - self.began
+            if abs(gone_by - result.dt) > 1e-9 * result.dt:
+                # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
+                statistics["dt"] = gone_by
             if now.bodies:
                 now.crack_energy.passed(tips, now.blocks, now.problem.materials, now.hanging)
                 if ends or parts:

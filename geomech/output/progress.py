@@ -7,6 +7,7 @@ import math
 import sys
 import textwrap
 import time
+from collections import deque
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -16,6 +17,7 @@ from geomech.model import STOPS, Cycle, Problem, counted
 
 from . import checkpoint
 from .condition import closing, told
+from .units import length_text, stress_text
 
 #: So many warnings of a run are shown at its end, each this long at most.
 SHOWN_WARNINGS, WIDTH = 3, 400
@@ -49,10 +51,45 @@ class Warned(logging.Handler):
                 *(f"    {text}" for text in shown)]  # fmt: skip
 
 
+class Pace:
+    """How fast a run goes through its scene, by the later half of the wall time it has taken.
+
+    A pace means something after `LEAST` s, where the two halves of that span went at paces that differ by less than a
+    factor `UNEVEN`: rock that begins to crack stops the clock of the scene.
+    """
+
+    LEAST, UNEVEN = 3.0, 2.5
+
+    def __init__(self) -> None:
+        self._began: float | None = None
+        self._seen: deque[tuple[float, float]] = deque()
+
+    def add(self, wall: float, time: float) -> None:
+        """The scene has come to ``time``, s, at ``wall``, s."""
+        self._began = wall if self._began is None else self._began
+        self._seen.append((wall, time))
+        half = 0.5 * (self._began + wall)
+        while len(self._seen) > 2 and self._seen[1][0] <= half:
+            self._seen.popleft()
+
+    def time_for(self, rest: float) -> float:
+        """Wall time, s, for ``rest`` s of the scene; inf where that is not known."""
+        if len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
+            return math.inf
+        first, last = self._seen[0], self._seen[-1]
+        middle = min(self._seen, key=lambda seen: abs(seen[0] - 0.5 * (first[0] + last[0])))
+        early, late = (
+            (b[1] - a[1]) / (b[0] - a[0]) if b[0] > a[0] else 0.0 for a, b in ((first, middle), (middle, last))
+        )
+        if not 0.0 < early <= self.UNEVEN * late <= self.UNEVEN**2 * early:
+            return math.inf
+        return max(0.0, rest) * (last[0] - first[0]) / (last[1] - first[1])
+
+
 class Progress:
     """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
-    time left is what the rest of the scene takes at the pace of its load steps so far; a scene that stops at an event
-    ends sooner. ``quiet`` leaves only where a failed run stopped.
+    time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; a scene that stops at an
+    event ends sooner. ``quiet`` leaves only where a failed run stopped.
 
     ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
     between two with the same percentage.
@@ -67,8 +104,7 @@ class Progress:
         self._folder, self._end = Path(folder), problem.run.end_time
         self._said = time.perf_counter()
         self._percent, self._last = -1, None
-        # (wall time, scene's time) when the first load step was done: it may have compiled kernels, and sets no pace.
-        self._paced: tuple[float, float] | None = None
+        self._pace = Pace()
         self._bar = None
         if not self.quiet and self._out.isatty():
             from tqdm import tqdm
@@ -100,20 +136,20 @@ class Progress:
         if self.quiet:
             return
         now = time.perf_counter()
-        if self._paced is None and cycle.state.time > 0:
-            self._paced = now, cycle.state.time
+        if cycle.state.time > 0:  # from the first load step on: it may have compiled kernels, and sets no pace
+            self._pace.add(now, float(cycle.state.time))
         if self._bar is not None:
             # The text is made only as often as the bar is drawn.
             if now - self._said >= self._bar.mininterval:
                 self._said = now
-                self._bar.set_postfix_str(_told(cycle) + self._left(cycle, now), refresh=False)
+                self._bar.set_postfix_str(_told(cycle) + self._left(cycle), refresh=False)
             self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
         elif now - self._said >= self.interval:
             percent = self._share(cycle)
             if percent == self._percent and now - self._said < 2 * self.interval:
                 return
             self._said, self._percent = now, percent
-            self._say(f"  {percent:3d} %  {_told(cycle)}{self._left(cycle, now)}")
+            self._say(f"  {percent:3d} %  {_told(cycle)}{self._left(cycle)}")
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         self._warnings.end()
@@ -132,13 +168,10 @@ class Progress:
     def _share(self, cycle: Cycle) -> int:
         return round(100 * min(cycle.state.time, self._end) / self._end)
 
-    def _left(self, cycle: Cycle, now: float) -> str:
-        """Wall time that the rest of the scene takes at the pace so far; empty where there is no pace yet."""
-        if self._paced is None or cycle.state.time <= self._paced[1]:
-            return ""
-        began, from_time = self._paced
-        seconds = (now - began) / (cycle.state.time - from_time) * max(0.0, self._end - cycle.state.time)
-        return f", about {_duration(seconds)} left" if seconds >= 0.5 else ""
+    def _left(self, cycle: Cycle) -> str:
+        """Wall time that the rest of the scene takes; empty where there is no steady pace."""
+        seconds = self._pace.time_for(self._end - float(cycle.state.time))
+        return f", about {_duration(seconds)} left" if 0.5 <= seconds < math.inf else ""
 
     def _say(self, text: str) -> None:
         self._out.write(text + "\n")
@@ -152,7 +185,7 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
     for kind, first in summary.get("first", {}).items():
         # A load of 0 is that of a scene which has no leading one: it is driven by time.
         load = first.get("load_pa")
-        text = f"  {kind:<13}" + (f" {abs(load) / 1e6:8.3f} MPa" if load else f" t = {first['time_s']:.4g} s")
+        text = f"  {kind:<13} " + (f"{stress_text(load):>12}" if load else f"t = {first['time_s']:.4g} s")
         text += " in tension" if load and load < 0 else ""
         if load and first.get("load_normalised") is not None:
             text += f"   σ√(πb)/K_Ic = {first['load_normalised']:.3f}"
@@ -164,7 +197,7 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
     elif "cycles" in summary:
         lines.append(
             f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with growth, "
-            f"{1e3 * summary['crack_growth_m']:.3g} mm of new crack in {summary.get('wall_s', math.nan):.2f} s"
+            f"{length_text(summary['crack_growth_m'])} of new crack in {summary.get('wall_s', math.nan):.2f} s"
         )
     if summary.get("end") in STOPS:
         lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")
@@ -175,9 +208,9 @@ def _told(cycle: Cycle) -> str:
     if not cycle.cracks.n_cracks:
         return f"t = {cycle.state.time:.4g} s, {told(cycle)}"
     growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
-    # A load that has not begun by then is that of a scene which has no leading one: it is driven by time.
-    timed = not cycle.load and cycle.state.time > 0
-    drive = f"t = {cycle.state.time:.4g} s" if timed else f"load {cycle.load / 1e6:.2f} MPa"
+    # A load that has not begun is that of a scene which has no leading one: it is driven by time.
+    pulled = " in tension" if cycle.load < 0 else ""
+    drive = f"load {stress_text(cycle.load, 3)}{pulled}" if cycle.load else f"t = {cycle.state.time:.4g} s"
     text = f"{drive}, cycle {cycle.number}"
     return text + (f", {growing} of {len(cycle.tips)} tips growing" if len(cycle.tips) else "")
 

@@ -11,6 +11,7 @@ import numpy as np
 from geomech.output.reading import Run
 
 from .field import COMPONENTS, interior_grid, values
+from .overlaps import overlap
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -21,6 +22,8 @@ CRACK_COLOURS = {"birth": "grown in cycle", "opening": "opening, µm"}
 
 #: The largest displacement relative to the block system, drawn as this fraction of its size.
 DEFORMATION = 0.03
+#: Blocks may be drawn inside others by this fraction of the size: two pixels of a picture 800 wide.
+OVERLAP = 0.0025
 #: Stress at a crack tip is singular: the colours span these percentiles of the rock's area and end there.
 ROBUST = (0.7, 99.3)
 
@@ -161,6 +164,8 @@ def _crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
 
 
 def _magnification(shown: Sequence[pv.UnstructuredGrid], size: float) -> float:
+    """A round factor by which displacements are seen, and blocks are not drawn inside others by
+    more than the width of a line."""
     # A common translation shows nothing; what counts is how far points move against each other, and cracked blocks give
     # way further than the strain that they have as blocks.
     spread = max(np.ptp(grid["displacement"], axis=0).max() for grid in shown)
@@ -168,7 +173,14 @@ def _magnification(shown: Sequence[pv.UnstructuredGrid], size: float) -> float:
         return 1.0
     scale = DEFORMATION * size / spread
     # Motion that is large enough to be seen is drawn true.
-    return max(1.0, float(f"{scale:.1g}")) if scale > 1 else 1.0
+    if scale <= 1:
+        return 1.0
+    scale = max(1.0, float(f"{scale:.1g}"))
+    if overlap(shown, 1.0, OVERLAP * size):
+        return scale  # no fault of the factor
+    while scale > 1.0 and overlap(shown, scale, OVERLAP * size):
+        scale = max(1.0, float(f"{0.5 * scale:.1g}"))
+    return scale
 
 
 def _limits(grid: pv.UnstructuredGrid, component: str) -> tuple[tuple[float, float], tuple[bool, bool]]:

@@ -15,6 +15,8 @@ from .picture import IDLE, OLD_CRACK, ROCK_OUTLINE, Painter
 
 #: A frame in which cracks grew stays so much longer than one of loading.
 LINGER = 2.0
+#: The shortest and the longest time of a frame, over the mean, where the run's time goes on between frames.
+PACES = 0.5, 4.0
 #: The last frame stays for this long, ms.
 LAST = 2500
 
@@ -37,12 +39,25 @@ def movie(run: Run, path: Path, fixed: Look, *, frames: int = 48, frames_per_sec
             painter.draw(cycle)
             image = Image.fromarray(painter.image())
             images.append(image.quantize(palette=palette, dither=Image.Dither.NONE))
-    length = run.history["crack_length"]
-    grown = [float(run.at(cycle)["crack_length"]) > length[0] for cycle in shown]
-    times = [round(1000 / frames_per_second * (LINGER if more else 1)) for more in grown]
-    times[-1] = max(LAST, times[-1])
+    times = durations(run, shown, frames_per_second)
     images[0].save(path, save_all=True, append_images=images[1:], duration=times, loop=0, optimize=False)
     return path
+
+
+def durations(run: Run, shown: list[int], frames_per_second: float) -> list[int]:
+    """ms for which each of the cycles ``shown`` stands: as the run's time goes by until the next one, between a half and
+    four times the mean; cycles in which cracks have grown, at one load perhaps, no less than `LINGER` of it."""
+    rows = [run.at(cycle) for cycle in shown]
+    gone_by = np.abs(np.diff([float(row["time"]) for row in rows]))
+    pace = np.ones(len(rows))
+    if gone_by.sum() > 0:
+        pace[:-1] = np.clip(gone_by / gone_by.mean(), *PACES)
+    start = float(run.history["crack_length"][0])
+    grown = np.array([float(row["crack_length"]) > start for row in rows])
+    pace = np.where(grown, np.maximum(pace, LINGER), pace)
+    times = [10 * round(float(100 / frames_per_second * each)) for each in pace]  # a GIF counts hundredths of a second
+    times[-1] = max(LAST, times[-1])
+    return times
 
 
 def moments(run: Run, frames: int) -> list[int]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from geomech.output.reading import Run
+from geomech.output.units import stress_text, stress_unit
 
 from . import offscreen
 from .field import COMPONENTS, face_displacements, interior_grid, values
@@ -228,13 +229,15 @@ class Painter:
         said = []
         if self.run.led and np.isfinite(row["load"]):
             pulled = " in tension" if row["load"] < 0 else ""
-            said.append(f"load {abs(row['load']) / 1e6:.2f} MPa{pulled}")
+            said.append(f"load {stress_text(row['load'])}{pulled}")
         said += [f"t = {rounded(row['time'])} s", f"cycle {int(row['cycle'])}"]
         if self.look.scale not in (0.0, 1.0):
             said.append(f"displacements × {self.look.scale:g}")
-        size = text(self.run.title, (24 * u, h - 38 * u), 15, width=w - 48 * u)
-        text("     ".join(said), (24 * u, h - 64 * u), min(11, size), SOFT_INK, width=w - 48 * u)
+        letters = text(self.run.title, (24 * u, h - 38 * u), 15, width=w - 48 * u)
+        text("     ".join(said), (24 * u, h - 64 * u), min(11, letters), SOFT_INK, width=w - 48 * u)
         name, limits, beyond = COMPONENTS[self.look.component][2], self.look.limits, self.look.beyond
+        unit, size = stress_unit(1e6 * max(map(abs, limits)))
+        limits = tuple(1e6 / size * limit for limit in limits)
         grown = self.look.crack_limits[1] > self.look.crack_limits[0]
         if self.look.upright:
             # From the top down: title, bar, note, title, bar; the bars give way where the drawing is not tall.
@@ -242,14 +245,14 @@ class Painter:
             spare = top - 24 * u - (150 if grown else 80) * u
             tall = min(260 * u, spare * (0.65 if grown else 1.0))
             low = top - 62 * u - tall
-            text(f"{name}, MPa", (left, top - 28 * u), 12)
+            text(f"{name}, {unit}", (left, top - 28 * u), 12)
             bar(self.look.colours, limits, (left, low, 26 * u, tall), beyond)
             text("tension positive", (left, low - 44 * u), 9, SOFT_INK)
             short = min(150 * u, spare * 0.35)
             below = (left, low - 100 * u - short, 26 * u, short)
         else:
             bar(self.look.colours, limits, (44 * u, 44 * u, 0.45 * w, 18 * u), beyond)
-            text(f"{name}, MPa (tension positive)", (44 * u, 68 * u), 11)
+            text(f"{name}, {unit} (tension positive)", (44 * u, 68 * u), 11)
             below = (0.62 * w, 44 * u, 0.3 * w, 18 * u)
         if grown:
             bar(crack_colours(), self.look.crack_limits, below, whole=self.look.cracks == "birth")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..output.reading import Run
+from ..output.units import largest_of, length_text, length_unit, stress_text, stress_unit
 from .page import Page, written
 
 #: A record of the log, which may run over several lines, up to the next.
@@ -81,7 +82,7 @@ def key_results(run: Run) -> dict[str, Any]:
         if event.get("load_pa") is None or not run.led:
             return f"{written(event['time_s'])} s"
         relative = event.get("load_normalised")
-        return f"{event['load_pa'] / 1e6:.2f} MPa" + (f" ({relative:.3f})" if relative else "")
+        return stress_text(event["load_pa"]) + (f" ({relative:.3f})" if relative else "")
 
     def scaled(name: str, factor: float, digits: str) -> str | None:
         value = summary.get(name)
@@ -90,10 +91,12 @@ def key_results(run: Run) -> dict[str, Any]:
     facts: dict[str, Any] = {"how it ended": summary.get("end", "not ended")}
     facts |= {f"first {kind}": at(kind) for kind in first}
     if run.led:
-        facts["peak load, MPa"] = scaled("peak_load_pa", 1e-6, ".2f")
+        peak = summary.get("peak_load_pa")
+        facts["peak load"] = None if peak is None else stress_text(peak)
         facts["strain at the end, 10⁻³"] = scaled("last_strain", 1e3, ".3f")
     if summary.get("cracks"):
-        facts["crack growth, mm"] = scaled("crack_growth_m", 1e3, ".1f")
+        grown = summary.get("crack_growth_m")
+        facts["crack growth"] = None if grown is None else length_text(grown)
     facts["blocks"] = summary.get("blocks")
     facts["cycles"] = summary.get("cycles")
     facts["time simulated, s"] = summary.get("time_s")
@@ -174,7 +177,7 @@ def add_pictures(page: Page, run: Run) -> None:
 
 def _moment(run: Run, cycle: int) -> str:
     row = run.at(cycle)
-    load = f"{row['load'] / 1e6:.2f} MPa, " if np.isfinite(row["load"]) and row["load"] else ""
+    load = f"{stress_text(row['load'])}, " if np.isfinite(row["load"]) and row["load"] else ""
     return f"{load}t = {written(float(row['time']))} s, cycle {written(cycle)}"
 
 
@@ -205,16 +208,24 @@ def _add_events(page: Page, run: Run) -> None:
     if not len(run.events):
         return
     page.section("Events")
+    load, pascals = stress_unit(largest_of(run.events["load"]))
+    length, metres = _unit_of_places(run)
     rows = [
-        [e["kind"], int(e["cycle"]), float(e["time"]), float(e["load"]) / 1e6, *(1e3 * float(e[x]) for x in "xy"), e["detail"]]
+        [e["kind"], int(e["cycle"]), float(e["time"])]
+        + [float(e["load"]) / pascals, *(float(e[x]) / metres for x in "xy"), e["detail"]]
         for e in run.events[:LISTED]
-    ]  # fmt: skip
+    ]
     page.table(
-        ["event", "cycle", "time, s", "load, MPa", "x, mm", "y, mm", "what"],
+        ["event", "cycle", "time, s", f"load, {load}", f"x, {length}", f"y, {length}", "what"],
         [[str(cell) if isinstance(cell, np.str_) else cell for cell in row] for row in rows],
     )
     if len(run.events) > LISTED:
         page.text(f"{len(run.events) - LISTED} more in events.csv.")
+
+
+def _unit_of_places(run: Run) -> tuple[str, float]:
+    """(name, m) of the unit for coordinates of events and tips."""
+    return length_unit(max(largest_of(rows[x]) for rows in (run.events, run.tips) if len(rows) for x in "xy"))
 
 
 def _add_tips(page: Page, run: Run) -> None:
@@ -222,16 +233,17 @@ def _add_tips(page: Page, run: Run) -> None:
     if not len(tips):
         return
     names = run.summary.get("cracks", [])
+    length, metres = _unit_of_places(run)
     page.section("Crack tips")
     for title, cycle in (("In the first step", tips["cycle"][0]), ("At the end", tips["cycle"][-1])):
         own = tips[tips["cycle"] == cycle][:LISTED]
         page.table(
-            ["crack", "end", "x, mm", "y, mm", "K_I, MPa√m", "K_II, MPa√m", "K_eq, MPa√m", "would turn, °"],
+            ["crack", "end", f"x, {length}", f"y, {length}", "K_I, MPa√m", "K_II, MPa√m", "K_eq, MPa√m", "would turn, °"],
             [
                 [
                     names[int(t["crack"])] if t["crack"] < len(names) else str(int(t["crack"])),
                     ("start", "end")[int(t["end"])],
-                    *(float(t[name]) * 1e3 for name in "xy"),
+                    *(float(t[name]) / metres for name in "xy"),
                     *(float(t[name]) / 1e6 for name in ("K_I", "K_II", "K_eq")),
                     float(t["angle_deg"]),
                 ]

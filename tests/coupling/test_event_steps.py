@@ -188,3 +188,16 @@ def test_the_load_does_not_go_back_for_tips_that_still_grow():
         if len(times) == 7:
             break
     assert (np.diff(times) == 0).sum() >= 2 and (np.diff(times) >= 0).all()
+
+
+def test_the_step_that_is_told_is_the_time_gone_by():
+    """In load steps that end at events, in those that go back with the load, and in all passes at one load."""
+    seen = []
+    for cycle in cycles(plate(stop_at=(), control="toughness", end_time=4000.0)):
+        seen.append(cycle)
+        if cycle.load_step == 6:
+            break
+    ends = {cycle.load_step: cycle.state.time for cycle in seen}
+    gone_by = [cycle.state.time - ends[cycle.load_step - 1] for cycle in seen[1:]]
+    assert min(gone_by) < 0 < max(gone_by)
+    assert [cycle.statistics["dt"] for cycle in seen[1:]] == pytest.approx(gone_by, rel=1e-9)

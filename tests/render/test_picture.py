@@ -14,12 +14,13 @@ import synthetic_run as made
 
 from geomech.output import Histories, Run, Series, Summary
 from geomech.render import draw, offscreen
+from geomech.render.crack_curves import length_ever, stress_intensity, tip_curves
 from geomech.render.field import COMPONENTS, agreeing, face_displacements, interior_grid, values
 from geomech.render.legend import ticks
 from geomech.render.look import final_cycle, look
 from geomech.render.movie import moments
 from geomech.render.picture import picture
-from geomech.render.plots import _tip_curves, plots
+from geomech.render.plots import plots
 from geomech.report.table import table
 
 imageio = pytest.importorskip("imageio.v3")
@@ -146,9 +147,43 @@ def test_a_run_that_ends_with_a_cut_is_shown_before_it(tmp_path):
 
 def test_tips_with_the_same_curve_share_one(drawn_run):
     """The made-up crack has the same factors at both its ends."""
-    ((label, load, k_i, _),) = _tip_curves(drawn_run)
-    assert label == "flaw, both tips"
+    ((members, load, k_i, _, _),) = tip_curves(drawn_run)
+    assert members == [(0, 0), (0, 1)]
     assert np.allclose(k_i, -0.0626 * load, rtol=1e-9)
+
+
+def test_of_many_tips_those_that_grow_are_named(drawn_run):
+    """Thirty tips with factors of their own, of which one grows and one, at a thread of rock, has a factor of 1e6: the
+    legend names a few, and neither it nor the runaway is larger than the page."""
+    from matplotlib.figure import Figure
+
+    own = drawn_run.tips[(drawn_run.tips["crack"] == 0) & (drawn_run.tips["end"] == 0)]
+    tips = np.concatenate([own] * 30)
+    tips["crack"] = np.repeat(np.arange(30), len(own))
+    for name in ("K_I", "K_II"):
+        tips[name] *= np.repeat(1 + np.arange(30) / 10, len(own))
+    tips["K_I"][-len(own) :] *= 1e6
+    tips["grown_m"] = np.where(tips["crack"] == 7, 1e-3, 0.0)
+    run = Run(drawn_run.folder)
+    vars(run)["tips"] = tips
+    axes = Figure().add_subplot()
+    stress_intensity(axes, run)
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "crack 7, start" in labels and "24 more tips" in labels and len(labels) == 10
+    # The toughness, 2 MPa√m, is far above all others.
+    assert 2.0 < np.abs(axes.get_ylim()).max() < 10.0
+    assert any("beyond the page" in text.get_text() for text in axes.texts)
+
+
+def test_length_goes_on_being_counted_where_cracks_become_faces(drawn_run):
+    """Two metres of crack, of which one becomes faces while a tip elsewhere grows by a tenth of a metre."""
+    run = Run(drawn_run.folder)
+    history = drawn_run.history[:4].copy()
+    history["crack_length"] = [2.0, 2.3, 1.4, 1.5]
+    tips = np.zeros(2, drawn_run.tips.dtype)
+    tips["cycle"], tips["grown_m"] = history["cycle"][[0, 1]], [0.3, 0.1]
+    vars(run).update(history=history, tips=tips)
+    assert np.allclose(length_ever(run), [2.0, 2.3, 2.4, 2.5], rtol=1e-12)
 
 
 def test_moments_prefer_growth(tmp_path):
@@ -174,6 +209,30 @@ def test_automatic_magnification_is_a_round_number(drawn_run):
     spread = np.ptp(drawn_run.grid("blocks", 9)["displacement"], axis=0).max()
     assert 0.02 * 0.14 < scale * spread < 0.05 * 0.14
     assert scale == float(f"{scale:.1g}")
+
+
+def test_magnification_does_not_draw_blocks_inside_one_another():
+    """A block that has slid a thousandth of its width towards a wall a hundredth away: fifteen times is no
+    overlap of more than a line's width, sixty times would be. What overlaps as it is does not count."""
+    import pyvista as pv
+
+    from geomech.render.look import OVERLAP, _magnification
+    from geomech.render.overlaps import overlap
+
+    def drawn(shift: float) -> pv.UnstructuredGrid:
+        x = np.array([0.0, 1.0, 1.0, 0.0])
+        points = np.concatenate([np.stack([x + at, [0, 0, 1, 1], 0 * x], axis=1) for at in (0.0, 1.01)])
+        triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+        cells = np.column_stack([np.full(4, 3), triangles]).ravel()
+        grid = pv.UnstructuredGrid(cells, np.full(4, pv.CellType.TRIANGLE), points)
+        grid["block_id"] = np.array([0, 0, 1, 1])
+        grid["displacement"] = np.where(np.arange(8)[:, None] < 4, [shift, 0.0, 0.0], 0.0)
+        return grid
+
+    grid = drawn(1e-3)
+    assert 1.0 < _magnification([grid], 2.01) <= 15.0
+    assert not overlap([grid], _magnification([grid], 2.01), OVERLAP * 2.01) and overlap([grid], 60.0, OVERLAP * 2.01)
+    assert _magnification([drawn(0.02)], 2.01) == 3.0
 
 
 def test_a_scene_without_cracks_and_interior_is_drawn(tmp_path):

@@ -55,7 +55,7 @@ class RenderTable(Table):
     )
     width_px: Annotated[int, Field(ge=64)] = Field(800, description="width of pictures, pixels")
     deformation_scale: NotNegative | None = Field(
-        None, description="displacements are drawn this much larger (unset: so that they are seen)"
+        None, description="displacements are drawn this much larger (unset: so that they are seen, and blocks not inside others)"
     )
     crack_colour: Literal["birth", "opening"] = Field("birth", description="what the colour of cracks means")
     gif: bool = Field(True, description="also make a moving picture of the growth")

@@ -1,0 +1,166 @@
+"""Curves of a run's cracks: stress intensity factors of the tips, and the length of all cracks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from geomech.output.reading import Run
+from geomech.output.units import length_unit
+
+from .drive import COLOURS, SAME, drive, drive_label, first_events, to_the_end
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: So many curves have a colour and a name of their own: of more, those of the tips that go farthest, or are driven most;
+#: the others are grey.
+NAMED = 6
+#: So many tips are named where they share a curve.
+SHARING = 2
+#: Where there are many tips, K of a crack that runs away, or hangs by a thread, is beyond this percentile.
+MOST_TIPS = 98.0
+_GREY = "#c4c6ca"
+
+
+class TipCurve(NamedTuple):
+    """``members`` (crack, end) share ``load`` (drive), ``k_i`` and ``k_ii`` MPa√m; they grow by ``grown`` m."""
+
+    members: list[tuple[int, int]]
+    load: np.ndarray
+    k_i: np.ndarray
+    k_ii: np.ndarray
+    grown: float
+
+
+def stress_intensity(axes: Axes, run: Run) -> None:
+    """K_I (full) and K_II (dashed) at every tip against load, or time where nothing leads: growth relieves a tip, the
+    load drives it up again. Tips with the same curves share one; the toughness is a line across."""
+    curves = tip_curves(run)
+    n_tips = sum(len(curve.members) for curve in curves)
+    named = _foremost(curves)
+    others = [curve for k, curve in enumerate(curves) if k not in named]
+    for curve in others:
+        axes.plot(curve.load, curve.k_i, color=_GREY, lw=0.8)
+        axes.plot(curve.load, curve.k_ii, color=_GREY, lw=0.8, ls="--")
+    for colour, k in zip(COLOURS, named):
+        curve = curves[k]
+        axes.plot(curve.load, curve.k_i, color=colour, lw=1.4, label=_tip_names(run, curve.members, n_tips))
+        axes.plot(curve.load, curve.k_ii, color=colour, lw=1.0, ls="--")
+    if others:
+        count = sum(len(curve.members) for curve in others)
+        axes.plot([], [], color=_GREY, lw=0.8, label=f"{count} more tip{'s' if count > 1 else ''}")
+    axes.plot([], [], color="#555555", lw=1.6, label=r"$K_I$")
+    axes.plot([], [], color="#555555", lw=1.3, ls="--", label=r"$K_{II}$")
+    axes.axhline(0, color="#999999", lw=0.6)
+    toughness = run.summary.get("normalisation", {}).get("k_ic_pa_sqrt_m")
+    if toughness:
+        axes.axhline(toughness / 1e6, color="#222222", lw=0.9, ls=":", label=r"$K_{Ic}$")
+    # Beside many curves there is no corner that one of them does not reach.
+    beside = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if others else {}
+    axes.legend(frameon=False, fontsize=8, **beside)
+    low, high = _calm_span(run)
+    title = run.title
+    if high > low:
+        # A crack that runs away leaves all others flat at the bottom, so it leaves the page instead.
+        room = 2.0 * max((toughness or 0.0) / 1e6, high, -low)
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(max(bottom, low - room), min(top, high + room))
+        highest = max((float(np.nanmax(np.abs([c.k_i, c.k_ii]), initial=0.0)) for c in curves), default=0.0)
+        if highest > max(high + room, room - low):
+            axes.text(
+                0.01, 0.99, f"beyond the page: up to {highest:.3g}", transform=axes.transAxes, fontsize=7, va="top"
+            )
+    axes.set(xlabel=drive_label(run), ylabel="stress intensity factor, MPa√m", title=title)
+
+
+def _foremost(curves: list[TipCurve]) -> list[int]:
+    """Which curves are named, in order: all where they are few, else those that grow farthest, then the largest."""
+    if len(curves) <= NAMED:
+        return list(range(len(curves)))
+    sizes = [float(np.nanpercentile(np.abs(np.concatenate([c.k_i, c.k_ii])), 90)) for c in curves]
+    order = sorted(range(len(curves)), key=lambda k: (-curves[k].grown, -sizes[k]))
+    return sorted(order[:NAMED])
+
+
+def _calm_span(run: Run) -> tuple[float, float]:
+    """The least and the largest K_I or K_II, MPa√m, where the load has just gone up and nothing has grown at it: of many
+    tips what `MOST_TIPS` of them have."""
+    calm = run.history["cycle"][run.history["growth_pass"] == 0]
+    tips = run.tips[np.isin(run.tips["cycle"], calm)]
+    every = np.concatenate([tips["K_I"], tips["K_II"]]) / 1e6
+    every = every[np.isfinite(every)]
+    if not len(every):
+        return 0.0, 0.0
+    beyond = 100.0 - MOST_TIPS if len(np.unique(tips["crack"])) > NAMED else 0.0
+    low, high = np.percentile(every, [beyond, 100.0 - beyond])
+    return min(0.0, float(low)), max(0.0, float(high))
+
+
+def tip_curves(run: Run) -> list[TipCurve]:
+    """A curve for every tip; one for all tips whose curves lie on one another."""
+    tips = run.tips
+    every = np.abs([tips["K_I"], tips["K_II"]])
+    every = every[np.isfinite(every)]
+    # Of many tips, one that runs away is no measure for the others.
+    many = len(np.unique(tips["crack"])) > NAMED
+    near = SAME * float(np.percentile(every, 90.0 if many else 100.0)) if len(every) else 0.0
+    groups: list[tuple[list[tuple[int, int]], np.ndarray]] = []
+    for crack, end in np.unique(np.stack([tips["crack"], tips["end"]], axis=1), axis=0).astype(int):
+        mine = tips[(tips["crack"] == crack) & (tips["end"] == end)]
+        for members, known in groups:
+            if np.array_equal(known["cycle"], mine["cycle"]) and all(
+                np.abs(known[name] - mine[name]).max() <= near for name in ("K_I", "K_II")
+            ):
+                members.append((crack, end))
+                break
+        else:
+            groups.append(([(crack, end)], mine))
+    return [
+        TipCurve(members, drive(run, mine), mine["K_I"] / 1e6, mine["K_II"] / 1e6, float(np.nansum(mine["grown_m"])))
+        for members, mine in groups
+    ]
+
+
+def _tip_names(run: Run, members: list[tuple[int, int]], n_tips: int) -> str:
+    if len(members) == n_tips and n_tips > 2:
+        return f"all {n_tips} tips"
+    names = run.summary.get("cracks", [])
+    parts = []
+    for crack in dict.fromkeys(crack for crack, _ in members):
+        ends = [end for other, end in members if other == crack]
+        name = names[crack] if crack < len(names) else f"crack {crack}"
+        parts.append((f"{name}, {'both tips' if len(ends) > 1 else ('start', 'end')[ends[0]]}", len(ends)))
+    more = sum(count for _, count in parts[SHARING:])
+    return "; ".join(told for told, _ in parts[:SHARING]) + (f"; {more} tips like them" if more else "")
+
+
+def crack_length(axes: Axes, run: Run) -> None:
+    """The length of all cracks against load, or time where nothing leads: what grows at one load is a vertical line.
+    Where rock comes apart its cracks are faces of blocks from then on: they go on being counted, and what is still
+    cracks is dashed."""
+    history, every = to_the_end(run), length_ever(run)
+    unit, size = length_unit(float(every.max()))
+    at, still = drive(run, history), history["crack_length"]
+    parted = bool((every - still > 1e-6 * every.max()).any())
+    axes.plot(at, every / size, color=COLOURS[0], lw=1.8, label="with those that are block faces now" if parted else None)
+    if parted:
+        axes.plot(at, still / size, color=COLOURS[0], lw=1.2, ls="--", label="cracks still")
+    first_events(axes, run, None)
+    if parted:
+        axes.legend(frameon=False, fontsize=8)
+    axes.set(xlabel=drive_label(run), ylabel=f"crack length, {unit}", title=run.title)
+
+
+def length_ever(run: Run) -> np.ndarray:
+    """(rows to the end,) m of crack that there is, or was before blocks parted along it. Between two cycles cracks get
+    longer by what their tips grew, and shorter only by what becomes faces of blocks."""
+    history = to_the_end(run)
+    length = history["crack_length"]
+    grown = np.zeros(len(history))
+    row = np.minimum(np.searchsorted(history["cycle"], run.tips["cycle"]), len(history) - 1)
+    mine = np.isfinite(run.tips["grown_m"]) & (run.tips["cycle"] <= history["cycle"][-1])
+    np.add.at(grown, row[mine], run.tips["grown_m"][mine])
+    change = np.diff(length)
+    return length[0] + np.concatenate([[0.0], np.cumsum(np.where(change < -1e-12, grown[:-1], change))])
