@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import dda
 from ..dda import StepResult
-from ..model import TIP, State
+from ..model import TIP, Motion, State
 from .bodies import boundary_loads, threads_for, tip_rows
 from .compliance import crack_response, passive, strain_rotation, stress_rotation
 from .cracked_blocks import CrackedBlocks
@@ -124,8 +124,10 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
 def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
     """Every body under what the block solver's forces are on it."""
     with now.timed("tractions"):
-        # Equilibrium holds on the geometry at the start of the step.
-        now.loads = boundary_loads(now.problem, now.blocks, now.state, now.motion(now.state), result, now.bodies)
+        # Equilibrium holds where the forces of the step act.
+        still = result.vertices is now.state.vertices
+        motion = now.motion(now.state) if still else Motion.of(now.blocks, result.vertices)
+        now.loads = boundary_loads(now.problem, now.blocks, now.state, motion, result, now.bodies)
     now.solutions = now.solve(now.bodies, now.loads, now.solutions)
     now.solved_from = now.history
 

@@ -74,8 +74,8 @@ def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
 def boundary_loads(
     problem: Problem, blocks: Blocks, state: State, motion: Motion, result, bodies: dict
 ) -> dict[int, BoundaryLoad]:
-    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state`` with ``motion``: on
-    that geometry the forces are in equilibrium."""
+    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state``; ``motion`` leads to its
+    vertices: on that geometry the forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
     strengths = [joint.tensile_strength for joint in problem.joints]
     acting = beside_acting(result.contacts, blocks.n_blocks)
@@ -93,9 +93,9 @@ def boundary_loads(
         b: boundary_load(
             b,
             blocks,
-            state.vertices,
+            result.vertices,
             motion,
-            float(state.rotation[b]),
+            float(state.rotation[b] + result.turn[b]),
             contacts[b],
             edges[b],
             points[b],

@@ -15,6 +15,7 @@ from .contact_set import ContactSet
 from .force_rows import POINT_FORCE
 from .imposed_motion import ImposedMotion, Pairs
 from .loads import LoadMap
+from .middle import Middle
 from .open_close import Settled
 from .step import contact_resultants
 
@@ -39,10 +40,11 @@ class StepActions:
     """Given motion and bolts of one attempt at a step, in the order in which the step goes."""
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, moments: np.ndarray,
+        self, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
         order: np.ndarray, removed: np.ndarray | None, end: float,
     ) -> None:  # fmt: skip
-        self.blocks, self.order, self.loads, self.load_map, self.moments = blocks, order, loads, load_map, moments
+        self.blocks, self.order, self.loads, self.load_map = blocks, order, loads, load_map
+        self.moments = middle.moments
         vertices = state.vertices
 
         def point_at(block: int, at: tuple[float, float]) -> np.ndarray:
@@ -52,29 +54,27 @@ class StepActions:
         shaken = loads.base is not None and loads.base.frame == "ground"
         if shaken or loads.block_motions or loads.point_motions:
             self.imposed = ImposedMotion(
-                blocks, fixed, removed, loads, moments, point_at, state.imposed, state.time, end
+                blocks, fixed, removed, loads, middle, point_at, state.imposed, state.time, end
             )
         self.bolts: BoltSet | None = None
         self.memory = np.empty(0, BOLT)
         if loads.bolts:
             check_bolts(loads.bolts, blocks, blocks.fixed)
-            self.bolts, self.memory = BoltSet.of(
-                loads.bolts, state.bolts, state.time, point_at, order, moments, removed
-            )
+            self.bolts, self.memory = BoltSet.of(loads.bolts, state.bolts, state.time, point_at, order, middle, removed)
         #: (n_contacts,) m: what the fixed blocks' motion makes of the contacts' motion along their edges.
         self.along = np.zeros(0)
         self._motion = np.zeros((0 if self.bolts is None else len(self.bolts.number), 2))
 
     @classmethod
     def of(
-        cls, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, moments: np.ndarray,
+        cls, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
         order: np.ndarray, removed: np.ndarray | None, end: float,
     ) -> StepActions | None:  # fmt: skip
         """None where the loads are forces only."""
         shaken = loads.base is not None and loads.base.frame == "ground"
         if not (shaken or loads.block_motions or loads.point_motions or loads.bolts):
             return None
-        return cls(blocks, fixed, loads, state, load_map, moments, order, removed, end)
+        return cls(blocks, fixed, loads, state, load_map, middle, order, removed, end)
 
     @property
     def linked(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -99,19 +99,18 @@ class StepActions:
         return held
 
     def settle(
-        self, pattern: Pattern, matrix: np.ndarray, right: np.ndarray, vectors: np.ndarray, found: ContactSet,
-        gap: np.ndarray, settle: Settle,
+        self, pattern: Pattern, matrix: np.ndarray, right: np.ndarray, vectors: np.ndarray, acting: np.ndarray,
+        found: ContactSet, gap: np.ndarray, settle: Settle,
     ) -> tuple[Settled, np.ndarray]:  # fmt: skip
         """Settled contacts and the solver's unknowns (n_free, 6), given ones among them. Changes matrix, right side and
         vectors in place, to those of the equations that are solved; given motion adds to what contacts' gaps and
-        ``stretch`` begin with. Raises `Unsettled`."""
+        ``stretch`` begin with. ``acting`` (n, 7): the contacts' geometry where they act. Raises `Unsettled`."""
         if self.bolts is not None:
             self.bolts.stiffen_turning(matrix, self.order, self.moments)
         shift = np.zeros((len(found), 2))
         self.along = shift[:, 1]
         if self.imposed is not None:
-            point = found.geometry[:, 5:7]
-            normal = found.geometry[:, 1:3]
+            point, normal = acting[:, 5:7], acting[:, 1:3]
             along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
             contacts = Pairs(
                 found.block, found.other, vectors, np.stack([point, point], axis=1), np.stack([normal, along], axis=1),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..conventions import rotate_stress
 from ..model import OPEN, STICK, Loads, State
 from . import assembly
 from .actions import StepActions, felt_gravity
@@ -23,6 +24,7 @@ from .energy import StepEnergy, sliding, step_energies
 from .held import balanced, hold, with_rigid_motion
 from .imbalance import imbalance
 from .loads import AppliedForces, Inertia, generalised
+from .middle import Middle
 from .open_close import Settled, Unsettled, settle
 from .rigid import mean_stress
 from .step import CrackResponse, StepResult
@@ -63,40 +65,60 @@ class Attempt:
         load_time: float | None,
     ) -> None:
         self.system, self.state, self.vertices, self.carried, self.moments = system, state, vertices, carried, moments
-        self.dt, self.found, self.cuts = dt, found, cuts
+        self.dt, self.found, self.cuts, scheme = dt, found, cuts, system.scheme
         self.time = state.time + dt
-        self.centroid = np.ascontiguousarray(moments[:, 1:3])
         # Mass stays, whatever the strain does to the area.
         self.density = system.mass / moments[:, 0]
-        self.given = crack is not None
+        self.given, self.n_free = crack is not None, len(system.moving)
         self.crack_compliance = (
             np.ascontiguousarray(crack.compliance, dtype=float) if self.given else system.no_compliance
         )
         self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
         self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
-        self._act(loads, load_time)
-        self._assemble()
-        self._absorb(loads, load_time)
-        self._settle()
+        self.iterations = 0
+        foreseen = self._foreseen()
+        self._place(foreseen)
+        if scheme.place == 1.0 and foreseen is not None:
+            # From the end's arms the arc is long, but known as well as these.
+            self._follow(foreseen, self.middle.vertices)
+        for bends in range(_BENDS, -1, -1):
+            self._act(loads, load_time)
+            self._assemble()
+            self._absorb(loads, load_time)
+            self._settle()
+            if not bends or not self._bent():
+                break
         self._move()
+
+    def _foreseen(self) -> np.ndarray | None:
+        """(n_blocks, 6) what the velocity makes of this step; None in statics, which carry none."""
+        system = self.system
+        if system.scheme.static or not self.n_free:
+            return None
+        return self.dt * system.scheme.begun(self.carried, self.state.acceleration, self.dt)[0]
+
+    def _place(self, increment: np.ndarray | None) -> None:
+        """Put the forces of the step where blocks are in the middle of ``increment`` (n_blocks, 6)."""
+        system = self.system
+        self.middle = Middle.of(increment, system.scheme.place, self.vertices, system.owner, self.moments)
+        self.turn = np.zeros(len(self.moments)) if self.middle.turn is None else self.middle.turn
 
     def _act(self, loads: Loads, load_time: float | None) -> None:
         """Forces, imposed motion and bolts of this step."""
-        system, state, scheme, dt = self.system, self.state, self.system.scheme, self.dt
+        system, state, scheme, dt, middle = self.system, self.state, self.system.scheme, self.dt, self.middle
         acting = state.time + scheme.weight * dt if load_time is None else load_time
         self.gravity = felt_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
-        self.points, self.edges = system.load_map.rows(loads, acting, self.vertices, state.rotation)
-        self.load = generalised(self.points, self.edges, self.centroid)
+        self.points, self.edges = system.load_map.rows(loads, acting, middle.vertices, state.rotation + self.turn)
+        self.load = middle.loads_back(generalised(self.points, self.edges, middle.centroid))
         end = self.time if load_time is None else load_time
         self.actions = StepActions.of(
-            system.blocks, system.fixed, loads, state, system.load_map, self.moments, system.free, system.taken_out, end
+            system.blocks, system.fixed, loads, state, system.load_map, middle, system.free, system.taken_out, end
         )
 
     def _assemble(self) -> None:
         """The equations of blocks without their contacts."""
         system, scheme, found, dt = self.system, self.system.scheme, self.found, self.dt
         self.begun, self.heavier = scheme.begun(self.carried, self.state.acceleration, dt)
-        self.n_free = len(system.moving)
         linked = None if self.actions is None else self.actions.linked
         self.pattern = system.pattern_of(found.block, found.other, self.moments, linked) if self.n_free else None
         self.order = system.free if self.pattern is None else self.pattern.order
@@ -111,12 +133,12 @@ class Attempt:
         system, state = self.system, self.state
         self.quiet = None
         if loads.viscous_boundaries and not system.scheme.static and self.n_free:
-            middle = state.time + 0.5 * self.dt if load_time is None else load_time
+            time = state.time + 0.5 * self.dt if load_time is None else load_time
             self.quiet = QuietEdges.of(
-                loads.viscous_boundaries, system.blocks, self.vertices, middle, system.density, system.stiffness,
+                loads.viscous_boundaries, system.blocks, self.middle.vertices, time, system.density, system.stiffness,
                 system.fixed,
             )  # fmt: skip
-            self.quiet.assemble(self.matrix, self.right, self.order, self.moments, self.dt)
+            self.quiet.assemble(self.matrix, self.right, self.order, self.middle, self.dt)
 
     def _held(self) -> np.ndarray | None:
         """(n_blocks, 3) bool: what is held of the blocks' motion in this step; None where nothing is."""
@@ -129,15 +151,16 @@ class Attempt:
 
     def _settle(self) -> None:
         """The states of contacts and the unknowns; faces with a stiffness are tried on other parts until they fit."""
-        actions, found, order = self.actions, self.found, self.order
+        actions, found, order, middle = self.actions, self.found, self.order, self.middle
         held = self._held()
         own = self.matrix, self.right
-        self.iterations, bends = 0, _BENDS
         for tries in range(1, 2 * _PLACED + 1):
             if found.points is not None or tries > 1:
                 self.matrix, self.right = own[0].copy(), own[1].copy()
             springs, gap, weight, curved = self._over_the_step(found)
-            vectors = assembly.contact_vectors(found.block, found.other, found.geometry, order, self.moments)
+            geometry = middle.contacts(found.geometry, found.block, found.other, self._along(found))
+            vectors = assembly.contact_vectors(found.block, found.other, geometry, order, middle.moments)
+            middle.turn_back(vectors, found.block, found.other)
             if held is not None and self.n_free:
                 hold(held, self.matrix, self.right, vectors, found.block, found.other, order)
             if not self.n_free:
@@ -151,15 +174,14 @@ class Attempt:
                 unknowns = settled.unknowns
             else:
                 solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
-                settled, unknowns = actions.settle(self.pattern, self.matrix, self.right, vectors, found, gap, solve)
+                settled, unknowns = actions.settle(
+                    self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
+                )
             self.iterations += settled.iterations
             better = found.misplaced(settled)
             if better is None:
-                better = self._bent(found, settled, unknowns) if bends else None
-                if better is None:
-                    break
-                bends -= 1
-            elif tries % _PLACED == 0:
+                break
+            if tries % _PLACED == 0:
                 # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
                 # this one.
                 better = found.cornered(better)
@@ -169,17 +191,17 @@ class Attempt:
         self.found, self.settled, self.unknowns = found, settled, unknowns
         self.vectors, self.weight = vectors, weight
 
-    def _bent(self, found: ContactSet, settled: Settled, unknowns: np.ndarray) -> ContactSet | None:
-        """The contacts ``found`` with the gaps that the motion of ``unknowns`` really leads to; None if those are
-        known."""
-        system = self.system
+    def _bent(self) -> bool:
+        """Give contacts the gaps that the motion really leads to, and the forces of the step the place that they have
+        in its middle; False if those are known."""
+        system, found, settled = self.system, self.found, self.settled
         if system.scheme.static or not len(found) or not self.n_free:
-            return None
+            return False
         known = _KNOWN * found.rounding
         # What turns by r while it moves by d leaves its chord by r d at most.
-        increment = self._increment(unknowns)
+        increment = self._increment(self.unknowns)
         if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
-            return None
+            return False
         vertices = self._advanced(increment)[0]
         straight = settled.gap + settled.lifted + found.lift - found.arc
         if found.points is not None:
@@ -188,8 +210,36 @@ class Attempt:
         arc, before = gap - straight, found.arc if found.lumped is None else found.lumped.arc
         some = (settled.state != OPEN) | (gap < 0.0)
         if not (np.abs(arc - before) > known)[some].any():
-            return None
-        return found.along(arc)
+            return False
+        tried = found.rows(settled)
+        self._place(increment)
+        self._follow(increment, vertices)
+        self.found = self.found.trying(tried)
+        return True
+
+    def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:
+        """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), which leads to ``vertices``: by what these go
+        beyond what the equations of this middle make of it."""
+        system, found, scaled = self.system, self.found, increment.copy()
+        if found.lumped is not None:
+            found = found.lumped
+        if not len(found):
+            return
+        blocks, all_blocks = (found.block, found.other), np.arange(len(increment))
+        scaled[:, 2:] *= np.sqrt(self.moments[:, :1])
+        along = self._along(found)
+        geometry = self.middle.contacts(found.geometry, *blocks, along)
+        vectors = assembly.contact_vectors(*blocks, geometry, all_blocks, self.middle.moments)
+        self.middle.turn_back(vectors, *blocks)
+        across, slid = (sliding(vectors, scaled, all_blocks, *blocks, way) for way in (0, 1))
+        end = Middle.of(increment, 1.0, self.vertices, system.owner, self.moments)
+        went = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]
+        arc = system.finder.gaps(vertices, found.vertex, found.edge) - found.geometry[:, 3] - across
+        self.found = self.found.along(arc, went * np.hypot(*along.T) - slid)
+
+    def _along(self, found: ContactSet) -> np.ndarray:
+        """(n, 2) m: the edges of ``found``."""
+        return self.vertices[self.system.next[found.edge]] - self.vertices[found.edge]
 
     def _over_the_step(self, found: ContactSet):
         """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs,
@@ -217,9 +267,11 @@ class Attempt:
             return settle(pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved)
 
         if not system.allowed_penetration or not len(found):
-            if found.stretch.any():
-                found = replace(found, shear=found.shear - springs.shear * found.stretch)
+            stretch = found.stretch + found.swing
+            if stretch.any():
+                found = replace(found, shear=found.shear - springs.shear * stretch)
             return solve(found, springs, gap)
+        found = replace(found, stretch=found.stretch + found.swing)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
 
     def _increment(self, unknowns: np.ndarray) -> np.ndarray:
@@ -242,14 +294,14 @@ class Attempt:
     def _move(self) -> None:
         """Blocks are moved; their velocities, stresses and accelerations at the end."""
         scheme, found, dt = self.system.scheme, self.found, self.dt
-        state, carried, actions, moments = self.state, self.carried, self.actions, self.moments
+        state, carried, actions = self.state, self.carried, self.actions
         increment = self._increment(self.unknowns)
         imposed = None if actions is None else actions.imposed
         self.new_vertices, velocity, self.new_stress, self.new_crack, self.largest = self._advanced(increment)
         if self.quiet is not None:
-            absorbed = self.quiet.rows(increment, moments, dt)
+            absorbed = self.quiet.rows(increment, self.middle, dt)
             self.edges = np.concatenate([self.edges, absorbed])
-            self.load = self.load + generalised(self.points[:0], absorbed, self.centroid)
+            self.load = self.load + self.middle.loads_back(generalised(self.points[:0], absorbed, self.middle.centroid))
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
         velocity, self.kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
         if self.heavier != 1.0:
@@ -268,8 +320,10 @@ class Attempt:
         """Take the sliding that friction has stopped in the step off the velocity; the energy (J/m) that this takes."""
         system, found, velocity = self.system, self.found, self.velocity
         mass = np.where(system.fixed, np.inf, system.mass)
+        end = Middle.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
+        geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
         stopped = Stopped.of(
-            found, self.settled, self.slid, velocity, self.moments[:, 1:3], mass, self.dt, system.slack
+            found, geometry, self.settled, self.slid, velocity, end.centroid, mass, self.dt, system.slack
         )
         if stopped is None:
             return
@@ -290,14 +344,16 @@ class Attempt:
     def result(self) -> StepResult:
         """The step as it is told of."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
-        state, actions, dt, gravity = self.state, self.actions, self.dt, self.gravity
-        rows = found.rows(settled)
+        state, actions, dt, gravity, middle = self.state, self.actions, self.dt, self.gravity, self.middle
+        corners = found.geometry if found.points is None else found.points.corners
+        rows = found.rows(settled, middle.contacts(corners, found.block, found.other, self._along(found)))
         reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
         points, load, turn = self.points, self.load, self.increment[:, 2]
         if actions is not None:
             points, reaction, acted = actions.acted(settled, self.unknowns, rows, points, self.new_vertices)
             acting_right, largest_force = actions.with_bolt_forces(self.right), actions.largest_bolt_force
-            load = generalised(points, self.edges, self.centroid) + actions.work_forces(reaction, rows, self.centroid)
+            load = middle.loads_back(generalised(points, self.edges, middle.centroid))
+            load = load + actions.work_forces(reaction, rows, middle.centroid)
         end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, self.weight)
         energy = self._energy(load, end_shear)
         residual, ratio = imbalance(
@@ -308,8 +364,8 @@ class Attempt:
         new_stress, acceleration = self.new_stress, self.acceleration
         if len(system.rigid):
             new_stress[system.rigid] = mean_stress(
-                system.rigid, rows, load, self.moments, self.density, acceleration, self.carried[:, 2], turn
-            )
+                system.rigid, rows, load, middle.moments, self.density, acceleration, self.carried[:, 2], self.turn, turn,
+            )  # fmt: skip
         if scheme.mass_damping:
             acceleration = acceleration + scheme.mass_damping / dt * self.increment
         memory = rows
@@ -319,11 +375,15 @@ class Attempt:
             memory["shear_force"] = end_shear
         if system.taken_out is not None:
             new_stress[system.taken_out] = 0.0
-        inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
         beyond = None
         if not scheme.static:
             beyond = scheme.overstress(self.increment[:, 3:], self.tangent, system.stiffness, system.mass, dt)
-        forces = AppliedForces(points, self.edges, self.centroid, self.moments[:, 0].copy(), inertia, reaction, beyond)
+        if middle.turn is not None:
+            acceleration = turned(acceleration, middle.turn)
+            beyond = None if beyond is None else rotate_stress(beyond, middle.turn)
+        inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
+        area = self.moments[:, 0].copy()
+        forces = AppliedForces(points, self.edges, middle.centroid, area, inertia, reaction, beyond)
         imposed = None if actions is None else actions.imposed
         new_state = State(
             time=self.time,
@@ -354,7 +414,9 @@ class Attempt:
         reserve = reserves(
             settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs
         )
-        return StepResult(new_state, dt, rows, forces, acceleration, energy, reserve, statistics)
+        return StepResult(
+            new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, statistics
+        )
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
         """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""

@@ -17,9 +17,9 @@ import numpy as np
 
 from ..conventions import normal_of
 from ..model import BOLT, GROUND, Blocks, Bolt
-from .basis import displacement_matrix
 from .force_rows import POINT_FORCE
 from .imposed_motion import Pairs
+from .middle import Middle
 from .open_close import Unsettled
 
 log = logging.getLogger(__name__)
@@ -52,10 +52,10 @@ def labels(bolts: Sequence[Bolt]) -> list[str]:
 
 @dataclass(eq=False)
 class BoltSet:
-    """The bolts that act in a step, on the geometry at its start; arrays (n,).
+    """The bolts that act in a step, along the axes that they have at its start; arrays (n,).
 
     number        rows in the loads' bolts
-    ends          (n, 2, 2)  m, where they are now
+    ends          (n, 2, 2)  m, where they act, in the step's middle
     length        m
     trial, dowel  N, what they would carry if nothing moved: axial (positive in tension), across
     geometric     N/m, stiffness of a taut bolt against turning
@@ -87,10 +87,11 @@ class BoltSet:
         time: float,
         point_at,
         order: np.ndarray,
-        moments: np.ndarray,
+        middle: Middle,
         removed: np.ndarray | None,
     ) -> tuple[BoltSet | None, np.ndarray]:
-        """The bolts that act from ``time`` on (None: none), and their BOLT rows with those newly installed."""
+        """The bolts that act from ``time`` on (None: none), and their BOLT rows with those newly installed;
+        ``point_at(block, at)`` is where points are as the step begins."""
         memory = memory.copy() if len(memory) == len(bolts) else np.zeros(len(bolts), BOLT)
         ends = np.zeros((len(bolts), 2, 2))
         for k, bolt in enumerate(bolts):
@@ -117,9 +118,12 @@ class BoltSet:
         vectors = np.zeros((len(own), 2, 12))
         for k in range(len(own)):
             for side, (b, sign) in enumerate(((block[k], -1.0), (other[k], 1.0))):
-                if b != GROUND and order[b] >= 0:
-                    h = np.sqrt(moments[b, 0])
-                    t = axes[k] @ displacement_matrix(ends[k, side], moments[b, 1:3]) / [1.0, 1.0, h, h, h, h]
+                if b == GROUND:
+                    continue
+                ends[k, side] = middle.points(ends[k, None, side], np.array([b]))[0]
+                if order[b] >= 0:
+                    h = np.sqrt(middle.moments[b, 0])
+                    t = axes[k] @ middle.displacement(ends[k, side], b) / [1.0, 1.0, h, h, h, h]
                     vectors[k, :, 6 * side : 6 * side + 6] = sign * t
         # A ground end has no unknowns: its half of the vectors is empty, and it may stand with the bolt's own block.
         pairs = Pairs(block, other, vectors, ends, axes, -1.0, np.zeros((len(own), 2)))

@@ -48,6 +48,7 @@ class ContactSet:
                                without any
     arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the
                 straight one
+    swing       (n,)     m that it adds so to the motion along the edge
     tried                      state and direction that open–close iterations begin with, where these are others
     """
 
@@ -77,6 +78,7 @@ class ContactSet:
     points: FacePoints | None = None
     lumped: ContactSet | None = None
     arc: np.ndarray | float = 0.0
+    swing: np.ndarray | float = 0.0
     tried: tuple[np.ndarray, np.ndarray] | None = None
 
     def trying(self, rows: np.ndarray) -> ContactSet:
@@ -115,6 +117,7 @@ class ContactSet:
             points=points,
             lumped=self,
             arc=points.between_corners(self.arc) if isinstance(self.arc, np.ndarray) else self.arc,
+            swing=points.between_corners(self.swing) if isinstance(self.swing, np.ndarray) else self.swing,
         )
 
     def misplaced(self, settled: Settled) -> ContactSet | None:
@@ -125,11 +128,12 @@ class ContactSet:
         better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
         return None if better is None else self.lumped.placed(better)
 
-    def along(self, arc: np.ndarray) -> ContactSet:
-        """The contacts with gaps that follow an ``arc`` (n,) m at their corners."""
+    def along(self, arc: np.ndarray, swing: np.ndarray) -> ContactSet:
+        """The contacts with gaps that follow an ``arc`` and motion along the edges that follows a ``swing`` (n,) m at
+        their corners."""
         if self.points is None:
-            return replace(self, arc=arc)
-        return replace(self.lumped, arc=arc).placed(self.points)
+            return replace(self, arc=arc, swing=swing)
+        return replace(self.lumped, arc=arc, swing=swing).placed(self.points)
 
     def cornered(self, better: ContactSet) -> ContactSet:
         """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other
@@ -167,8 +171,9 @@ class ContactSet:
     def __len__(self) -> int:
         return len(self.vertex)
 
-    def rows(self, settled: Settled) -> np.ndarray:
-        """CONTACT rows of the finished step, on the geometry on which it was assembled."""
+    def rows(self, settled: Settled, acting: np.ndarray | None = None) -> np.ndarray:
+        """CONTACT rows of the finished step, on the geometry on which it was assembled: ``acting`` (n, 7) of the corners
+        where the forces acted, None where the step began."""
         rows = np.zeros(len(self), CONTACT)
         for name in ("vertex", "edge", "block", "other", "law", "inset"):
             rows[name] = getattr(self, name)
@@ -180,7 +185,8 @@ class ContactSet:
             for name in ("normal_force", "shear_force"):
                 rows[name] = points.at_corners(rows[name])
             rows["gap"] = points.gap_at_corners(settled.gap)
-        rows["position"], rows["normal"], rows["point"] = geometry[:, 0], geometry[:, 1:3], geometry[:, 5:7]
+        acting = geometry if acting is None else acting
+        rows["position"], rows["normal"], rows["point"] = acting[:, 0], acting[:, 1:3], acting[:, 5:7]
         rows["length"] = geometry[:, 4]
         rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
         # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.

@@ -102,16 +102,16 @@ def _stored(stiffness, gap, limit, bonded):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def sliding(vectors, unknowns, order, block, other):
-    """(n,) m: motion of every contact along its edge, from ``vectors`` (n, 2, 12) and scaled ``unknowns`` (n_free,
-    6)."""
+def sliding(vectors, unknowns, order, block, other, way=1):
+    """(n,) m: motion of every contact along its edge, or across it (``way`` 0), from ``vectors`` (n, 2, 12) and scaled
+    ``unknowns`` (n_free, 6)."""
     out = np.zeros(block.shape[0])
     for c in range(out.shape[0]):
         for side in range(2):
             i = order[block[c]] if side == 0 else order[other[c]]
             if i >= 0:
                 for a in range(6):
-                    out[c] += vectors[c, 1, 6 * side + a] * unknowns[i, a]
+                    out[c] += vectors[c, way, 6 * side + a] * unknowns[i, a]
     return out
 
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import UNKNOWNS, BaseMotion, BlockMotion, Blocks, Loads, PointMotion
-from .basis import displacement_matrix
 from .force_rows import POINT_FORCE
+from .middle import Middle
 
 #: Rows of C that are combinations of others to this relative size contradict or repeat one another.
 _DEPENDENT = 1e-10
@@ -63,7 +63,7 @@ class Pairs:
 
 
 class ImposedMotion:
-    """The motion that ``loads`` give from ``start`` to ``end`` (s), on the geometry at the start of the step.
+    """The motion that ``loads`` give from ``start`` to ``end`` (s), acting where blocks are in the ``middle`` of the step.
 
     ``totals`` (k,) is what they have imposed at ``end``, ``before`` the same at the start as an earlier step has left
     it (else taken at ``start``): statics may seek equilibrium at one time in many steps. ``increment`` and ``rate``
@@ -72,11 +72,12 @@ class ImposedMotion:
     """
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, moments: np.ndarray, point_at, before: np.ndarray,
+        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, middle: Middle, point_at, before: np.ndarray,
         start: float, end: float,
     ) -> None:  # fmt: skip
         n = blocks.n_blocks
-        self.blocks, self.fixed, self.moments = blocks, fixed, moments
+        self.blocks, self.fixed, self.moments = blocks, fixed, middle.moments
+        self._middle = middle
         self.increment, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
         self._given: dict[int, _Given] = {}
         self._springs: list[tuple[int, int, np.ndarray, np.ndarray]] = []
@@ -126,10 +127,11 @@ class ImposedMotion:
         self, number: int, motion: PointMotion, by: np.ndarray, now: np.ndarray, start: float, end: float
     ) -> None:
         b = motion.block
-        self._rows[number]["block"], self._rows[number]["at"], self._rows[number]["point"] = b, motion.at, now
+        acts = self._middle.points(now[None], np.array([b]))[0]
+        self._rows[number]["block"], self._rows[number]["at"], self._rows[number]["point"] = b, motion.at, acts
         if self.fixed[b]:
             raise ValueError(f"a point of {self._name(b)} is to be moved, but the block is fixed: give its own motion")
-        rows = motion.axes @ displacement_matrix(now, self.moments[b, 1:3])
+        rows = motion.axes @ self._middle.displacement(acts, b)
         if motion.kind == "displacement":
             # To where the point is to be, so that what the turn of a step leaves out is made up for in the next.
             by = motion.history.at(end) - motion.axes @ (now - np.asarray(motion.at, dtype=float))

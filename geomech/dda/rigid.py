@@ -29,20 +29,22 @@ def mean_stress(
     density: np.ndarray,
     acceleration: np.ndarray,
     spin: np.ndarray,
+    middle: np.ndarray,
     turn: np.ndarray,
 ) -> np.ndarray:
     """(n, 3) Pa mean stress of ``blocks`` (n,) on axes turned by ``turn`` (n_blocks,) rad, from the forces of a step:
-    CONTACT rows, generalised ``load`` (n_blocks, 6) N m, ``acceleration`` (n_blocks, 6) and ``spin`` (n_blocks,)
-    rad/s."""
+    CONTACT rows, on a geometry turned by ``middle`` (n_blocks,) rad, generalised ``load`` (n_blocks, 6) N m,
+    ``acceleration`` (n_blocks, 6) and ``spin`` (n_blocks,) rad/s."""
     n = contacts["normal"]
     force = contacts["normal_force"][:, None] * n
     force += contacts["shear_force"][:, None] * np.stack([-n[:, 1], n[:, 0]], axis=1)
-    virial = load[:, 3:].copy()
+    virial = np.zeros((len(load), 3))
     for owner, sign in (("block", 1.0), ("other", -1.0)):
         own = contacts[owner]
         (x, y), (fx, fy) = (contacts["point"] - moments[own, 1:3]).T, sign * force.T
         for k, part in enumerate((x * fx, y * fy, 0.5 * (y * fx + x * fy))):
             virial[:, k] += np.bincount(own, weights=part, minlength=len(virial))
+    virial = rotate_stress(virial, -middle) + load[:, 3:]
     xx, yy, xy = moments[:, 3:6].T
     second = np.stack([xx, yy, xy], axis=1)
     turning = np.stack([-xy, xy, 0.5 * (xx - yy)], axis=1)

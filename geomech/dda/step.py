@@ -40,10 +40,12 @@ class StepResult:
 
     state          the new State; ``state.contacts`` stand on its geometry
     dt             s, the time it advanced (less than asked if the step was cut)
-    contacts       CONTACT rows on the geometry on which equilibrium was assembled, with the converged forces
+    contacts       CONTACT rows on the geometry on which the forces acted, with the converged ones
     forces         whatever else acted, on the same geometry
     acceleration   (n_blocks, 6) mean of the unknowns over the step, with what mass-proportional damping adds
     energy         the terms of the step's energy balance
+    vertices       (n_vertices, 2) m, that geometry: the middle of the step in dynamics (`dda.middle`)
+    turn           (n_blocks,) rad, by which blocks have turned there since the step began
     reserve        (n_contacts,) N, how far each of ``contacts`` is from leaving its state (`contact_states.reserves`)
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
                    worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
@@ -58,6 +60,8 @@ class StepResult:
     acceleration: np.ndarray
     energy: StepEnergy
     reserve: np.ndarray
+    vertices: np.ndarray
+    turn: np.ndarray
     statistics: dict[str, float] = field(default_factory=dict)
 
 

@@ -41,17 +41,17 @@ class Stopped:
 
     @classmethod
     def of(
-        cls, found: ContactSet, settled: Settled, slid: np.ndarray, velocity: np.ndarray, centroid: np.ndarray,
+        cls, found: ContactSet, geometry: np.ndarray, settled: Settled, slid: np.ndarray, velocity: np.ndarray, centroid: np.ndarray,
         mass: np.ndarray, dt: float, slack: float,
     ) -> Stopped | None:  # fmt: skip
-        """None where nothing stops. ``slid`` (n,) m along the edge in the step; ``velocity`` (n_blocks, 6),
-        ``centroid`` (n_blocks, 2), ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry less than ``slack``
+        """None where nothing stops. ``geometry`` (n, 7) of the contacts at the end of the step, ``slid`` (n,) m along
+        the edge in it; ``velocity`` (n_blocks, 6), ``centroid`` (n_blocks, 2), ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry less than ``slack``
         (m) in a step are none."""
         stuck = (found.state == SLIP) & (settled.state == STICK) & (found.direction != 0.0)
         rows = np.flatnonzero(stuck | ((settled.state == SLIP) & (settled.direction != 0.0)))
         if not len(rows):
             return None
-        after = _sliding_speed(found, rows, velocity, centroid)
+        after = _sliding_speed(found, geometry, rows, velocity, centroid)
         # Friction acts against the sliding.
         sense = -np.where(stuck[rows], found.direction[rows], settled.direction[rows])
         before = sense * (2.0 * slid[rows] / dt - after)
@@ -67,14 +67,16 @@ class Stopped:
         lighter = np.minimum(mass[found.block], mass[found.other])
         stiff = (settled.state == STICK) & (settled.springs.shear * dt * dt > _TURNS_ABOUT * lighter)
         rows = np.flatnonzero(stops | stiff)
-        after = senses[rows] * _sliding_speed(found, rows, velocity, centroid)
+        after = senses[rows] * _sliding_speed(found, geometry, rows, velocity, centroid)
         before = senses[rows] * 2.0 * slid[rows] / dt - after
         return cls(rows, stops[rows], senses[rows], before, after)
 
 
-def _sliding_speed(found: ContactSet, rows: np.ndarray, velocity: np.ndarray, centroid: np.ndarray) -> np.ndarray:
+def _sliding_speed(
+    found: ContactSet, geometry: np.ndarray, rows: np.ndarray, velocity: np.ndarray, centroid: np.ndarray
+) -> np.ndarray:
     """(n,) m/s of the vertex along the edge of contacts ``rows``, relative to the edge."""
-    normal, point = found.geometry[rows, 1:3], found.geometry[rows, 5:7]
+    normal, point = geometry[rows, 1:3], geometry[rows, 5:7]
     speed = np.zeros((len(rows), 2))
     for owner, sign in ((found.block[rows], 1.0), (found.other[rows], -1.0)):
         v, (x, y) = velocity[owner], (point - centroid[owner]).T

@@ -86,9 +86,9 @@ class BlockSystem:
         self.rigid = np.flatnonzero(rigid)
         self.compliance[rigid] = 0.0
         self.held = with_rigid(blocks.held, rigid)
-        self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
+        self.next = np.ascontiguousarray(blocks.next_vertex, np.int64)
         self.vertex_start = np.ascontiguousarray(blocks.vertex_start, np.int64)
-        self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
+        self.owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
         self.no_compliance = np.zeros((blocks.n_blocks, 3, 3))
         self.no_offset = np.zeros((blocks.n_blocks, 3))
 
@@ -171,7 +171,7 @@ class BlockSystem:
         vertices = np.ascontiguousarray(state.vertices)
         carried = self.settings.dynamic_factor * state.velocity
         carried[self.fixed] = 0.0
-        moments = block_moments(vertices, self._next, self.vertex_start)
+        moments = block_moments(vertices, self.next, self.vertex_start)
         if state.time == 0.0 and len(state.contacts) == 0:
             refuse_overlap(self.blocks, vertices, moments)
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
@@ -246,7 +246,7 @@ class BlockSystem:
             )
 
     def _refuse_crushed(self, state: State) -> None:
-        area = block_moments(state.vertices, self._next, self.vertex_start)[:, 0]
+        area = block_moments(state.vertices, self.next, self.vertex_start)[:, 0]
         if not (area > 0).all():
             crushed = int(np.argmin(area > 0))
             name = self.blocks.names[crushed] if self.blocks.names else f"block {crushed}"
@@ -258,8 +258,8 @@ class BlockSystem:
         """``dt`` shortened where the velocity alone would carry a vertex beyond the limit."""
         if not carried.any():
             return dt
-        v = carried[self._owner]
-        x, y = vertices[:, 0] - moments[self._owner, 1], vertices[:, 1] - moments[self._owner, 2]
+        v = carried[self.owner]
+        x, y = vertices[:, 0] - moments[self.owner, 1], vertices[:, 1] - moments[self.owner, 2]
         vx = v[:, 0] - v[:, 2] * y + v[:, 3] * x + 0.5 * v[:, 5] * y
         vy = v[:, 1] + v[:, 2] * x + v[:, 4] * y + 0.5 * v[:, 5] * x
         speed = float(np.sqrt(np.max(vx * vx + vy * vy)))

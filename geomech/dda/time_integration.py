@@ -50,6 +50,12 @@ class TimeScheme:
     mass_damping: float = 0.0
     stiffness_damping: float = 0.0
 
+    @property
+    def place(self) -> float:
+        """At which part of the step its forces have their places and directions: the α-scheme's are those of its
+        end."""
+        return 0.5 if self.recall == 0.0 else 1.0
+
     @classmethod
     def of(cls, settings: DdaSettings) -> TimeScheme:
         beta, gamma = settings.newmark

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
+from geomech.conventions import rotate_stress
 from geomech.model import (
     OPEN,
     SLIP,
@@ -50,8 +51,10 @@ def imbalance(system: dda.BlockSystem, before: State, result: dda.StepResult) ->
         add(row["block"], row["point"], row["force"])
     for row in f.edges:
         add(row["block"], 0.5 * (row["start"] + row["end"]), row["force"])
-    # A linear body force field b0 + B x has the resultant A b0 and the moment ∫ (x b_y − y b_x) dA.
+    # A linear body force field b0 + B x has the resultant A b0 and the moment ∫ (x b_y − y b_x) dA; inertia is that of
+    # the block as the step began, turned to where the forces act.
     second = dda.block_moments(before.vertices, system.blocks.next_vertex, system.blocks.vertex_start)[:, 3:]
+    second = rotate_stress(second, result.turn)
     b = f.body_force_gradient
     total[:, :2] += f.area[:, None] * f.body_force
     total[:, 2] += second[:, 0] * b[:, 1, 0] + second[:, 2] * (b[:, 1, 1] - b[:, 0, 0]) - second[:, 1] * b[:, 0, 1]

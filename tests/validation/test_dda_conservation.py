@@ -81,7 +81,7 @@ def test_a_collision_of_nine_blocks_keeps_momentum_and_gains_no_energy(newmark, 
     assert sum(touching) > 10
     # Contact forces are equal and opposite at one point: round-off of 300 steps.
     assert np.abs(after - before).max() < 1e-12 * scale
-    # Equilibrium of moments holds on the geometry before the step; blocks go on by v dt meanwhile. Second order in dt.
-    assert abs(turned - turning) < 2e-3 * scale
+    # Forces act where blocks are in the middle of the step, which is foreseen but for impacts.
+    assert abs(turned - turning) < 1e-4 * scale
     assert energies.max() < 1 + 1e-7
     assert np.diff(energies).max() < step_rise
