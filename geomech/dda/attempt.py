@@ -185,7 +185,7 @@ class Attempt:
                 # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
                 # this one.
                 better = found.cornered(better)
-            found = better.trying(found.rows(settled))
+            found = better.trying_again(settled)
         else:
             raise Unsettled("faces do not settle on the part of them that touches")
         self.found, self.settled, self.unknowns = found, settled, unknowns

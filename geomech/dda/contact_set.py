@@ -95,6 +95,14 @@ class ContactSet:
         known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
         return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
 
+    def trying_again(self, settled: Settled) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with the states so ``settled`` with springs that stood
+        elsewhere. (The sense of sliding is that of each spring: forces at the corners of a face may have another.)"""
+        # A bond that was lost there may hold here.
+        known = (self.bonded == 0) | (settled.bonded == self.bonded)
+        tried = np.where(known, settled.state, self.state), np.where(known, settled.direction, self.direction)
+        return replace(self, tried=tried)
+
     def like(self, rows: np.ndarray) -> ContactSet:
         """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press
         on."""

@@ -28,6 +28,7 @@ from .contact_springs import Springs
 from .contact_states import check_states, contact_forces
 from .contacts import ContactSet
 from .curved_joints import CurvedJoints
+from .joint_states import clusters, settled_together, with_neighbours
 from .lagged_friction import LaggedFriction
 from .rounded_laws import RoundedLaws
 
@@ -36,11 +37,15 @@ from .rounded_laws import RoundedLaws
 _ALL, _SOME, _WORST, _FIRST = 0, 1, 2, 3
 #: Switching all goes on while the number of wrong contacts falls to this part of the fewest so far, …
 _FEWER = 0.55
-#: … or for so many iterations although it does not.
-_TRIES = 1
+#: … or for so many iterations although it does not, more where no more than this part of the contacts is wrong (on a
+#: slope that slides, an iteration takes a fifth of one of the path, of which forty may lead nowhere).
+_TRIES, _TRIES_OF_FEW, _FEW_OF_ALL = 1, 4, 0.02
 #: If no more than this many contacts are still wrong then, only some are switched, while that helps or for so many
 #: iterations.
 _LITTLE, _MORE = 12, 5
+#: Before that, where no more than so many are wrong, the states of those that were in the last iterations (these and so
+#: many more) are sought together, so many times; no more than so many with each other.
+_SOUGHT, _LATELY, _TOGETHER, _JOINED = 40, 3, 12, 80
 #: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path
 #: takes fifteen; it is asked after so many iterations.
 _FEW, _CAUTIOUS = 40, 12
@@ -159,6 +164,27 @@ class _Equations:
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
         self._side = np.empty(6 * self.pattern.n)
+
+    def together(self, which: np.ndarray, states: _States, answer: _Answer) -> _States:
+        """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in common
+        at a time; where none are found, as the ``answer`` calls for."""
+        found = self.found
+        fixed = found, self.vectors, answer.springs, answer.gap
+        for some in clusters(which, found, self.pattern.order):
+            proposal = None
+            wider = with_neighbours(some, states.state, states.bonded, found, self.pattern.order)
+            for group in (some, wider):
+                if proposal is None and group.sum() <= _JOINED:
+                    try:
+                        proposal = settled_together(
+                            group, states.state, states.direction, self.pattern, self.matrix, self.right, *fixed
+                        )
+                    except np.linalg.LinAlgError:
+                        # In statics nothing else may hold their blocks.
+                        break
+            called = some & (answer.violation > 0)
+            states = states.switched(called, answer.called) if proposal is None else _States(*proposal, states.bonded)
+        return states
 
     def answer(self, states: _States, normal_force: np.ndarray, slip: np.ndarray) -> _Answer:
         """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises
@@ -331,6 +357,8 @@ def settle(
     caution, fewest, tries = _ALL, np.inf, 0
     few, small = len(found) <= _FEW, pattern.solver is None
     iteration, most = 0, max_iterations
+    # Contacts (n,) that were wrong in the last iterations, when few were, and how often they were sought together.
+    lately, joint = [], 0
     # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states
     # fits.
     closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
@@ -364,7 +392,19 @@ def settle(
         seen.add(states.key)
         tries = 0 if number <= _FEWER * fewest else tries + 1
         fewest = min(fewest, number)
-        stuck = caution == _ALL and (returned or tries > _TRIES)
+        most_tries = _TRIES if few or number > _FEW_OF_ALL * len(found) else _TRIES_OF_FEW
+        stuck = caution == _ALL and (returned or tries > most_tries)
+        if few or caution != _ALL or number > _SOUGHT:
+            lately, joint = [], 0
+        else:
+            lately = [*lately[-_LATELY:], wrong]
+            if (stuck or joint) and joint < _TOGETHER:
+                joint += 1
+                proposal = equations.together(np.any(lately, axis=0), states, answer)
+                if proposal.key not in seen:
+                    states = proposal
+                    continue
+                joint = _TOGETHER
         tired = caution == _SOME and (returned or tries > _MORE)
         if few and path is None:
             tired = iteration > _CAUTIOUS or (caution == _FIRST and returned)

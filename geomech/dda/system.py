@@ -179,7 +179,7 @@ class BlockSystem:
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
         found = self.finder.find(state, vertices, _WINDOW * limit)
         if like is not None:
-            found = found.like(like.contacts)
+            found = found.like(like.state.contacts)
         reason, before, broken = "", np.inf, np.zeros(0, np.int64)
         cuts = 0
         while True:
