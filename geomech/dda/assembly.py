@@ -140,6 +140,37 @@ def contact_vectors(block, other, geometry, order, moments):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def begin(data, matrix, stride, diagonal):
+    """The flat ``data`` as lines of six, with the blocks' own part alone."""
+    data[:] = 0.0
+    lines = data.reshape((-1, 6))
+    for b in range(matrix.shape[0]):
+        for a in range(6):
+            line = (diagonal[b] + a * stride[b]) // 6
+            for m in range(6):
+                lines[line, m] = matrix[b, a, m]
+    return lines
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True, inline="always")
+def add_block(lines, first, step, push, drag, pull, across, mine, its):
+    """Add the 6 × 6 of ``push`` ⊗ ``pull`` + ``drag`` ⊗ ``across`` (12,) whose rows begin at ``mine`` and columns at
+    ``its`` to every ``step``-th of the ``lines`` of `begin`. (Written out and inlined: two thirds of the time of
+    loops.)"""
+    u0, u1, u2, u3, u4, u5 = pull[its], pull[its + 1], pull[its + 2], pull[its + 3], pull[its + 4], pull[its + 5]
+    t = across
+    t0, t1, t2, t3, t4, t5 = t[its], t[its + 1], t[its + 2], t[its + 3], t[its + 4], t[its + 5]
+    for a in range(6):
+        line, p, d = first + a * step, push[mine + a], drag[mine + a]
+        lines[line, 0] += p * u0 + d * t0
+        lines[line, 1] += p * u1 + d * t1
+        lines[line, 2] += p * u2 + d * t2
+        lines[line, 3] += p * u3 + d * t3
+        lines[line, 4] += p * u4 + d * t4
+        lines[line, 5] += p * u5 + d * t5
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def assemble_contacts(
     data,
     right,
@@ -168,16 +199,12 @@ def assemble_contacts(
     Normal force N = −kₙ(g + n·Δu − κ t·Δu), with the lift κ by sliding. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c),
     with N the unknown one, which makes the matrix unsymmetric but friction exact in one solution.
     """
-    data[:] = 0.0
-    n = matrix.shape[0]
-    for b in range(n):
+    lines = begin(data, matrix, stride, diagonal)
+    for b in range(matrix.shape[0]):
         for a in range(6):
             right[6 * b + a] = base_right[b, a]
-            line = data[diagonal[b] + a * stride[b] : diagonal[b] + a * stride[b] + 6]
-            for m in range(6):
-                line[m] = matrix[b, a, m]
     symmetric = True
-    push, pull = np.empty(12), np.empty(12)
+    push, drag, pull, across = np.empty(12), np.empty(12), np.empty(12), np.empty(12)
     for c in range(block.shape[0]):
         if state[c] == OPEN:
             continue
@@ -186,40 +213,24 @@ def assemble_contacts(
             slope = direction[c] * friction[c]
             given = direction[c] * sliding[c]
             symmetric = symmetric and slope == 0.0 and lift[c] == 0.0
-        # Slices with indices that cannot be negative: only such loops become vector instructions.
-        along, across = vectors[c, 0], vectors[c, 1]
-        for a in range(12):
-            push[a] = along[a] + slope * across[a]
-            pull[a] = along[a] - lift[c] * across[a]
         stiff_along = shear[c] if state[c] == STICK else 0.0
-        for side in range(2):
-            i = order[block[c]] if side == 0 else order[other[c]]
-            if i < 0:
-                continue
-            mine, my_push, my_across = (
-                right[6 * i : 6 * i + 6],
-                push[6 * side : 6 * side + 6],
-                across[6 * side : 6 * side + 6],
-            )
-            for a in range(6):
-                mine[a] -= normal[c] * gap[c] * my_push[a]
-                mine[a] += given * my_across[a]
-            for target in range(2):
-                j = order[block[c]] if target == 0 else order[other[c]]
-                if j < 0:
-                    continue
-                if side == target:
-                    base = diagonal[i]
-                elif side == 0:
-                    base = upper[c]
-                else:
-                    base = lower[c]
-                its_pull, its_across = pull[6 * target : 6 * target + 6], across[6 * target : 6 * target + 6]
-                for a in range(6):
-                    line = data[base + a * stride[i] : base + a * stride[i] + 6]
-                    pushed, dragged = normal[c] * my_push[a], stiff_along * my_across[a]
-                    for m in range(6):
-                        line[m] += pushed * its_pull[m] + dragged * its_across[m]
+        kn, rise, pressed = normal[c], lift[c], normal[c] * gap[c]
+        i, j = order[block[c]], order[other[c]]
+        for a in range(12):
+            n, t = vectors[c, 0, a], vectors[c, 1, a]
+            push[a], drag[a] = n + slope * t, stiff_along * t
+            pull[a], across[a] = n - rise * t, t
+            k = i if a < 6 else j
+            if k >= 0:
+                right[6 * k + a % 6] += given * t - pressed * push[a]
+            push[a] *= kn
+        if i >= 0:
+            add_block(lines, diagonal[i] // 6, stride[i] // 6, push, drag, pull, across, 0, 0)
+        if j >= 0:
+            add_block(lines, diagonal[j] // 6, stride[j] // 6, push, drag, pull, across, 6, 6)
+        if i >= 0 and j >= 0:
+            add_block(lines, upper[c] // 6, stride[i] // 6, push, drag, pull, across, 0, 6)
+            add_block(lines, lower[c] // 6, stride[j] // 6, push, drag, pull, across, 6, 0)
     return symmetric
 
 

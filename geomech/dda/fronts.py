@@ -1,0 +1,254 @@
+"""Elimination of dense fronts of 6×6 blocks, and substitution through them, in double or single precision.
+
+A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel
+of three blocks at a time,
+
+    Z = F_kk⁻¹,   U = Z F_k·,   F_ij ← F_ij − F_ik U_j,
+
+and what is left of F_BB is added into its parent's front (Duff & Reid 1983). Arrays of the tree are those of
+`dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) chain the children of a front.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+#: Sums may be reordered and fused: the products of whole fronts are summed as BLAS likes, too.
+_jit = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+
+#: Unknowns eliminated at a time; twelve to thirty keep BLAS as busy.
+PANEL = 18
+
+#: BLAS's general products, as Numba itself binds them for np.dot: here with strides, and added in place.
+_gemm = types.ExternalFunction(
+    "numba_xxgemm",
+    types.intc(
+        types.char, types.char, types.char, types.intp, types.intp, types.intp, types.voidptr, types.voidptr, types.intp,
+        types.voidptr, types.intp, types.voidptr, types.voidptr, types.intp,
+    ),
+)  # fmt: skip
+
+
+@_jit
+def _product(a, x):
+    """Σ a x. Where a factor streams from memory, one row after the other runs at twice the speed of BLAS, which reads
+    four at a time."""
+    total = a.dtype.type(0)
+    for j in range(len(a)):
+        total += a[j] * x[j]
+    return total
+
+
+@_jit
+def _add_product(scale, a, b, keep, c):
+    """c ← keep c + scale a b for row-major slices; ``scale`` and ``keep`` (1,) of the same type."""
+    if c.shape[0] == 0 or c.shape[1] == 0:
+        return
+    size = c.itemsize
+    # Row-major arrays are their transposes to BLAS: cᵀ = bᵀaᵀ.
+    _gemm(
+        100 if size == 8 else 115, 78, 78, c.shape[1], c.shape[0], a.shape[1], scale.ctypes, b.ctypes,
+        b.strides[0] // size, a.ctypes, a.strides[0] // size, keep.ctypes, c.ctypes, c.strides[0] // size,
+    )  # fmt: skip
+
+
+@_jit
+def _invert(a, swapped):
+    """Invert ``a`` (n, n) in place, Gauss–Jordan with exchange of rows; False if it is singular."""
+    n = a.shape[0]
+    for k in range(n):
+        pivot, largest = k, abs(a[k, k])
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > largest:
+                pivot, largest = i, abs(a[i, k])
+        if not (largest > 0.0 and largest < np.inf):
+            return False
+        swapped[k] = pivot
+        if pivot != k:
+            for j in range(n):
+                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
+        share = 1 / a[k, k]
+        a[k, k] = 1
+        for j in range(n):
+            a[k, j] *= share
+        for i in range(n):
+            if i != k:
+                share = a[i, k]
+                a[i, k] = 0
+                for j in range(n):
+                    a[i, j] -= share * a[k, j]
+    for k in range(n - 1, -1, -1):
+        pivot = swapped[k]
+        if pivot != k:
+            for i in range(n):
+                a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
+    return True
+
+
+@_jit
+def longest(pivots, reach, first, last):
+    """The most unknowns of any front from ``first`` to before ``last``, and the most beyond its own."""
+    most, far = 0, 0
+    for f in range(first, last):
+        most = max(most, 6 * (pivots[f + 1] - pivots[f] + reach[f + 1] - reach[f]))
+        far = max(far, 6 * (reach[f + 1] - reach[f]))
+    return most, far
+
+
+@_jit
+def eliminate(
+    first,
+    last,
+    touched,
+    data,
+    pivots,
+    reach,
+    seat,
+    entries,
+    entry,
+    row,
+    column,
+    stack,
+    kept,
+    at,
+    child,
+    sibling,
+    room,
+    factors,
+    units,
+    space,
+):
+    """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
+    ``units`` are 1, −1, 0; ``space``: room for a panel, for a front's rest where these are not ``kept``, and for
+    numbers, as from `working_space`."""
+    one, minus, none = units[0:1], units[1:2], units[2:3]
+    panel, spare, begins, swapped = space
+    for f in range(first, last):
+        if not touched[f]:
+            continue
+        own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
+        p, b = 6 * own, 6 * far
+        m = p + b
+        upper = factors[at[f] : at[f] + p * m].reshape((p, m))
+        lower = factors[at[f] + p * m : at[f + 1]].reshape((b, p))
+        if kept:
+            rest = room[stack[f] : stack[f] + b * b].reshape((b, b))
+        else:
+            rest = spare[: b * b].reshape((b, b))
+        # A leaf's rest is its own product alone: not cleared, for clearing takes as long as adding.
+        leaf = child[f] < 0 and p > 0
+        if not leaf:
+            rest[:] = 0
+        upper[:] = 0
+        lower[:] = 0
+        for k in range(entries[f], entries[f + 1]):
+            i, j = row[k], column[k]
+            block = data[36 * entry[k] : 36 * entry[k] + 36]
+            for a in range(6):
+                here = (upper[6 * i + a] if i < own else lower[6 * (i - own) + a])[6 * j : 6 * j + 6]
+                for c in range(6):
+                    here[c] = block[6 * a + c]
+        g = child[f]
+        while g >= 0:
+            met, n = reach[g], reach[g + 1] - reach[g]
+            # Neighbours in the child's boundary mostly stand side by side in the parent too: long rows are added at
+            # once.
+            runs = 0
+            for v in range(n):
+                j = seat[met + v]
+                if v == 0 or j != seat[met + v - 1] + 1 or j == own:
+                    begins[runs] = v
+                    runs += 1
+            begins[runs] = n
+            for u in range(n):
+                i = seat[met + u]
+                for a in range(6):
+                    line = room[stack[g] + (6 * u + a) * 6 * n : stack[g] + (6 * u + a + 1) * 6 * n]
+                    if i < own:
+                        own_row, far_row = upper[6 * i + a, :p], upper[6 * i + a, p:]
+                    else:
+                        own_row, far_row = lower[6 * (i - own) + a], rest[6 * (i - own) + a]
+                    for r in range(runs):
+                        j, v, w = 6 * seat[met + begins[r]], 6 * begins[r], 6 * begins[r + 1]
+                        # Slices, for their indices need no check for a negative sign, which would keep loops from
+                        # vectors.
+                        here = own_row[j : j + w - v] if j < p else far_row[j - p : j - p + w - v]
+                        added = line[v:w]
+                        for c in range(w - v):
+                            here[c] += added[c]
+            g = sibling[g]
+        for start in range(0, p, PANEL):
+            end = min(start + PANEL, p)
+            if not _invert(upper[start:end, start:end], swapped):
+                return False
+            right = panel[: (end - start) * (m - end)].reshape((end - start, m - end))
+            scaled = upper[start:end, end:]
+            right[:] = scaled
+            _add_product(one, upper[start:end, start:end], right, none, scaled)
+            _add_product(minus, upper[end:, start:end], scaled, one, upper[end:, end:])
+            _add_product(minus, lower[:, start:end], scaled[:, : p - end], one, lower[:, end:])
+        if p > 0:
+            _add_product(minus, lower, upper[:, p:], none if leaf else one, rest)
+        if not kept:
+            room[stack[f] : stack[f] + b * b] = rest.ravel()
+    return True
+
+
+@_jit
+def working_space(pivots, reach, kept, factors):
+    """What `eliminate` works in."""
+    most, far = longest(pivots, reach, 0, len(reach) - 1)
+    panel, spare = np.empty(PANEL * most, factors.dtype), np.empty(0 if kept else far * far, factors.dtype)
+    return panel, spare, np.empty(far // 6 + 1, np.int64), np.empty(PANEL, np.int64)
+
+
+@_jit
+def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, passed):
+    """Forward substitution in ``out`` (6n,), in the order of elimination, through fronts from ``first`` to before
+    ``last``; ``passed`` holds what each front passes on."""
+    part = np.empty(PANEL, factors.dtype)
+    for f in range(first, last):
+        own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
+        p = 6 * own
+        m = p + 6 * far
+        mine, further = out[6 * pivots[f] : 6 * pivots[f + 1]], passed[6 * reach[f] : 6 * reach[f + 1]]
+        further[:] = 0
+        g = child[f]
+        while g >= 0:
+            for u in range(reach[g], reach[g + 1]):
+                i = seat[u]
+                here = mine[6 * i : 6 * i + 6] if i < own else further[6 * (i - own) : 6 * (i - own) + 6]
+                for a in range(6):
+                    here[a] += passed[6 * u + a]
+            g = sibling[g]
+        upper = factors[at[f] : at[f] + p * m].reshape((p, m))
+        lower = factors[at[f] + p * m : at[f + 1]].reshape((6 * far, p))
+        for start in range(0, p, PANEL):
+            end = min(start + PANEL, p)
+            for i in range(start, end):
+                part[i - start] = mine[i] - _product(upper[i, :start], mine)
+            for i in range(start, end):
+                mine[i] = _product(upper[i, start:end], part)
+        for i in range(6 * far):
+            further[i] -= _product(lower[i], mine)
+
+
+@_jit
+def backward(first, last, out, pivots, reach, boundary, at, factors):
+    """Backward substitution in ``out`` from front ``last`` − 1 down to ``first``."""
+    known = np.empty(longest(pivots, reach, first, last)[0], factors.dtype)
+    for f in range(last - 1, first - 1, -1):
+        start_of, p, n = 6 * pivots[f], 6 * (pivots[f + 1] - pivots[f]), reach[f + 1] - reach[f]
+        m = p + 6 * n
+        upper = factors[at[f] : at[f] + p * m].reshape((p, m))
+        known[:p] = out[start_of : start_of + p]
+        for u in range(n):
+            i, j = 6 * boundary[reach[f] + u], p + 6 * u
+            for a in range(6):
+                known[j + a] = out[i + a]
+        for start in range(PANEL * ((p - 1) // PANEL), -1, -PANEL):
+            end = min(start + PANEL, p)
+            for i in range(start, end):
+                known[i] -= _product(upper[i, end:], known[end:])
+        out[start_of : start_of + p] = known[:p]
