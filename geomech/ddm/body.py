@@ -225,13 +225,13 @@ class Body:
         self.work.elements_assembled += self.counts["elements_new"]
         self.work.bodies += 1
 
-        width, before = 2 * c.per, old._cg if old else None
+        before = old._cg if old else None
         if same_boundary and isinstance(before, KeptRows) and not self.compressed:
-            self._cg = before.grown(c_seen, lambda r: system.influence_on(c.take(r), np.arange(g.n)))
+            self._cg = before.grown(c, c_seen, lambda r: system.influence_on(c.take(r), np.arange(g.n)))
         else:
             before = before.dense if isinstance(before, KeptRows) else before
             rows = reuse(before, c_seen, g_old, c, g, lambda r, k: system.influence_on(c.take(r), k), "C")
-            self._cg = rows if self.compressed else KeptRows.whole(rows, width)
+            self._cg = rows if self.compressed else KeptRows.whole(rows, c)
         if system.holds is not None:
             self._c_known = system.holds.known(c, nu, tol)
         self._loads = UnitLoads(
@@ -257,7 +257,7 @@ class Body:
             return system.solve(gc(k)).T
 
         every = np.arange(c.n)
-        w = old._w.rows.grown(c_old, follow) if kept else KeptRows.whole(follow(every), width)
+        w = old._w.rows.grown(c, c_old, follow) if kept else KeptRows.whole(follow(every), c)
         self._w = w.T
 
         def schur(r, k):

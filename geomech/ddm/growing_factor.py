@@ -22,12 +22,15 @@ ROOM, MORE_ROOM = 1.5, 200
 
 
 class Known(NamedTuple):
-    """What is known of L and U before elimination: of the ``rows`` (numbers) the first columns of L, transposed, in
-    ``lower``, and of the ``columns`` the first rows of U in ``upper``."""
+    """What is known of L and U before elimination: of the ``rows`` (numbers) the first columns of L, which are those
+    ``as_rows`` of ``lower``, transposed, and of the ``columns`` the first rows of U, those ``as_columns`` of
+    ``upper``."""
 
     rows: np.ndarray
-    columns: np.ndarray
+    as_rows: np.ndarray
     lower: np.ndarray
+    columns: np.ndarray
+    as_columns: np.ndarray
     upper: np.ndarray
 
 
@@ -118,46 +121,76 @@ class GrowingFactor:
             here = slice(first, end)
             if not k:
                 factor = self._factor or Factor(np.array(self.s[here, here], order="F"), what)
+                self.lu[here, here], self.order[here] = factor.lu, factor.rows
                 self.scale[here], self._factor = factor.scale, None
                 self._trust.append((factor.rcond, 1.0))
             else:
                 down, right, corner = self.s[here, :first], self.s[:first, here], self.s[here, here]
                 lower, upper, t = self.beside(first, Border(down, right, corner, self.scale[here], self._known[k]))
-                factor = Factor(t, what)
-                self.lu[here, :first] = (lower * factor.scale).T[factor.rows]
-                self.lu[:first, here] = upper
-                self.scale[here] *= factor.scale
-                rcond, worst = self._trust[-1]
-                self._trust.append((min(rcond, factor.rcond), max(worst, loss(lower, upper, t))))
-                self._known[k] = None
-            self.lu[here, here] = factor.lu
-            self.order[here] = first + factor.rows
+                self._eliminated(first, lower, upper, t, Factor(t, what))
         return self._trust[upto]
+
+    def _eliminated(self, first: int, lower: np.ndarray, upper: np.ndarray, t: np.ndarray, factor: Factor) -> None:
+        """Keep the factors of the next unknowns, behind the ``first``."""
+        here, k = slice(first, first + factor.n), len(self._trust)
+        self.lu[here, :first] = (lower * factor.scale).T[factor.rows]
+        self.lu[:first, here] = upper
+        self.lu[here, here] = factor.lu
+        self.order[here] = first + factor.rows
+        self.scale[here] *= factor.scale
+        rcond, worst = self._trust[-1]
+        self._trust.append((min(rcond, factor.rcond), max(worst, loss(lower, upper, t))))
+        self._known[k] = None
+
+    def is_next(self, n: int, m: int) -> bool:
+        """Whether all of the first ``n`` unknowns are eliminated and the next ``m``, that came together, are not."""
+        k = len(self._trust)
+        return 0 < k < len(self._ends) and self._ends[k - 1 : k + 1] == [n, n + m]
 
     def beside(self, n: int, border: Border) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of what stands behind the first ``n`` unknowns, all eliminated, L transposed (n, k), U (n, k) and what is
         left of its own block."""
-        rows = (border.down * border.scale[:, None]).T
-        columns = (border.right * self.scale[:n, None])[self.order[:n]]
-        k, known = len(border.corner), border.known
-        lower, upper = np.empty((n, k), order="F"), np.empty((n, k), order="F")
-        for out, given, names, before, solve in (
-            (lower, rows, known and known.rows, known and known.lower, self._below),
-            (upper, columns, known and known.columns, known and known.upper, self._above),
-        ):
-            if known is None or not len(names):
-                out[:] = solve(0, n, given)
-                continue
-            m, fresh = len(before), np.ones(k, bool)
-            fresh[names] = False
-            out[:, fresh] = solve(0, n, given[:, fresh])
-            out[:m, names] = before
-            if m < n:
-                across = self.lu[:m, m:n].T if solve == self._below else self.lu[m:n, :m]
-                out[m:, names] = solve(m, n, given[m:, names] - across @ before)
+        # Column-major all the way.
+        rows = border.down.T * border.scale
+        columns = np.take(border.right.T, self.order[:n], axis=1)
+        columns *= self.scale[self.order[:n]]
+        known = border.known
+        if known is None:
+            lower, upper = self._below(0, n, rows), self._above(0, n, columns.T)
+        else:
+            lower = self._beyond(n, rows, known.rows, known.lower, known.as_rows, self._below)
+            upper = self._beyond(n, columns.T, known.columns, known.upper, known.as_columns, self._above)
         t = np.array(border.corner * border.scale[:, None], order="F")
-        t -= lower.T @ upper
+        t -= (upper.T @ lower).T
         return lower, upper, t
+
+    def _beyond(self, n: int, given: np.ndarray, names, before, which, solve) -> np.ndarray:
+        """``solve`` with ``given`` (n, k), where of the columns ``names`` the first rows are ``before[:, which]``."""
+        if not len(names):
+            return solve(0, n, given)
+        m, fresh, before = len(before), np.ones(given.shape[1], bool), before.T[which].T
+        fresh[names] = False
+        out = np.empty(given.shape, order="F")
+        out.T[fresh] = solve(0, n, given.T[fresh].T).T
+        out[:m, names] = before
+        if m < n:
+            across = self.lu[:m, m:n].T if solve == self._below else self.lu[m:n, :m]
+            out[m:, names] = solve(m, n, given[m:, names] - across @ before)
+        return out
+
+    def eliminate_with(self, n: int, border: Border, m: int, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same for all but the first ``m`` of the ``border``, which stand behind the first ``n`` unknowns already
+        and are eliminated on the way."""
+        lower, upper, t = self.beside(n, border)
+        first = np.array(t[:m, :m], order="F")
+        self._eliminated(n, lower[:, :m], upper[:, :m], first, Factor(first, what))
+        end = n + m
+        across = t[:m, m:] * self.scale[n:end, None] / border.scale[:m, None]
+        beyond = self._above(n, end, across[self.order[n:end] - n]), self._below(n, end, t[m:, :m].T)
+        out_lower, out_upper = np.empty((2, t.shape[0] - m, end))
+        out_lower[:, :n], out_upper[:, :n] = lower.T[m:], upper.T[m:]
+        out_upper[:, n:], out_lower[:, n:] = beyond[0].T, beyond[1].T
+        return out_lower.T, out_upper.T, t[m:, m:] - beyond[1].T @ beyond[0]
 
     # -- triangles -----------------------------------------------------------------------------------------------
 

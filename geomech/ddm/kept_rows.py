@@ -1,4 +1,4 @@
-"""Rows by crack elements, kept while cracks grow: new ones are put beside the old, nothing is copied."""
+"""Rows by crack elements, kept while cracks grow: new ones are put behind the old, nothing is copied."""
 
 from __future__ import annotations
 
@@ -6,66 +6,98 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .influence import unknowns_of
+from .influence import ElementSet, unknowns_of
+from .shapes import ORDINARY
 
 #: Rows of elements that are gone are left out when there are so many times as many rows as are in use.
 CARRIED = 1.3
-#: Blocks are joined while the last but one has less than so many times the rows of the last.
-ALIKE = 2.0
+#: Room is made for so many times the rows.
+ROOM = 1.5
+
+
+class _Roomy:
+    """Rows with room for more behind them, shared by all that hold some of the first: what is there stays."""
+
+    def __init__(self, rows: np.ndarray):
+        self.n, self.rows = len(rows), rows
+
+    def __getstate__(self) -> np.ndarray:
+        """Without the room, which may hold anything."""
+        return self.rows[: self.n].copy()
+
+    def __setstate__(self, rows: np.ndarray) -> None:
+        self.n, self.rows = len(rows), rows
+
+    def followed(self, n: int, more: np.ndarray) -> _Roomy:
+        """Its first ``n`` rows and ``more`` behind them."""
+        if self.n == n and n + len(more) <= len(self.rows):
+            self.rows[n : n + len(more)] = more
+            self.n = n + len(more)
+            return self
+        out = _Roomy(np.empty((int(ROOM * (n + len(more))), more.shape[1])))
+        out.n = n + len(more)
+        out.rows[:n], out.rows[n : out.n] = self.rows[:n], more
+        return out
 
 
 class KeptRows:
-    """A matrix (n, m) of ``width`` rows an element: ``blocks`` of rows in the order in which they came, and ``at``
-    (n_elements,) where the elements are in that order."""
+    """A matrix (n, m) of the rows of ``elements``: the first ``n_firm`` of ``firm`` and behind them the ``loose`` ones,
+    of elements with a tip, which go when it moves on; ``at`` (n_elements,) is where the elements are in this order."""
 
-    def __init__(self, blocks: tuple[np.ndarray, ...], at: np.ndarray, width: int):
-        self.blocks, self.at, self._width = blocks, at, width
-        self._total = sum(len(block) for block in blocks)
+    def __init__(self, firm: _Roomy, n_firm: int, loose: np.ndarray, at: np.ndarray, width: int):
+        self._firm, self._n, self._loose, self.at, self._width = firm, n_firm, loose, at, width
+        self._total = n_firm + len(loose)
         self._in_order = len(at) * width == self._total and bool((at == np.arange(len(at))).all())
         self._places = unknowns_of(at, width)
 
     @classmethod
-    def whole(cls, matrix: np.ndarray, width: int) -> KeptRows:
-        return cls((matrix,), np.arange(len(matrix) // width), width)
+    def whole(cls, matrix: np.ndarray, elements: ElementSet) -> KeptRows:
+        n, width = elements.n, 2 * elements.per
+        return cls(_Roomy(matrix), n * width, np.empty((0, matrix.shape[1])), np.arange(n), width)
 
-    def grown(self, was: np.ndarray, compute: Callable[[np.ndarray], np.ndarray]) -> KeptRows:
-        """The matrix of elements whose numbers were ``was`` (n_elements,), −1 where new; ``compute(elements)`` makes
+    def grown(self, elements: ElementSet, was: np.ndarray, compute: Callable[[np.ndarray], np.ndarray]) -> KeptRows:
+        """The matrix of ``elements`` whose numbers were ``was`` (n,), −1 where new; ``compute(elements)`` makes
         rows."""
-        new, kept = np.flatnonzero(was < 0), np.flatnonzero(was >= 0)
-        at = np.empty(len(was), int)
-        at[kept], at[new] = self.at[was[kept]], self._total // self._width + np.arange(len(new))
-        blocks = [*self.blocks, compute(new)] if len(new) else list(self.blocks)
-        while len(blocks) > 2 and len(blocks[-2]) < ALIKE * len(blocks[-1]):
-            blocks[-2:] = [np.concatenate(blocks[-2:])]
-        out = KeptRows(tuple(blocks), at, self._width)
-        return out if out._total < CARRIED * len(out._places) else KeptRows.whole(out.dense, self._width)
+        width, n = self._width, self._n // self._width
+        at = np.append(self.at, -1)[was]  # its end stands for −1
+        new = np.flatnonzero(at < 0)
+        # What is not among the firm rows is loose, as it was, or computed.
+        come = np.flatnonzero((at < 0) | (at >= n))
+        stay = elements.kind[come] == ORDINARY
+        come = np.concatenate([come[stay], come[~stay]])
+        k, m = width * int(stay.sum()), self._loose.shape[1]
+        rows = np.empty((len(come), width, m))
+        old = at[come] >= 0
+        rows[old] = self._loose.reshape(len(self._loose) // width, width, m)[at[come[old]] - n]
+        if len(new):
+            rows[~old] = compute(come[~old]).reshape(len(new), width, m)
+        at[come] = n + np.arange(len(come))
+        rows = rows.reshape(width * len(come), m)
+        firm = self._firm.followed(self._n, rows[:k]) if k else self._firm
+        out = KeptRows(firm, self._n + k, rows[k:], at, width)
+        return out if out._total < CARRIED * len(out._places) else KeptRows.whole(out.dense, elements)
 
     def of(self, elements: np.ndarray) -> np.ndarray:
         """(k, m) rows of ``elements``."""
         places = unknowns_of(self.at[elements], self._width)
-        out, first = np.empty((len(places), self.blocks[0].shape[1])), 0
-        for block in self.blocks:
-            here = np.flatnonzero((places >= first) & (places < first + len(block)))
-            out[here] = block[places[here] - first]
-            first += len(block)
+        out, loose = np.empty((len(places), self._loose.shape[1])), places >= self._n
+        out[loose], out[~loose] = self._loose[places[loose] - self._n], self._firm.rows[places[~loose]]
         return out
 
     @property
     def dense(self) -> np.ndarray:
-        if self._in_order and len(self.blocks) == 1:
-            return self.blocks[0]
-        return np.concatenate(self.blocks)[self._places]
+        if self._in_order and not len(self._loose):
+            return self._firm.rows[: self._n]
+        return np.concatenate([self._firm.rows[: self._n], self._loose])[self._places]
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:
-        """(n,) or (n, k), the matrix times ``x`` (m,) or (m, k)."""
-        if len(self.blocks) == 1:
-            out = self.blocks[0] @ x
-        else:
-            out, first = np.empty((self._total, *x.shape[1:])), 0
-            for block in self.blocks:
-                np.matmul(block, x, out=out[first : first + len(block)])
-                first += len(block)
-        return out if self._in_order else out[self._places]
+        """(n,) or (n, k), column-major, the matrix times ``x`` (m,) or (m, k)."""
+        # Products into columns take half the time of products into rows.
+        out = np.empty((self._total, *x.shape[1:]), order="F")
+        np.matmul(self._firm.rows[: self._n], x, out=out[: self._n])
+        if len(self._loose):
+            np.matmul(self._loose, x, out=out[self._n :])
+        return out if self._in_order else out.T[..., self._places].T
 
     @property
     def T(self) -> TransposedRows:
@@ -76,11 +108,7 @@ class KeptRows:
         if not self._in_order:
             given, x = x, np.zeros((self._total, *x.shape[1:]))
             x[self._places] = given
-        out, first = np.zeros((self.blocks[0].shape[1], *x.shape[1:])), 0
-        for block in self.blocks:
-            out += block.T @ x[first : first + len(block)]
-            first += len(block)
-        return out
+        return self._firm.rows[: self._n].T @ x[: self._n] + self._loose.T @ x[self._n :]
 
 
 class TransposedRows:
