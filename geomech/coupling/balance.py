@@ -130,6 +130,9 @@ def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
         now.loads = boundary_loads(now.problem, now.blocks, now.state, motion, result, now.bodies)
     now.solutions = now.solve(now.bodies, now.loads, now.solutions)
     now.solved_from = now.history
+    for block, load in now.loads.items():
+        if load.bases:
+            now.loads[block] = replace(load, tractions=now.solutions[block].load.tractions)
 
 
 def _take_response(

@@ -78,6 +78,10 @@ def boundary_loads(
     vertices: on that geometry the forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
     strengths = [joint.tensile_strength for joint in problem.joints]
+    rigid = np.array([material.rigid for material in problem.materials], bool)
+    keep_straight = blocks.fixed | rigid[blocks.material]
+    if blocks.held is not None:
+        keep_straight = keep_straight | blocks.held.any(axis=1)
     acting = beside_acting(result.contacts, blocks.n_blocks)
     touching = zip(_rows_of(acting["block"], numbers), _rows_of(acting["other"], numbers))
     contacts, edges, points = (
@@ -107,6 +111,7 @@ def boundary_loads(
             problem.run.boundary_stress,
             strengths,
             None if forces.overstress is None else forces.overstress[b],
+            keep_straight,
         )
         for b in bodies
     }
@@ -147,6 +152,11 @@ def solve_bodies(
             body.work.solutions_kept += 1
             return known
         try:
+            if load.bases:
+                from ..ddm.bases import Base, on_bases
+
+                bases = [Base(*base) for base in load.bases]
+                return on_bases(body, ddm.BodyLoad(**asked), bases, known, history.get(b))
             return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
         except (ValueError, ddm.NotConverged) as failure:
             # (Others have more than a message, as `ddm.OutOfEquilibrium`.)
@@ -169,7 +179,7 @@ def threads_for(bodies: dict[int, Body]) -> int | None:
 
 
 #: What of a `BoundaryLoad` is a load.
-_ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name != "imbalance")
+_ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name not in ("imbalance", "bases"))
 
 
 def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:

@@ -6,12 +6,26 @@ from bisect import bisect_right
 
 from ..model import Blocks
 from .face_pressure import linear, no_pull
-from .load_pieces import SAME, Pieces, add_corner_force, add_edge_force, add_on_side, line_of, on_grid, place_along
+from .load_pieces import (
+    SAME,
+    Pieces,
+    add_base,
+    add_corner_force,
+    add_edge_force,
+    add_on_side,
+    line_of,
+    on_grid,
+    place_along,
+)
 from .touches import Touch
 
+#: A resultant nearer to an end of a face than this part of it presses there and nowhere else.
+AT_AN_END = 1e-2
 
-def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touch]) -> None:
-    """All that touches a straight ``side`` as one distribution with the resultant and moment of its forces."""
+
+def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touch], based: bool = False) -> None:
+    """All that touches a straight ``side`` as one distribution with the resultant and moment of its forces; where it is
+    ``based`` on what keeps straight, it is yet to be found how they are spread."""
     line = start, _, (ax, ay), length = line_of(blocks, side)
     places = [place_along(touch.point, start, (ax, ay)) for touch in touches]
     acting = [(place, touch) for place, touch in zip(places, touches) if touch.acts]
@@ -40,6 +54,14 @@ def add_face(pieces: Pieces, blocks: Blocks, side: list[int], touches: list[Touc
     even = holds or abs(total) <= 1e-9 * size or not inside
     slope = 0.0 if even else shear / total
     per_push = (slope * ax - ay, slope * ay + ax)
+    if based and not even:
+        near, far = (on_grid(min(max(place, 0.0), length), length) for place in (min(places), max(places)))
+        arm = moment / total
+        if min(arm - near, far - arm) > AT_AN_END * (far - near):
+            _, _, p_near, p_far = linear(far - near, total, moment - near * total)
+            add_base(pieces, blocks, side, line, (near, far), p_near, p_far, per_push)
+            pieces.left_out.append(((ax, ay), stretched - slope * moment))
+            return
     gapes = [(place, touch) for place, touch in zip(places, touches) if not touch.acts]
     for low, low_share in _ends(acting, gapes, length, -1):
         for high, high_share in _ends(acting, gapes, length, 1):

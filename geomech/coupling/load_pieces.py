@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,12 +31,19 @@ ON_EDGE = 1e-6
 LONE_SPREAD = 1.0 / 20.0
 
 
+#: Pieces of a face on a rigid base. A slot in a block as wide as deep, twice and three times as wide: K to 6e-4, 1e-4
+#: and 2e-3 with 24 of them, 7e-4, 2e-3 and 2 % with 16 (`tests/coupling/test_bases.py`).
+ON_BASE = 24
+
+
 class Pieces:
     """Loaded pieces of the outline as they are found: pairs of x and y at their two ends.
 
     ``left_out``: directions of faces, and by what moment (N m) shears along each of them stretch the block beyond what
     the tractions on it do: those of two contacts that oppose each other have neither resultant nor moment. ``couple``:
     the moment (N m) that forces lose which act beyond the end of the edge that bears them, see `add_couple`.
+    ``bases``: rows of pieces, one after the other, that press on a rigid base, and the traction with a unit of
+    pressure.
     """
 
     def __init__(self) -> None:
@@ -44,6 +52,7 @@ class Pieces:
         self.points: list[tuple[np.ndarray, np.ndarray]] = []
         self.left_out: list[tuple[tuple[float, float], float]] = []
         self.couple = 0.0
+        self.bases: list[tuple[range, tuple[float, float]]] = []
 
     def add(self, a, b, t_a, t_b) -> None:
         if any(t_a) or any(t_b):
@@ -98,6 +107,25 @@ def add_on_side(pieces: Pieces, blocks: Blocks, side: list[int], line: tuple, sp
         low, high = max(a, marks[k]), min(b, marks[k + 1])
         if high - low > SNAP * length:
             pieces.add(at(low, k), at(high, k + 1), traction(low), traction(high))
+
+
+def add_base(pieces: Pieces, blocks: Blocks, side: list[int], line: tuple, span: tuple, p_a, p_b, per_push) -> None:
+    """A pressure from ``p_a`` to ``p_b`` over a ``span`` of a straight side, on pieces that another one may take: short
+    at the ends, where bases press most."""
+    (start, end, (ax, ay), length), (a, b) = line, span
+    corners = [(place_along(blocks.vertices[k].tolist(), start, (ax, ay)), k) for k in side[1:-1]]
+    inner = [math.sin(0.5 * math.pi * k / ON_BASE) ** 2 for k in range(1, ON_BASE)]
+    marks = {a: None, b: None} | {a + part * (b - a): None for part in inner}
+    marks |= {place: k for place, k in corners if a + SNAP * length < place < b - SNAP * length}
+    places = sorted(marks)
+    points = [(start[0] + s * ax, start[1] + s * ay) if marks[s] is None else blocks.vertices[marks[s]] for s in places]
+    if b == length:
+        points[-1] = end
+    tractions = [tuple((p_a + (s - a) / (b - a) * (p_b - p_a)) * way for way in per_push) for s in places]
+    first = len(pieces.segments)
+    pieces.segments += list(pairwise(points))
+    pieces.tractions += list(pairwise(tractions))
+    pieces.bases.append((range(first, len(pieces.segments)), per_push))
 
 
 def add_corner_force(pieces: Pieces, blocks: Blocks, vertex: int, force: Sequence[float]) -> None:

@@ -16,7 +16,8 @@ class Touch(NamedTuple):
     """A contact as one of its blocks feels it. There are few, so they are plain numbers.
 
     ``own``: the block owns the vertex, not the edge; ``normal`` of the edge, current axes; ``point`` and the ``force``
-    on the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``: it may pull.
+    on the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``: it may pull; ``against``: the
+    other block.
     """
 
     own: bool
@@ -28,6 +29,7 @@ class Touch(NamedTuple):
     acts: bool
     gap: float
     holds: bool
+    against: int
 
 
 def touches_of(
@@ -38,10 +40,10 @@ def touches_of(
     holding = np.zeros(len(rows), bool)
     if tensile_strength is not None:
         holding = (rows["bonded"] == 1) & (np.asarray(tensile_strength)[rows["law"]] > 0)
-    names = ("block", "vertex", "edge", "normal", "normal_force", "shear_force", "gap")
+    names = ("block", "other", "vertex", "edge", "normal", "normal_force", "shear_force", "gap")
     columns = (rows[name].tolist() for name in names)
     touches = []
-    for owner, vertex, edge, normal, push, shear, gap, point, holds in zip(
+    for owner, other, vertex, edge, normal, push, shear, gap, point, holds in zip(
         *columns, motion.reference(block, rows["point"]).tolist(), holding.tolist(), strict=True
     ):
         own = owner == block
@@ -50,7 +52,8 @@ def touches_of(
         # Shear acts along the edge's direction: its outward normal turned by +90°.
         x, y = push * normal[0] - shear * normal[1], push * normal[1] + shear * normal[0]
         acts = push != 0 or shear != 0
-        touches.append(Touch(own, vertex, edge, normal, point, (c * x + s * y, c * y - s * x), acts, gap, holds))
+        force, against = (c * x + s * y, c * y - s * x), other if own else owner
+        touches.append(Touch(own, vertex, edge, normal, point, force, acts, gap, holds, against))
     return touches
 
 

@@ -9,6 +9,9 @@ spreads over a short piece of that edge; a lone force on a block's own corner is
 and enters there as shear, which keeps both force and moment exactly. What presses beyond the end of an edge acts at
 that end, and its moment about it on the whole outline. Tractions change without a jump as contacts come and go.
 
+By the route "bases" faces on blocks that are fixed or guided press as on a rigid base, as their own elasticity has it
+(`geomech.ddm.bases`), with the same force and moment; here it is said only where.
+
 Two other routes are there to be compared with: "springs" leaves each contact's force where its spring is, a point force
 on the boundary; "kelvin-springs" takes these by Kelvin's solution for the infinite plane, as Khanizadeh Bahabadi et al.
 (2023, eqs. 2-4) write.
@@ -28,7 +31,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,7 +52,8 @@ class BoundaryLoad:
     points and forces (k, 2) what acts at points, None without, ``kelvin`` as in `ddm.BodyLoad`;
     body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
     resultant that inertia had to balance beyond the solver's own acceleration on the block as it is strained, relative
-    to the forces' size.
+    to the forces' size; ``bases`` are rows of segments in which pressure is yet to be found, and the traction (2,) with
+    a unit of it.
     """
 
     segments: np.ndarray
@@ -62,6 +66,7 @@ class BoundaryLoad:
     points: np.ndarray | None = None
     forces: np.ndarray | None = None
     kelvin: bool = False
+    bases: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
 
 def boundary_load(
@@ -81,25 +86,28 @@ def boundary_load(
     route: str = "contacts",
     tensile_strength: Sequence[float] | None = None,
     overstress: np.ndarray | None = None,
+    keep_straight: np.ndarray | None = None,
 ) -> BoundaryLoad:
     """The load of ``block``.
 
     ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
     that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
     ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which
-    is spread over the block as its inertia is; ``route``: "contacts", "springs" or "kelvin-springs";
+    is spread over the block as its inertia is; ``route``: "contacts", "bases", "springs" or "kelvin-springs";
+    ``keep_straight`` (n_blocks,) bool which blocks are bases;
     ``tensile_strength`` of the joint laws, Pa (None: none has any); ``overstress`` (3,) what the forces balance beyond
     the stress of the block, Pa, current axes (None: at rest).
     """
     c, s = math.cos(rotation), math.sin(rotation)
     pieces = Pieces()
     touches = touches_of(block, motion, contacts, c, s, tensile_strength)
-    pointed = route != "contacts"
+    pointed = route in ("springs", "kelvin-springs")
     if pointed:
         pieces.points += [(on_outline(blocks, touch), np.array(touch.force)) for touch in touches]
     faces, lone = ({}, []) if pointed else faces_and_lone(blocks, vertices, touches)
     for (edge, _), touches in faces.items():
-        add_face(pieces, blocks, blocks.sides[edge], touches)
+        based = route == "bases" and keep_straight is not None and bool(keep_straight[touches[0].against])
+        add_face(pieces, blocks, blocks.sides[edge], touches, based)
     for touch in lone:
         add_lone(pieces, blocks, touch, touch.force)
     turn_back = np.array([[c, s], [-s, c]])
@@ -110,10 +118,11 @@ def boundary_load(
     add_couple(pieces, blocks, block)
     segments, tractions = pieces.arrays()
     inside = pieces.inside()
-    return _balanced(
+    load = _balanced(
         block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
         pieces.stretch(), route == "kelvin-springs", overstress,
     )  # fmt: skip
+    return replace(load, bases=tuple((np.array(rows), np.array(way)) for rows, way in pieces.bases))
 
 
 def _balanced(

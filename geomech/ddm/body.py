@@ -137,6 +137,8 @@ class Body:
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}
+        #: How unit pressures move faces on bases, by face and states of the cracks (`bases`).
+        self.on_bases: dict[bytes, np.ndarray] = {}
         self._assemble(previous, holds, many)
 
     @property
@@ -372,6 +374,11 @@ class Body:
             imposed = self._imposed(applied)
             rest += np.concatenate([self._outside.known @ imposed, self._c_known @ imposed])
         return applied, self._loads.of(applied), rest, imposed
+
+    def unit_answers(self, segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What forces of one N/m at the ends of ``segments`` (m, 2, 2) come to, A_ΓΓ⁻¹ g (n_boundary_unknowns, 4 m) and
+        traction on closed faces (n_crack_unknowns, 4 m): columns as of `UnitLoad`."""
+        return self._loads.answers(segments, self._outside, self._cg)
 
     def k_functionals(self, solution: Solution | None = None) -> TipFunctionals:
         """K_I and K_II of all tips as functions of the load, for the face states of ``solution`` (all open if None);

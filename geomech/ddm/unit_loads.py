@@ -186,14 +186,30 @@ class UnitLoads:
     def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray, opened) -> None:
         """Work out what the ``units`` come to."""
         n_g = self.boundary.n_unknowns
-        fresh = [unit for unit in units if unit.eliminated is None]
+        self._eliminate(units, boundary)
+        for unit in units:
+            reduced = unit.applied[n_g:] - cg @ unit.eliminated
+            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
+
+    def _eliminate(self, units: list[UnitLoad], boundary: BoundarySystem) -> None:
+        """Work out y of those of the ``units`` that have none."""
+        n_g, fresh = self.boundary.n_unknowns, [unit for unit in units if unit.eliminated is None]
         if fresh:
             y = boundary.solve(np.hstack([unit.applied[:n_g] for unit in fresh]))
             for unit, part in zip(fresh, np.split(y, np.cumsum([u.applied.shape[1] for u in fresh])[:-1], axis=1)):
                 unit.eliminated = part
-        for unit in units:
-            reduced = unit.applied[n_g:] - cg @ unit.eliminated
-            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
+
+    def answers(
+        self, segments: np.ndarray, boundary: BoundarySystem, cg: np.ndarray | KeptRows
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """y (n_boundary_unknowns, 4 m) and r' (n_crack_unknowns, 4 m), see `UnitLoad`, of ``segments`` (m, 2, 2)."""
+        units = [unit for unit, _ in self._unit_segments(segments, np.zeros((len(segments), 2, 2)))]
+        self._eliminate(units, boundary)
+        # A segment that was given against the boundary's direction has its ends changed about.
+        order = [[2, 3, 0, 1] if unit.against else [0, 1, 2, 3] for unit in units]
+        y = np.hstack([unit.eliminated[:, columns] for unit, columns in zip(units, order)])
+        direct = [unit.applied[self.boundary.n_unknowns :, columns] for unit, columns in zip(units, order)]
+        return y, np.hstack(direct) - cg @ y
 
     def _unit_segments(self, segments: np.ndarray, tractions: np.ndarray) -> list[tuple[UnitLoad, np.ndarray]]:
         """The ``segments`` (m, 2, 2) and their (4,) tractions."""

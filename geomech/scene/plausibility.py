@@ -128,7 +128,7 @@ def _shallow(c: Check) -> None:
     base = np.flatnonzero(fixed[blocks.vertex_block])
     cracked = [b for b in np.unique(c.drawing.cracks.block).tolist() if not fixed[b]]
     # In dynamics blocks come down on corners and edges: how they would rest is not what loads their cracks.
-    if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0:
+    if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0 or c.tables.run.boundary_stress == "bases":
         return
     starts, ends = blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]
     weight, found = np.array(c.tables.loads.gravity_m_s2), []
@@ -153,7 +153,8 @@ def _shallow(c: Check) -> None:
             f"{blocks.names[block]!r} holds cracks and lies on a fixed block with a side of {length:.3g} m, {slenderness:.2g} times "
             f"as long as the block is deep{others}: it presses on it linearly, and bends where it would not on a true base; K "
             "of its cracks may be twice what it should be",
-            f"draw it deeper (less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
+            'say run.boundary_stress = "bases", or draw it deeper '
+            f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
         )
 
 

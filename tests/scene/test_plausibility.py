@@ -100,8 +100,8 @@ def test_how_far_linear_pressure_is_off_under_shallow_blocks(ratio, at, too_larg
     assert linear.tips["k_i"].max() / held.tips["k_i"].max() == pytest.approx(too_large, rel=0.01)
 
 
-@pytest.mark.parametrize(("height", "told"), [(0.5, 1), (0.7, 0)])
-def test_shallow_cracked_blocks_on_a_fixed_base_are_told(scene_file, height, told):
+@pytest.mark.parametrize(("height", "route", "told"), [(0.5, "contacts", 1), (0.7, "contacts", 0), (0.5, "bases", 0)])
+def test_shallow_cracked_blocks_on_a_fixed_base_are_told(scene_file, height, route, told):
     text = f"""
 title = "a slab on its ground"
 [[geometry.zones]]
@@ -126,6 +126,7 @@ friction_angle_deg = 30
 gravity_m_s2 = [0.0, -9.81]
 [run]
 end_time_s = 1.0
+boundary_stress = "{route}"
 """
     found = [w for w in load_scene(scene_file(text)).warnings if "lies on a fixed block" in w.message]
     assert len(found) == told

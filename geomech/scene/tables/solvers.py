@@ -193,9 +193,10 @@ class RunTable(Table):
         "at the load at which the most driven tip has K_eq = K_Ic, also where that is less than before (time is what the "
         "loads are functions of, and goes back with them)",
     )
-    boundary_stress: Literal["contacts", "springs", "kelvin-springs"] = Field(
+    boundary_stress: Literal["contacts", "bases", "springs", "kelvin-springs"] = Field(
         "contacts",
-        description='how contact forces load cracked blocks: "contacts", linear over each face; "springs", as point forces '
+        description='how contact forces load cracked blocks: "contacts", linear over each face; "bases", the same, but on fixed, '
+        'guided and rigid blocks as on a straight, rigid base that cannot pull; "springs", as point forces '
         'where they are; "kelvin-springs", as those of the infinite plane (for comparison: most of a force is then lost)',
     )
     skip: bool = Field(
