@@ -434,10 +434,11 @@ class Attempt:
             ).tolist()
         )  # fmt: skip
         return energy._replace(
-            before=energy.before + found.unbent,
+            before=energy.before + found.unbent + found.released,
             bond=energy.bond + found.unbent,
             friction=energy.friction + self.rubbed,
-            scheme=energy.scheme - self.rubbed,
+            # What springs back where faces part is a vibration that no step resolves.
+            scheme=energy.scheme - self.rubbed + found.released,
         )
 
     def _real_springs(self) -> tuple[np.ndarray, np.ndarray]:

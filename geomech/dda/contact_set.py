@@ -39,6 +39,8 @@ class ContactSet:
                                does not count yet: what multipliers have left of it, and what given motion makes of it
                                in the step
     inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
+    bare        (n,)     part of its face, from its corner on, that did not touch as the last step ended; −1: not known
+    released             J/m that shear had stored where faces part and that their new springs do not hold
     unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than
                          at the corners
     relies_on_glue             corners have been left out that hold as long as all bonds do
@@ -71,6 +73,8 @@ class ContactSet:
     lift: np.ndarray
     stretch: np.ndarray
     inset: np.ndarray
+    bare: np.ndarray
+    released: float = 0.0
     unbent: float = 0.0
     relies_on_glue: bool = False
     faces: BondedFaces | None = None
@@ -112,13 +116,19 @@ class ContactSet:
         return replace(self.lumped.placed(self.points.pressed_by(rows["normal_force"])), tried=again.tried)
 
     def placed(self, points: FacePoints | None) -> ContactSet:
-        """These contacts, found at the corners, with the springs of faces where ``points`` say."""
+        """These contacts, found at the corners, with the springs of faces where ``points`` say. Where a face parts, the
+        shear stress there goes; where it comes to touch there is none."""
         if points is None:
             return self
+        was, springs = points.before(self.bare, self.by_length), points.springs(self.springs, self.by_length)
+        shear = points.passed_on(self.shear, was)
+        stored = self.shear**2 / was.springs(self.springs, self.by_length).shear - shear**2 / springs.shear
         return replace(
             self,
             geometry=points.geometry(),
-            springs=points.springs(self.springs, self.by_length),
+            springs=springs,
+            shear=shear,
+            released=0.5 * float(stored[points.ends].sum()),
             normal=points.at_points(self.normal),
             lift=points.between_corners(self.lift),
             faces=None if self.faces is None else points.on_bonded(self.faces),
@@ -192,6 +202,7 @@ class ContactSet:
             geometry, lift = points.corners, self.lumped.lift
             for name in ("normal_force", "shear_force"):
                 rows[name] = points.at_corners(rows[name])
+            rows["bare"][points.ends] = np.abs(points.part - [0.0, 1.0])
             rows["gap"] = points.gap_at_corners(settled.gap)
         acting = geometry if acting is None else acting
         rows["position"], rows["normal"], rows["point"] = acting[:, 0], acting[:, 1:3], acting[:, 5:7]

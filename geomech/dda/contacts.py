@@ -168,7 +168,7 @@ class ContactFinder:
 
         def placed(inside):
             return FacePoints.of(
-                block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal,
+                block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
                 (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), bend,
             )  # fmt: skip
 
@@ -207,7 +207,7 @@ class ContactFinder:
             return np.where(known, old[name][parent], old.dtype[name].type(0))
 
         contact_state, bonded, normal, shear = of("state"), of("bonded"), of("normal_force"), of("shear_force")
-        slip, wear, lift, stretch = of("slip"), of("wear"), of("lift"), of("stretch")
+        slip, wear, lift, stretch, bare = of("slip"), of("wear"), of("lift"), of("stretch"), of("bare")
         if not known.all():
             # New contacts that touch already are tried closed first; one with a partner must show which line it
             # crosses.
@@ -226,7 +226,7 @@ class ContactFinder:
         contact_state[(contact_state == STICK) & ~rough] = SLIP
         return {
             "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
-            "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset,
+            "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset, "bare": bare,
         }  # fmt: skip
 
     def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:

@@ -82,12 +82,14 @@ class FacePoints:
         geometry: np.ndarray,
         stiff: np.ndarray,
         normal: np.ndarray,
+        bare: np.ndarray,
         holds: np.ndarray,
         least: np.ndarray,
         bends: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> FacePoints | None:
         """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
-        blocks, 0 for neither, last known to press by ``normal`` N, ``holds`` a bond that may pull, ``least`` m of face
+        blocks, 0 for neither, last known to press by ``normal`` N and to be ``bare`` of touch
+        from their corners on, ``holds`` a bond that may pull, ``least`` m of face
         that the stiffness is at least that of; ``bends(ends, length)`` the ``apart`` of bonds. None without any."""
         some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
         if len(some) < 2:
@@ -108,13 +110,43 @@ class FacePoints:
             apart[glued] = bends(ends[glued], length[glued])
             some = apart < _AT_CORNERS
             ends, length, held, shortest, apart = ends[some], length[some], held[some], shortest[some], apart[some]
-        part = _pressed(normal[ends], held, shortest)
+        part = _left(bare[ends], _pressed(normal[ends], held, shortest), held, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))
         return cls(ends, geometry, length, part, held, shortest, apart, still, full)
 
     def pressed_by(self, normal: np.ndarray) -> FacePoints:
         """The same faces on the parts that forces ``normal`` (n,) N at the corners press on."""
         return replace(self, part=_pressed(normal[self.ends], self.held, self.shortest))
+
+    def before(self, bare: np.ndarray, stiff_in_shear: np.ndarray) -> FacePoints:
+        """The same faces on the parts that the last step has left in contact, ``bare`` (n,) as in `ContactSet`: those
+        whose shear stiffness goes by their length (``stiff_in_shear``), the others where they are."""
+        first, second = bare[self.ends].T
+        known = (first >= 0) & (second >= 0) & (first + second < 1) & stiff_in_shear[self.ends[:, 0]]
+        return replace(self, part=np.where(known[:, None], np.stack([first, 1 - second], axis=1), self.part))
+
+    def passed_on(self, shear: np.ndarray, was: FacePoints) -> np.ndarray:
+        """(n,) N that these springs begin with, of the ``shear`` of springs where they ``was``: that of a stress which is
+        linear along that part, and goes on where both parts touch. It has the resultant and the moment of what goes on,
+        and its springs store no more than that did."""
+        out = shear.copy()
+        if (was.part == self.part).all():
+            return out
+        low, high = was.part.T
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        on_first, on_second = shear[self.ends].T
+        mean, tilt = 0.5 * (on_first + on_second), 0.5 * (on_second - on_first) / self.apart
+        a, b = np.clip((self.part.T - middle) / half, -1.0, 1.0)
+        total = mean * (b - a) + tilt * (b**2 - a**2) / 2
+        moment = mean * (b**2 - a**2) / 2 + tilt * (b**3 - a**3) / 3
+        first, second = (self.place.T - middle) / half
+        on_low = (second * total - moment) / (second - first)
+        # A straight line through a stress that ends within the part swings to the other side beyond.
+        one_way = on_first * on_second >= 0
+        on_low = np.where(one_way, np.clip(on_low, np.minimum(total, 0.0), np.maximum(total, 0.0)), on_low)
+        moved = (was.part != self.part).any(axis=1)
+        out[self.ends[moved]] = np.stack([on_low, total - on_low], axis=1)[moved]
+        return out
 
     def but(self, others: FacePoints) -> FacePoints | None:
         """These faces without those that ``others``, the same faces, have on other parts; None where none is left."""
@@ -266,6 +298,14 @@ def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: n
     low, high = np.where(held, 0.0, low), np.where(held, 1.0, high)
     out = ((first > 0) & (second > 0) & ~held)[:, None]
     return np.where(out, before, np.stack([low, high], axis=1))
+
+
+def _left(bare: np.ndarray, pressed: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face that is left beside what is ``bare`` (m, 2) from its ends on, where something is; the
+    part ``pressed`` (m, 2) of all others."""
+    first, second = bare.T
+    some = (first >= 0) & (second >= 0) & (first + second > 0) & (1 - first - second >= shortest * (1 - 1e-9)) & ~held
+    return np.where(some[:, None], np.stack([first, 1 - second], axis=1), pressed)
 
 
 def _pressed(normal: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:

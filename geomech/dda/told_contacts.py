@@ -45,7 +45,7 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
     spring keeps."""
     rows = np.zeros(len(found), CONTACT)
     for name in (
-        "vertex", "edge", "block", "other", "law", "state", "bonded", "slip", "wear", "lift", "stretch", "inset",
+        "vertex", "edge", "block", "other", "law", "state", "bonded", "slip", "wear", "lift", "stretch", "inset", "bare",
     ):  # fmt: skip
         rows[name] = getattr(found, name)
     rows["normal_force"], rows["shear_force"], rows["gap"] = found.normal, found.shear, found.gap
@@ -66,5 +66,5 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
     rows["lift"][at] = g[at, 3] - rows["gap"][at]
     rows["slip"][at] = told.slip
     rows["wear"][at] = np.where(closed, np.maximum(found.wear[at], np.abs(told.slip)), found.wear[at])
-    rows["stretch"][at], rows["inset"][at] = 0.0, False
+    rows["stretch"][at], rows["inset"][at], rows["bare"][at] = 0.0, False, -1.0
     return rows

@@ -41,6 +41,7 @@ CONTACT = np.dtype(
         ("wear", np.float64),  # m, length of the way it has slid, to and fro
         ("lift", np.float64),  # m, faces forced apart by sliding; negative: a gap that the geometry has not
         ("inset", np.bool_),  # a bond whose springs stand inside its face, as the bending of its blocks wants them
+        ("bare", np.float64),  # part of its face, from this corner on, that does not touch; −1 where that is not known
         ("stretch", np.float64),  # m, motion along the edge while sticking that a multiplier has still to take back
     ]
 )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
+from geomech.dda.energy import EnergyBudget
 from geomech.dda.face_points import FacePoints
 from geomech.model import STICK, Blocks, DdaSettings, History, JointLaw, Loads, Material, PointLoad, State
 
@@ -211,3 +212,28 @@ def test_rows_tell_of_forces_that_hold_the_block(eccentricity):
     x, y, moment = dda.contact_resultants(result.contacts, 2, np.array([at, at]))[1]
     assert [x, y] == pytest.approx([-0.3 * THRUST, THRUST], rel=1e-6)
     assert abs(moment) < 1e-8 * THRUST * FACE
+
+
+def test_points_that_part_lose_their_shear_and_points_that_come_to_touch_begin_without():
+    """A bed sheared by H, rocked until it touches along c, set down again and let go has moved by H/(kₛ ℓ), H/(kₛ c), no
+    more, and H/(kₛ c) − H/(kₛ ℓ): every spring that touches has gone along. None of it comes from nowhere (with shear
+    carried whole two thirds of ½ H²/(kₛ ℓ) would)."""
+    rough = JointLaw("rough", 1.4, normal_stiffness=STIFFNESS, shear_stiffness=STIFFNESS)
+    system, shear, farthest = on_a_bed(rough), 2 * THRUST, 0.6
+    state, budget = State.at_rest(system.blocks), EnergyBudget()
+    moved = []
+    eccentric = [0.0, 0.0, *np.linspace(0.1, farthest, 6), *np.linspace(farthest, 0.0, 4), 0.0]
+    for number, eccentricity in enumerate(eccentric):
+        thrust = PointLoad(1, (FACE / 2 + eccentricity, 0.0), History.constant([0.0, -THRUST]))
+        pull = PointLoad(1, (FACE / 2, 0.0), History.constant([shear if number < len(eccentric) - 1 else 0.0, 0.0]))
+        result = system.step(state, Loads(point_loads=(thrust, pull)), 10.0)
+        state, budget = result.state, budget.after(result.energy)
+        moved.append(float((state.vertices[4:6] - system.blocks.vertices[4:6])[:, 0].mean()))
+    whole, rocked = shear / (STIFFNESS * FACE), shear / (STIFFNESS * 3 * (FACE / 2 - farthest))
+    print("moved", np.round(np.array(moved) / whole, 4), f"residual {budget.residual / (0.5 * shear * whole):.3f}")
+    assert moved[1] == pytest.approx(whole, rel=1e-4)
+    # The part in contact is known to a hundredth of itself.
+    assert moved[7] == pytest.approx(rocked, rel=1e-2)
+    assert moved[-2] == pytest.approx(moved[7], rel=1e-3)
+    assert moved[-1] == pytest.approx(moved[-2] - whole, rel=1e-3)
+    assert abs(budget.residual) < 0.03 * 0.5 * shear * whole
