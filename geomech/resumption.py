@@ -93,8 +93,8 @@ def _refuse_other_sources(header: Mapping[str, Any], path: Path) -> None:
             what = {"format": "way of storing runs", "sources": "geomech's sources"}.get(name, name)
             was = "" if name == "sources" else f" ({header.get(name)}, now {value})"
             raise NotResumable(
-                f"{path} was written with another {what}{was}: go on with what wrote it, geomech {header.get('geomech')}, or "
-                "run the scene anew"
+                f"{path} was written with another {what}{was}: go on with what wrote it, geomech "
+                f"{header.get('geomech')}, or run the scene anew"
             )
 
 
@@ -115,8 +115,8 @@ def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str
     if forbidden:
         told = "; ".join(f"{key} was {changes[key][0]!r}, is now {changes[key][1]!r}" for key in forbidden[:6])
         raise NotResumable(
-            f"this would change what has happened in the run: {told}. Set it back, or run the changed scene into another "
-            f"folder. What may be changed: {', '.join(ALLOWED)}"
+            f"this would change what has happened in the run: {told}. Set it back, or run the changed scene into "
+            f"another folder. What may be changed: {', '.join(ALLOWED)}"
         )
     files = digests(resolved)
     for name, digest in header["files"].items():
@@ -185,7 +185,8 @@ def _begin_again(
 
 def _other_surroundings(header: Mapping[str, Any]) -> list[str]:
     return [
-        f"{name} was {header.get(name)!r} and is {value!r}: the last digits may differ from those of an uninterrupted run"
+        f"{name} was {header.get(name)!r} and is {value!r}: the last digits may differ from those of an uninterrupted "
+        "run"
         for name, value in checkpoint.surroundings().items()
         if header.get(name) != value
     ]

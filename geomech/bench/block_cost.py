@@ -329,14 +329,21 @@ def errors() -> dict[str, float]:
 def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict], errors: dict[str, float]) -> str:
     busy = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "unknown"
     lines = [
-        f"steps of {1e3 * TIME_STEP:g} ms from rest under sudden weight; medians, the first step left out; iterations are",
-        f"factorisations of the step's equations; {len(os.sched_getaffinity(0))} cores, load average of the machine {busy}",
+        (
+            f"steps of {1e3 * TIME_STEP:g} ms from rest under sudden weight; medians, the first step left out; "
+            "iterations are"
+        ),
+        (
+            f"factorisations of the step's equations; {len(os.sched_getaffinity(0))} cores, load average of the "
+            f"machine {busy}"
+        ),
         f"settled: {SETTLED - 1} steps of blocks at rest under their weight",
-        f"  {'scene':<13}  blocks  contacts  steps  iterations  first s   s/step  ms/iteration  of it solving  search/step"
-        + "  s/settled step (iterations)  memory  imbalance",
+        f"  {'scene':<13}  blocks  contacts  steps  iterations  first s   s/step  ms/iteration  of it solving  "
+        "search/step" + "  s/settled step (iterations)  memory  imbalance",
     ]
     lines += [
-        f"  {c.scene:<13}{c.blocks:8d}{c.contacts:10d}{c.steps:7d}{c.iterations:12.1f}{c.first:9.3g}{c.step:9.3g}{1e3 * c.iteration:14.2f}"
+        f"  {c.scene:<13}{c.blocks:8d}{c.contacts:10d}{c.steps:7d}{c.iterations:12.1f}{c.first:9.3g}"
+        f"{c.step:9.3g}{1e3 * c.iteration:14.2f}"
         f"{c.solution / c.iteration:15.0%}{c.search / c.step:13.1%}{c.settled:15.3g} ({c.settled_iterations:10.1f})"
         f"{c.memory:6.0f} MB{c.imbalance:11.1e}"
         for c in costs

@@ -149,7 +149,8 @@ def measure(quick: bool = False) -> Measured:
     points = by_order(PHI_DEG[0], (2, 4, 6) if quick else (2, 3, 4, 6, 8))
     FOLDER.mkdir(parents=True, exist_ok=True)
     told = {
-        "routes": rows, "quadratic_elements": elements, "time and error by order": [asdict(p) for p in points], "quick": quick,
+        "routes": rows, "quadratic_elements": elements, "time and error by order": [asdict(p) for p in points],
+        "quick": quick,
     }  # fmt: skip
     draw(
         points, ROUTES, FOLDER / "work_precision.png", (1, 2), lambda p: f"p = {p.size}",
@@ -161,7 +162,8 @@ def measure(quick: bool = False) -> Measured:
         f"{'stress MPa':>10}{'φ':>5}  {'route':<22}{'K_I':>10}{'K_II':>10}",
     ]
     lines += [
-        f"{row['stress_pa'] / 1e6:10g}{row['phi_deg']:5d}  {row['route']:<22}{row['error_k_i']:10.1e}{row['error_k_ii']:10.1e}"
+        f"{row['stress_pa'] / 1e6:10g}{row['phi_deg']:5d}  "
+        f"{row['route']:<22}{row['error_k_i']:10.1e}{row['error_k_ii']:10.1e}"
         for row in rows
     ]
     lines.append("Quadratic elements with equal nodes, four to a crack, exact tractions, against order 8")

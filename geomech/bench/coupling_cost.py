@@ -131,7 +131,13 @@ def measure(quick: bool = False) -> Measured:
             f"Two-crack specimen to its end, warm: {specimen['seconds']:.2f} s in {specimen['cycles']} cycles "
             f"(goal {SECONDS:g} s)"
         )
-    lines += ["", f"{pass_tolerance.PROBLEM} (default {DYNAMIC_TOLERANCE:g}): error of K against {pass_tolerance.EXACT:g}, and time"]
+    lines += [
+        "",
+        (
+            f"{pass_tolerance.PROBLEM} (default {DYNAMIC_TOLERANCE:g}): error of K against "
+            f"{pass_tolerance.EXACT:g}, and time"
+        ),
+    ]
     lines += [f"  {p.size:>8g}{p.passes:6d} passes   {p.error:8.1e}   {1e3 * p.seconds:8.1f} ms" for p in points]
     times = {
         f"{w['blocks']} blocks, {w['cracked']} cracked: {part} a pass": w[f"{part}_s"]

@@ -110,7 +110,8 @@ def arc_of_tangents(segments: int) -> CrackProblem:
 
 def edge_crack() -> CrackProblem:
     return CrackProblem(
-        "edge crack in a strip", [np.array([[-0.5, 0.0], [0.0, 0.0]])], (0.0, 1.0, 0.0), rectangle(0.5, 1.5), [(True, False)],
+        "edge crack in a strip", [np.array([[-0.5, 0.0], [0.0, 0.0]])], (0.0, 1.0, 0.0), rectangle(0.5, 1.5),
+        [(True, False)],
         reference=None,
     )  # fmt: skip
 

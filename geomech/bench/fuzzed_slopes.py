@@ -237,8 +237,10 @@ def outcome(every: Sequence[Watched]) -> Iterator[str]:
 def _row(w: Watched) -> dict:
     """A row of the table on a page: flat."""
     return {
-        "seed": w.seed, "verdict": w.verdict, "reason": w.reason, "blocks": w.blocks, "tips": w.tips, "cycles": w.cycles,
-        "seconds": round(w.seconds, 2), **{name: float(f"{value:.2g}") for name, value in w.worst.items()}, "what": w.why,
+        "seed": w.seed, "verdict": w.verdict, "reason": w.reason, "blocks": w.blocks, "tips": w.tips,
+        "cycles": w.cycles,
+        "seconds": round(w.seconds, 2), **{name: float(f"{value:.2g}") for name, value in w.worst.items()},
+        "what": w.why,
     }  # fmt: skip
 
 

@@ -80,11 +80,23 @@ def measure(quick: bool = False) -> Measured:
     write_json(FOLDER / "output.json", told)
     ours = writers[OURS]
     lines = [
-        f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles written: {found.bytes_a_cycle / 1e6:.2f} MB a cycle",
+        (
+            f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles written: "
+            f"{found.bytes_a_cycle / 1e6:.2f} MB a cycle"
+        ),
         f"  the blocks' series takes {found.bytes_a_cell:.0f} bytes a cell",
-        f"  {found.rate / 1e6:.0f} MB of arrays a second until all is on disk, {found.processor_rate / 1e6:.0f} MB a second of processor",
-        f"  a cycle costs {1e3 * found.processor:.1f} ms of processor, the run waits {1e3 * found.waited:.1f} ms for it",
-        f"share of writing in a run, cycle over step and cycle, in seconds of processor: {share:.1%} (goal for 10 000 blocks: below {SHARE:.0%})",
+        (
+            f"  {found.rate / 1e6:.0f} MB of arrays a second until all is on disk, {found.processor_rate / 1e6:.0f} MB "
+            "a second of processor"
+        ),
+        (
+            f"  a cycle costs {1e3 * found.processor:.1f} ms of processor, the run waits {1e3 * found.waited:.1f} ms "
+            "for it"
+        ),
+        (
+            f"share of writing in a run, cycle over step and cycle, in seconds of processor: {share:.1%} (goal for 10 "
+            f"000 blocks: below {SHARE:.0%})"
+        ),
         f"  beside a step of {1e3 * TIME_STEP:g} ms, {moving:.3g} s: median of steps 2 to {steps} after sudden weight",
         f"  beside the last of these steps, {last:.3g} s: {at_rest:.1%}",
         "one file of the blocks, as this project and as others write it",
@@ -141,7 +153,8 @@ def series(problem: Problem, cycle: Cycle, count: int) -> Written:
         for array in (grid.points, grid.connectivity, *grid.point_data.values(), *grid.cell_data.values())
     )
     return Written(
-        problem.blocks.n_blocks, cells, count, waited / count, processor / count, size / count, blocks_size / count / cells,
+        problem.blocks.n_blocks, cells, count, waited / count, processor / count, size / count,
+        blocks_size / count / cells,
         arrays * count / whole, arrays * count / processor,
     )  # fmt: skip
 

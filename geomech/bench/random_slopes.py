@@ -55,13 +55,15 @@ def scene_text(seed: int) -> str:
     if dynamic and rng.random() < 0.5:
         amplitude, frequency = rng.uniform(0.5, 5), rng.uniform(1, 8)
         lines.append(
-            f"[loads.base]\nacceleration_m_s2 = [{amplitude:.2f}, {0.3 * amplitude:.2f}]\nfrequency_hz = {frequency:.2f}"
+            f"[loads.base]\nacceleration_m_s2 = [{amplitude:.2f}, {0.3 * amplitude:.2f}]\nfrequency_hz = "
+            f"{frequency:.2f}"
         )
     elif not dynamic and rng.random() < 0.3:
         # The stress is that of the weight, which is there from the start.
         lines.remove("gravity_ramp_s = 3.0")
         lines.append(
-            f"[loads.in_situ]\nsurface_m = {height}\nunit_weight_n_per_m3 = {9.81 * density:.0f}\nk0 = {rng.uniform(0.2, 1.5):.2f}"
+            f"[loads.in_situ]\nsurface_m = {height}\nunit_weight_n_per_m3 = {9.81 * density:.0f}\nk0 = "
+            f"{rng.uniform(0.2, 1.5):.2f}"
         )
     dt = 10 ** rng.uniform(-3, -2) if dynamic else 1.0
     lines.append(f"[dda]\ntime_step_s = {dt:.5f}\ndynamic_factor = {int(dynamic)}\nmax_displacement_ratio = 0.01")

@@ -24,7 +24,8 @@ REASONS = (
     Reason(
         "sharp corner drawn",
         ValueError,
-        r"meet at \(\S+, \S+\) at less than 10°|folds back on itself|leaves the boundary at \(\S+, \S+\) at less than 3°",
+        r"meet at \(\S+, \S+\) at less than 10°|folds back on itself|leaves the boundary at \(\S+, \S+\) at less than "
+        r"3°",
         "cracks as cut meet each other or a surface too sharply to be resolved: they are named, with the place",
         drawn=True,
     ),
@@ -44,7 +45,8 @@ REASONS = (
         "contact states not found",
         dda.NotConverged,
         r"the block step at t = \S+ s failed after \d+ cuts",
-        "contacts find no consistent states at any length of the step: the contact, or how far a vertex moves, is named",
+        "contacts find no consistent states at any length of the step: the contact, or how far a vertex moves, is "
+        "named",
     ),
     Reason(
         "block crushed",

@@ -36,7 +36,8 @@ def measure(quick: bool = False) -> Measured:
     differences, times = {}, {}
     for label, without, with_it, difference in rows:
         lines.append(
-            f"{label:<{width}}  {1e3 * without:8.1f} ms {1e3 * with_it:8.1f} ms {without / with_it:7.1f}   {difference:8.1e}"
+            f"{label:<{width}}  {1e3 * without:8.1f} ms {1e3 * with_it:8.1f} ms {without / with_it:7.1f}   "
+            f"{difference:8.1e}"
         )
         differences[label], times[label] = difference, with_it
     worst = max(differences.values())

@@ -306,7 +306,10 @@ def _table(points: list[Point], growth: dict, goals: dict) -> str:
         lines += ["scikit-fem is not installed: finite elements left out (pip install 'geomech[bench]')", ""]
     g = growth
     lines += [
-        f"growth, {g['increments']} increments at two tips of the specimen ({g['elements_at_the_end']} elements at the end)",
+        (
+            f"growth, {g['increments']} increments at two tips of the specimen ({g['elements_at_the_end']} elements at "
+            "the end)"
+        ),
         f"  an increment with what is known {1e3 * g['incremental_s']:.1f} ms, all {g['all_incremental_s']:.2f} s",
         f"  fresh bodies {1e3 * g['fresh_s']:.1f} ms ({g['fresh_s'] / g['incremental_s']:.1f} times),"
         + f" all {g['all_fresh_s']:.2f} s ({g['all_fresh_s'] / g['all_incremental_s']:.1f} times);"
@@ -322,8 +325,14 @@ def _table(points: list[Point], growth: dict, goals: dict) -> str:
             )
         ),
         "",
-        f"time at error 1e-4 over this solver's (goal {RATIO:.0f} for constant elements): measured, or how much more time it was",
-        "given without coming down to 1e-4, and then what that would take if its error went on falling as it last did and its",
+        (
+            f"time at error 1e-4 over this solver's (goal {RATIO:.0f} for constant elements): measured, or how much "
+            "more time it was"
+        ),
+        (
+            "given without coming down to 1e-4, and then what that would take if its error went on falling as it last "
+            "did and its"
+        ),
         "time grew no faster than its unknowns (extrapolated)",
     ]
     for row in goals["time at error 1e-4 over this solver's"]:

@@ -17,7 +17,8 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
     bench.add_argument("topics", nargs="*", metavar="TOPIC", help=f"{', '.join(TOPICS)} (default: all)")
     bench.add_argument(
-        "--quick", action="store_true", help="smaller sizes and fewer of them, nothing compiled anew: a minute for all (else a quarter of an hour)"
+        "--quick", action="store_true", help="smaller sizes and fewer of them, nothing compiled anew: a minute for all "
+                                             "(else a quarter of an hour)"
     )  # fmt: skip
     bench.add_argument(
         "--out", type=Path, metavar="FILE", help="where the figures go, JSON (default outputs/bench/figures.json)"
@@ -27,8 +28,8 @@ def declare(verbs: Verbs) -> None:
     )
     bench.add_argument(
         "--seeds", metavar="FIRST-LAST",
-        help="of slopes: run these, one on each core, and leave rows and a picture in outputs/bench_slopes; seeds that have been "
-        "run before, by the same program, are not run again",
+        help="of slopes: run these, one on each core, and leave rows and a picture in outputs/bench_slopes; seeds that "
+             "have been run before, by the same program, are not run again",
     )  # fmt: skip
 
     bench.add_argument(

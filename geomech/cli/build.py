@@ -12,7 +12,8 @@ from .verb import DONE, Verbs, add_verb
 
 def declare(verbs: Verbs) -> None:
     build = add_verb(
-        verbs, "build", _build, "write the blocks that a scene is cut into, and a picture of them, before anything runs",
+        verbs, "build", _build, "write the blocks that a scene is cut into, and a picture of them, before anything "
+                                "runs",
         "geomech build slope.toml\ngeomech build slope.toml --set geometry.seed=7 --out /tmp/seed7",
     )  # fmt: skip
     build.description += (

@@ -8,7 +8,8 @@ from .verb import DONE, FAILED, Verbs, add_verb
 
 
 def declare(verbs: Verbs) -> None:
-    add_verb(verbs, "doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
+    add_verb(verbs, "doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is "
+                                       "missing",
          "geomech doctor")  # fmt: skip
 
 

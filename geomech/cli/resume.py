@@ -12,12 +12,13 @@ from .verb import DONE, BadInput, Verbs, add_verb
 
 def declare(verbs: Verbs) -> None:
     resume = add_verb(
-        verbs, "resume", _resume, "go on with a run that was interrupted, killed, or is to last longer, from its last checkpoint",
+        verbs, "resume", _resume, "go on with a run that was interrupted, killed, or is to last longer, from its last "
+                                  "checkpoint",
         "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
     )  # fmt: skip
     resume.description += (
-        " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores itself on"
-        " Ctrl-C or SIGTERM; a second one ends it at once."
+        " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores "
+        "itself on Ctrl-C or SIGTERM; a second one ends it at once."
     )
     resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
     resume.add_argument(

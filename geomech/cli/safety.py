@@ -16,8 +16,8 @@ def declare(verbs: Verbs) -> None:
         "geomech safety slope.toml\ngeomech safety slope.toml --reduce bedding --tolerance 1e-3 --out safety.json",
     )  # fmt: skip
     safety.description += (
-        " tan φ, cohesion and tensile strength of the joints are divided by F until no static equilibrium is left; cracks"
-        " inside blocks are left out."
+        " tan φ, cohesion and tensile strength of the joints are divided by F until no static equilibrium is left; "
+        "cracks inside blocks are left out."
     )
     scene_arguments(safety)
     safety.add_argument(

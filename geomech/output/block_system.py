@@ -176,7 +176,10 @@ def _lines(told: dict[str, Any], jointed: Any) -> list[str]:
     """The statistics for people."""
     size = told["blocks"]
     rows = [
-        f"  blocks    √area of 10, 50, 90 % of the rock at most {size['d10_m']:.3g}, {size['d50_m']:.3g}, {size['d90_m']:.3g} m"
+        (
+            f"  blocks    √area of 10, 50, 90 % of the rock at most {size['d10_m']:.3g}, {size['d50_m']:.3g}, "
+            f"{size['d90_m']:.3g} m"
+        )
     ]
     if told["sets"]:
         nodes, topology = told["nodes"], told["topology"]

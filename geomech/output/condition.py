@@ -63,7 +63,8 @@ def motion_summary(cycle: Cycle) -> dict[str, Any]:
 def energy_summary(cycle: Cycle) -> dict[str, float]:
     """The energy budget of the run, J/m: for ``summary.json``. Empty without one."""
     names = (
-        "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work", "friction_loss",
+        "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",
+        "friction_loss",
         "damping_loss", "bond_loss", "scheme_loss", "carried_loss", "overlap_energy", "energy_residual",
     )  # fmt: skip
     return {name: float(cycle.statistics[name]) for name in names if name in cycle.statistics}
@@ -99,14 +100,15 @@ def closing(summary: dict[str, Any]) -> list[str]:
     lines = []
     if motion.get("condition"):
         lines.append(
-            f"  {motion['condition']}: unbalanced force {motion['unbalanced_ratio']:.1e} of the forces on a block, kinetic "
-            f"energy {motion['kinetic_energy']:.3g} J/m"
+            f"  {motion['condition']}: unbalanced force {motion['unbalanced_ratio']:.1e} of the forces on a block, "
+            f"kinetic energy {motion['kinetic_energy']:.3g} J/m"
         )
     if energy.get("gravity_work") is not None:
         work = energy["gravity_work"] + energy["load_work"]
         lines.append(
             f"  work {work:.3g} J/m, of it lost in friction {energy['friction_loss']:.3g}, damping "
-            f"{energy['damping_loss']:.3g}, time scheme {energy['scheme_loss']:.3g}; unexplained {energy['energy_residual']:.1g}"
+            f"{energy['damping_loss']:.3g}, time scheme {energy['scheme_loss']:.3g}; unexplained "
+            f"{energy['energy_residual']:.1g}"
         )
     for entry in summary.get("key_blocks", ()):
         text = f"  {entry['block']:<13} moved {entry['displacement_m']:.3g} m, {entry['class']}"

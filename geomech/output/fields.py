@@ -54,8 +54,8 @@ SERIES: dict[str, tuple[Field, ...]] = {
             "key_block",
             "cell",
             "-",
-            "between neighbours that stand: -2 not known yet, -1 fixed or dug out, 0 held by them, 1 removable but pushed in, 2 removable but held by "
-            "strength, 3 slides, 4 falls",
+            "between neighbours that stand: -2 not known yet, -1 fixed or dug out, 0 held by them, 1 removable but "
+            "pushed in, 2 removable but held by strength, 3 slides, 4 falls",
             dtype="int32",
         ),
         Field("displacement_rank", "cell", "-", "0 the block that has moved farthest", dtype="int32"),
@@ -98,7 +98,8 @@ SERIES: dict[str, tuple[Field, ...]] = {
             "bonded",
             "point",
             "-",
-            "1 while cohesion and tensile strength hold, 2 after slip that wears cohesion, 3 cracked from the edge of its face",
+            "1 while cohesion and tensile strength hold, 2 after slip that wears cohesion, 3 cracked from the edge of "
+            "its face",
             dtype="int32",
         ),
         Field("block_id", "point", "-", "owner of the vertex", dtype="int32"),

@@ -88,8 +88,8 @@ class Pace:
 
 class Progress:
     """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
-    time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; a scene that stops at an
-    event ends sooner. ``quiet`` leaves only where a failed run stopped.
+    time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; a scene that stops at
+    an event ends sooner. ``quiet`` leaves only where a failed run stopped.
 
     ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
     between two with the same percentage.
@@ -196,8 +196,8 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
         lines.append(f"  {counted(summary['load_steps'], 'load step')} in {summary.get('wall_s', math.nan):.2f} s")
     elif "cycles" in summary:
         lines.append(
-            f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with growth, "
-            f"{length_text(summary['crack_growth_m'])} of new crack in {summary.get('wall_s', math.nan):.2f} s"
+            f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with "
+            f"growth, {length_text(summary['crack_growth_m'])} of new crack in {summary.get('wall_s', math.nan):.2f} s"
         )
     if summary.get("end") in STOPS:
         lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")

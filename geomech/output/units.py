@@ -1,4 +1,5 @@
-"""Units in which a number is easily read: kPa for a slope's loads, MPa for a specimen's; metres, millimetres, microns."""
+"""Units in which a number is easily read: kPa for a slope's loads, MPa for a specimen's; metres, millimetres or
+microns."""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ from .drive import COLOURS, SAME, drive, drive_label, first_events, to_the_end
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: So many curves have a colour and a name of their own: of more, those of the tips that go farthest, or are driven most;
-#: the others are grey.
+#: So many curves have a colour and a name of their own: of more, those of the tips that go farthest, or are driven
+#: most; the others are grey.
 NAMED = 6
 #: So many tips are named where they share a curve.
 SHARING = 2
@@ -85,8 +85,8 @@ def _foremost(curves: list[TipCurve]) -> list[int]:
 
 
 def _calm_span(run: Run) -> tuple[float, float]:
-    """The least and the largest K_I or K_II, MPa√m, where the load has just gone up and nothing has grown at it: of many
-    tips what `MOST_TIPS` of them have."""
+    """The least and the largest K_I or K_II, MPa√m, where the load has just gone up and nothing has grown at it: of
+    many tips what `MOST_TIPS` of them have."""
     calm = run.history["cycle"][run.history["growth_pass"] == 0]
     tips = run.tips[np.isin(run.tips["cycle"], calm)]
     every = np.concatenate([tips["K_I"], tips["K_II"]]) / 1e6
@@ -144,7 +144,8 @@ def crack_length(axes: Axes, run: Run) -> None:
     unit, size = length_unit(float(every.max()))
     at, still = drive(run, history), history["crack_length"]
     parted = bool((every - still > 1e-6 * every.max()).any())
-    axes.plot(at, every / size, color=COLOURS[0], lw=1.8, label="with those that are block faces now" if parted else None)
+    everything = "with those that are block faces now" if parted else None
+    axes.plot(at, every / size, color=COLOURS[0], lw=1.8, label=everything)
     if parted:
         axes.plot(at, still / size, color=COLOURS[0], lw=1.2, ls="--", label="cracks still")
     first_events(axes, run, None)

@@ -45,8 +45,8 @@ def movie(run: Run, path: Path, fixed: Look, *, frames: int = 48, frames_per_sec
 
 
 def durations(run: Run, shown: list[int], frames_per_second: float) -> list[int]:
-    """ms for which each of the cycles ``shown`` stands: as the run's time goes by until the next one, between a half and
-    four times the mean; cycles in which cracks have grown, at one load perhaps, no less than `LINGER` of it."""
+    """ms for which each of the cycles ``shown`` stands: as the run's time goes by until the next one, between a half
+    and four times the mean; cycles in which cracks have grown, at one load perhaps, no less than `LINGER` of it."""
     rows = [run.at(cycle) for cycle in shown]
     gone_by = np.abs(np.diff([float(row["time"]) for row in rows]))
     pace = np.ones(len(rows))

@@ -39,7 +39,8 @@ def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path) -> Path:
         panel.set_title(f"{grid.title}  (right below {grid.bound:g})", fontsize=10, loc="left")
     last.legend(
         [Patch(facecolor=colour) for colour in COLOURS.values()],
-        ["right: error below the bound", "reported: beyond it, a warning says so", "refused with a reason", "wrong in silence"],
+        ["right: error below the bound", "reported: beyond it, a warning says so", "refused with a reason",
+         "wrong in silence"],
         loc="center", frameon=False, fontsize=11,
     )  # fmt: skip
     return _saved(figure, path)

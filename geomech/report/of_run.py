@@ -238,7 +238,16 @@ def _add_tips(page: Page, run: Run) -> None:
     for title, cycle in (("In the first step", tips["cycle"][0]), ("At the end", tips["cycle"][-1])):
         own = tips[tips["cycle"] == cycle][:LISTED]
         page.table(
-            ["crack", "end", f"x, {length}", f"y, {length}", "K_I, MPa√m", "K_II, MPa√m", "K_eq, MPa√m", "would turn, °"],
+            [
+                "crack",
+                "end",
+                f"x, {length}",
+                f"y, {length}",
+                "K_I, MPa√m",
+                "K_II, MPa√m",
+                "K_eq, MPa√m",
+                "would turn, °",
+            ],
             [
                 [
                     names[int(t["crack"])] if t["crack"] < len(names) else str(int(t["crack"])),

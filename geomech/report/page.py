@@ -49,32 +49,37 @@ html { -webkit-text-size-adjust: 100%; }
 body { margin: 0 auto; padding: 1.5rem 1.1rem 4rem; max-width: 62rem; color: var(--ink); background: #fff;
   font: 1rem/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
 h1 { font-size: 1.65rem; line-height: 1.2; margin: 0 0 .4rem; }
-h2 { font-size: 1.2rem; line-height: 1.25; margin: 2.4rem 0 .6rem; padding-bottom: .25rem; border-bottom: 1px solid var(--line); }
+h2 { font-size: 1.2rem; line-height: 1.25; margin: 2.4rem 0 .6rem; padding-bottom: .25rem;
+  border-bottom: 1px solid var(--line); }
 p { margin: .5rem 0; max-width: 46rem; }
 .lead { color: var(--soft); }
 nav { margin: 1rem 0 0; font-size: .92rem; }
 nav a { color: var(--accent); text-decoration: none; margin-right: 1rem; display: inline-block; }
-.facts { display: grid; grid-template-columns: repeat(auto-fill, minmax(10.5rem, 1fr)); gap: .6rem; margin: 1rem 0; padding: 0; }
+.facts { display: grid; grid-template-columns: repeat(auto-fill, minmax(10.5rem, 1fr)); gap: .6rem;
+  margin: 1rem 0; padding: 0; }
 .facts div { background: var(--tint); border-radius: .35rem; padding: .5rem .7rem; }
 .facts dt { color: var(--soft); font-size: .82rem; }
 .facts dd { margin: 0; font-weight: 600; overflow-wrap: anywhere; }
 .wide { overflow-x: auto; margin: .8rem 0; }
 table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
 caption { caption-side: top; text-align: left; color: var(--soft); padding: 0 0 .35rem; }
-th, td { padding: .28rem .75rem .28rem 0; text-align: right; vertical-align: top; border-bottom: 1px solid var(--line); }
+th, td { padding: .28rem .75rem .28rem 0; text-align: right; vertical-align: top;
+  border-bottom: 1px solid var(--line); }
 th { font-weight: 600; vertical-align: bottom; border-bottom: 1.5px solid var(--soft); }
 th.words, td.words { text-align: left; }
 td.told { text-align: left; min-width: 11rem; }
-.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, var(--least, 17rem)), 1fr)); gap: 1rem; margin: 1rem 0; }
+.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, var(--least, 17rem)), 1fr));
+  gap: 1rem; margin: 1rem 0; }
 figure { margin: 0; min-width: 0; }
 figure img { max-width: 100%; height: auto; display: block; }
 figcaption { color: var(--soft); font-size: .88rem; margin-top: .3rem; }
-pre { background: var(--tint); border-radius: .35rem; padding: .7rem .9rem; overflow-x: auto; font-size: .85rem; line-height: 1.4; }
+pre { background: var(--tint); border-radius: .35rem; padding: .7rem .9rem; overflow-x: auto; font-size: .85rem;
+  line-height: 1.4; }
 details { margin: .8rem 0; }
 summary { cursor: pointer; color: var(--accent); }
 td.bar { width: 40%; min-width: 6rem; padding-right: 0; vertical-align: middle; }
-td.bar span { display: block; height: .7rem; border-radius: .15rem; background: var(--accent); print-color-adjust: exact;
-  -webkit-print-color-adjust: exact; }
+td.bar span { display: block; height: .7rem; border-radius: .15rem; background: var(--accent);
+  print-color-adjust: exact; -webkit-print-color-adjust: exact; }
 .warning { border-left: 3px solid #c8553d; padding-left: .7rem; overflow-wrap: anywhere; }
 @page { size: A4; margin: 16mm 15mm; }
 @media print {
@@ -134,7 +139,8 @@ class Page:
         title = f"<caption>{html.escape(caption)}</caption>" if caption else ""
         body = "\n".join(f"<tr>{line('td', row)}</tr>" for row in rows)
         self._body.append(
-            f'<div class="wide"><table>{title}<thead><tr>{line("th", headers)}</tr></thead>\n<tbody>{body}</tbody></table></div>'
+            f'<div class="wide"><table>{title}<thead><tr>{line("th", headers)}</tr></thead>\n'
+            f"<tbody>{body}</tbody></table></div>"
         )
 
     def bars(self, headers: Sequence[str], sizes: Mapping[str, float]) -> None:
@@ -149,7 +155,8 @@ class Page:
             f"<th{_of('words' if k == 0 else '')}>{html.escape(name)}</th>" for k, name in enumerate(headers)
         )
         self._body.append(
-            f'<div class="wide"><table style="width:100%"><thead><tr>{head}<th></th></tr></thead><tbody>{rows}</tbody></table></div>'
+            '<div class="wide"><table '
+            f'style="width:100%"><thead><tr>{head}<th></th></tr></thead><tbody>{rows}</tbody></table></div>'
         )
 
     def figures(self, pictures: Iterable[tuple[Path, str]], least_rem: float = 17.0, whole: bool = False) -> None:

@@ -81,7 +81,8 @@ def _zones(c: Check) -> None:
         if c.tables.run is not None and excavation.time_s >= c.tables.run.end_time_s:
             c.warn(
                 ("loads", "excavations", k, "time_s"),
-                f"the excavation at {excavation.time_s:g} s comes when the run has ended ({c.tables.run.end_time_s:g} s)",
+                f"the excavation at {excavation.time_s:g} s comes when the run has ended ({c.tables.run.end_time_s:g} "
+                "s)",
                 "let the run go on beyond it (run.end_time_s)",
             )
 

@@ -357,6 +357,6 @@ def _toughness(c: Check) -> None:
             ("materials", name, "k_ic_pa_sqrt_m"),
             f"material {name!r} has no fracture toughness, and crack {crack!r} in it may grow"
             + (' (joints that end in rock are cracks: geometry.dead_ends = "cracks")' if dead_end else ""),
-            f"add k_ic_pa_sqrt_m to [materials.{name}], Pa √m (1e6 to 2.5e6 for most rocks), or set growth.enabled = false"
-            + (', or geometry.dead_ends = "trim"' if dead_end else ""),
+            f"add k_ic_pa_sqrt_m to [materials.{name}], Pa √m (1e6 to 2.5e6 for most rocks), or set growth.enabled = "
+            "false" + (', or geometry.dead_ends = "trim"' if dead_end else ""),
         )

@@ -162,7 +162,8 @@ def draw(
             Fault(
                 place(("geometry", "traces")),
                 f"no rock: none of the layers is a zone, they are sets of joints ({layers})",
-                'say which layer holds the outline: layers = { "NAME" = "zone:rock", "*" = "" }, or add [[geometry.zones]]',
+                'say which layer holds the outline: layers = { "NAME" = "zone:rock", "*" = "" }, or add '
+                "[[geometry.zones]]",
             )
         )
         return None

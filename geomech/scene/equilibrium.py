@@ -78,8 +78,8 @@ def _loads_are_lost(c: Check, fixed: np.ndarray) -> bool:
         zone = c.drawing.zones[int(loaded[0][0])]
         c.refuse(
             ("zones", zone, "fixed"),
-            f"every load acts on fixed blocks ({', '.join(sorted({c.drawing.zones[b] for at in loaded for b in at}))}): "
-            "nothing would be strained",
+            "every load acts on fixed blocks "
+            f"({', '.join(sorted({c.drawing.zones[b] for at in loaded for b in at}))}): nothing would be strained",
             "fix what the specimen stands on, never the specimen; a block alone is held by loads that balance",
         )
         return True

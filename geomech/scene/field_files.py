@@ -47,7 +47,8 @@ def read_traces(
                     Fault(
                         place(("geometry", "traces", k, "layers", pattern)),
                         f"{said!r} wants a name after it",
-                        f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to leave it to the name of the layer',
+                        f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to leave it to the name of the '
+                        "layer",
                     )
                 )
         for pattern in idle:

@@ -73,7 +73,7 @@ def check_borne(c: Check) -> None:
     falls = f" and {others} more blocks" if others > 1 else " and the other block" if others else ""
     c.refuse(
         ("loads", "gravity_m_s2"),
-        f"nothing bears the weight of {blocks.names[lowest]!r}{falls}: no block is fixed or guided, and no load, motion, "
-        "bolt or water holds them",
+        f"nothing bears the weight of {blocks.names[lowest]!r}{falls}: no block is fixed or guided, and no load, "
+        "motion, bolt or water holds them",
         "say `fixed = true` in the [zones.NAME] of what they stand on, or draw it and call its edges `fixed`",
     )

@@ -169,8 +169,8 @@ def _too_fine(geometry: Geometry, box: np.ndarray) -> list[Flaw]:
     return [
         Flaw(
             "joint_sets", k,
-            f"this set would have about {number:.1g} joints, {density:.3g} m on every m², and all sets {pieces:.1g} pieces between "
-            "crossings: more than can be cut",
+            f"this set would have about {number:.1g} joints, {density:.3g} m on every m², and all sets {pieces:.1g} "
+            "pieces between crossings: more than can be cut",
             "are its spacing and lengths in metres? Make it coarser, or its `region` smaller",
         )
     ]  # fmt: skip

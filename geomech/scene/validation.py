@@ -64,7 +64,9 @@ def _meant(key: str, known: list[str]) -> str:
     close = difflib.get_close_matches(key, known, 1, cutoff=0.8)
     close = close or everywhere.get(key, [])[:3]
     if not close:
-        close = [place for near in difflib.get_close_matches(key, everywhere, 1, 0.85) for place in everywhere[near][:3]]
+        close = [
+            place for near in difflib.get_close_matches(key, everywhere, 1, 0.85) for place in everywhere[near][:3]
+        ]
     close = close or difflib.get_close_matches(key, known, 1, cutoff=0.65)
     return f"did you mean {' or '.join(map(repr, close))}? " if close else ""
 

@@ -76,7 +76,10 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
     if heights and max(heights) > 1e-9 * size:
         warnings.append(
             (
-                f"{path.name}: {sum(h > 1e-9 * size for h in heights)} entities have z ≠ 0 (up to {max(heights) * factor:g} m)",
+                (
+                    f"{path.name}: {sum(h > 1e-9 * size for h in heights)} entities have z ≠ 0 (up to "
+                    f"{max(heights) * factor:g} m)"
+                ),
                 "the rock is plane and z is left away: draw the section in x and y",
             )
         )

@@ -29,7 +29,10 @@ def lost_curves(gmsh, path: Path, curves: Curves, zones: list[Zone], known: set[
         listed = ", ".join(map(str, tags))
         what = f"curves {listed} lie" if len(tags) > 1 else f"curve {listed} lies"
         message = f"{path.name}: {what} inside zone {name!r} and {'are no cracks' if len(tags) > 1 else 'is no crack'}"
-        way_out = f'name a crack Physical Curve("{CRACK}NAME") = {{{listed}}}, a joint "{JOINT}NAME"; delete what only helped to draw'
+        way_out = (
+            f'name a crack Physical Curve("{CRACK}NAME") = {{{listed}}}, a joint "{JOINT}NAME"; delete what only '
+            "helped to draw"
+        )
         warnings.append((message, way_out))
     return warnings
 
@@ -56,7 +59,10 @@ def out_of_plane(gmsh, path: Path, size: float) -> list[tuple[str, str]]:
     worst = max((z[tag] for tag in off), key=abs)
     return [
         (
-            f"{path.name}: {f'points {shown} have' if len(off) > 1 else f'point {shown} has'} z ≠ 0 (up to {worst:g} m)",
+            (
+                f"{path.name}: {f'points {shown} have' if len(off) > 1 else f'point {shown} has'} z ≠ 0 (up to "
+                f"{worst:g} m)"
+            ),
             "the rock is plane and z is left away: draw in x and y, with z = 0",
         )
     ]

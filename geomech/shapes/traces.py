@@ -140,8 +140,8 @@ def _strung(
         other = next((row for row in rows if sets[row] != sets[rows[0]]), None)
         if other is not None:
             raise FieldFileError(
-                f"{path.name}:{numbers[other]}: trace {name!r} is in set {sets[other]!r} and, at line {numbers[rows[0]]}, "
-                f"in set {sets[rows[0]]!r}",
+                f"{path.name}:{numbers[other]}: trace {name!r} is in set {sets[other]!r} and, at line "
+                f"{numbers[rows[0]]}, in set {sets[rows[0]]!r}",
                 "give each trace one set, and an id of its own",
             )
         points, shape = values[rows], "line"

@@ -61,7 +61,10 @@ def report(runs: Mapping[str, list]) -> str:
         lines += [
             "Breakout, remote stresses rising in proportion",
             f"  onset at {found:.4f} of them; 2c cos φ/(1 − sin φ) over 3σ_H − σ_h: {expected:.4f}",
-            f"  at {', '.join(f'{a:.1f}°' for a in azimuths(run))} from σ_H (Bell & Gough 1979: 90°, the wall that faces σ_h)",
+            (
+                f"  at {', '.join(f'{a:.1f}°' for a in azimuths(run))} from σ_H (Bell & Gough 1979: 90°, the wall that "
+                "faces σ_h)"
+            ),
             f"  first chip: {width:.1f}° of the wall, {deep:.3f} radii deep",
             f"  its crack stands at K_Ic down to {min(step.load_factor for step in run):.3f} of the stresses",
         ]
@@ -73,7 +76,10 @@ def report(runs: Mapping[str, list]) -> str:
         lines += [
             f"Shear cracks, friction {FRICTION}, K_IIc {WEAK_IN_SHEAR / 1e6} MPa √m, at {ABOVE} of the remote stresses",
             f"  born at {', '.join(f'{a:.1f}°' for a in azimuths(run)[:2])} from σ_H",
-            f"  K_eq/K_Ic {drive[1]:.2f} at first, at most {max(drive):.2f}; they stop {depth(run):.3f} radii in the rock",
+            (
+                f"  K_eq/K_Ic {drive[1]:.2f} at first, at most {max(drive):.2f}; they stop {depth(run):.3f} radii in "
+                "the rock"
+            ),
         ]
         assert run[-1].events[-1].kind == "arrest", "the shear cracks do not stop"
         assert np.abs(azimuths(run)[:2] - 90).max() < AZIMUTH_TOLERANCE_DEG, (

@@ -136,7 +136,10 @@ def report(tests: Mapping[str, Sheared]) -> str:
             for name, t in known.items()
         ],
         after=[
-            "Half-planes: N tan φ + K √(πb) (Tada, Paris & Irwin 2000), which the specimen tends to as its bridge gets short.",
+            (
+                "Half-planes: N tan φ + K √(πb) (Tada, Paris & Irwin 2000), which the specimen tends to as its bridge "
+                "gets short."
+            ),
             "Lajtai (1969): the bridge's mean stress reaches its tensile strength, taken as 6.88 K_Ic (Zhang 2002).",
         ],
     )

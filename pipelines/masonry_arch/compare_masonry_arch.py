@@ -13,11 +13,12 @@ INK, STONE, BASE, THRUST, HINGE = "#2f3136", "#d8d2c4", "#a9a9a4", "#1f6f8b", "#
 
 LIMITS = """\
 What this does and does not say
-  - Joints are radial, of equal angle, and too rough to slide (60°); stone does not crush. Gravity acts on the whole arch
-    at once, as when a centring is struck.
+  - Joints are radial, of equal angle, and too rough to slide (60°); stone does not crush. Gravity acts on the whole
+    arch at once, as when a centring is struck.
   - Hinges form at joints only: few voussoirs stand thinner than many. With an odd number the crown's hinge splits over
     the two joints of the keystone.
-  - Elastic shortening (E = 100 GPa) lowers the line of thrust by 1e-4 of the thickness: that much more t/R is needed."""
+  - Elastic shortening (E = 100 GPa) lowers the line of thrust by 1e-4 of the thickness: that much more t/R is
+    needed."""
 
 
 def report(thinnest: dict[int, float], hinges: np.ndarray) -> str:

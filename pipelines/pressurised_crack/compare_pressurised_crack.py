@@ -52,14 +52,16 @@ def report(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> str
         thin = np.abs(got) / thin_layer(1.0, depth, 1.0)
         beside = f"{off:.1e}" if np.isfinite(off) else "-"
         rows.append(
-            f"{depth:5.2f} {got[0] / GRIFFITH:9.4f} {got[1] / GRIFFITH:9.4f}      {beside:>12}     {thin[0]:18.4f} {thin[1]:7.4f}"
+            f"{depth:5.2f} {got[0] / GRIFFITH:9.4f} {got[1] / GRIFFITH:9.4f}      {beside:>12}     {thin[0]:18.4f} "
+            f"{thin[1]:7.4f}"
         )
     limit = shallow_limit(depths, k)
     rows += ["", f"thin layer, extrapolated to no depth: {limit[0]:.4f}, {limit[1]:.4f} of the published K_I, K_II", ""]
     for depth, cracks in paths.items():
         top = cracks.nodes[np.argmax(cracks.nodes[:, 1])]
         rows.append(
-            f"from depth {depth:g} the crack comes up {abs(top[0]):.2f} from its middle, {abs(top[1]):.2f} below the surface"
+            f"from depth {depth:g} the crack comes up {abs(top[0]):.2f} from its middle, {abs(top[1]):.2f} below the "
+            "surface"
         )
     return "\n".join([*rows, "", LIMITS])
 

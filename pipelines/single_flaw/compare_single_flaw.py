@@ -18,12 +18,12 @@ LISTED = (0.2, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 
 #: What the comparison says of itself.
 LIMITS = (
-    """The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a third of the
-    width. They share the fall of K_I with length (stable growth), not its size; from where the wings are as far from the ends
-    as the specimen is wide, K_I rises again and they part from them.""",
-    """The load at which wings run to the ends belongs to ends under uniform stress: a block with one strain gives its ends no
-    resistance to bending open, as stiff platens would. Under it they go through to the ends: the load of daylighting is that of
-    the last stable increment, 45.82, 45.74 and 45.68 MPa for increments of 4, 2 and 1 mm.""",
+    """The closed forms are for flaws whose faces slide, in an infinite plane; this flaw is an open slot over a third of
+    the width. They share the fall of K_I with length (stable growth), not its size; from where the wings are as far
+    from the ends as the specimen is wide, K_I rises again and they part from them.""",
+    """The load at which wings run to the ends belongs to ends under uniform stress: a block with one strain gives its
+    ends no resistance to bending open, as stiff platens would. Under it they go through to the ends: the load of
+    daylighting is that of the last stable increment, 45.82, 45.74 and 45.68 MPa for increments of 4, 2 and 1 mm.""",
     "Published pictures (wings that turn into the load's direction) agree in kind only: no numbers are printed.",
 )
 
@@ -150,13 +150,13 @@ def _growth(wings: Wings) -> Part:
     load, mm = wings.load[[0, last]] / MPA, np.array([wings.arrested, wings.wing[last], to_end]) * 1e3
     opened = wings.k[1:][wings.k[1:, 0] > 0]
     shear = np.abs(opened[:, 1] / opened[:, 0]).max() if len(opened) else np.nan
-    words = [
-        f"The first burst, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm; then each increment needs a higher load,",
-        f"{len(wings.stable) - 1} times over. At {load[1]:.1f} MPa, {mm[1]:.0f} mm long and {mm[2]:.0f} mm from the specimen's",
-        f"ends, they run on at that load, {wings.direction[last]:.2f} degrees from the load's direction; |K_II|/K_I is at most",
-        f"{shear:.3f} after the kink. The run ended: {wings.end}.",
-    ]
-    return Part("Growth", before=[" ".join(words)])
+    words = (
+        f"The first burst, at {load[0]:.1f} MPa, leaves wings of {mm[0]:.0f} mm; then each increment needs a higher "
+        f"load, {len(wings.stable) - 1} times over. At {load[1]:.1f} MPa, {mm[1]:.0f} mm long and {mm[2]:.0f} mm from "
+        f"the specimen's ends, they run on at that load, {wings.direction[last]:.2f} degrees from the load's "
+        f"direction; |K_II|/K_I is at most {shear:.3f} after the kink. The run ended: {wings.end}."
+    )
+    return Part("Growth", before=[words])
 
 
 def _lengths(wings: Wings) -> Part:
@@ -179,7 +179,10 @@ def _stiffness(wings: Wings) -> Part:
     return Part(
         "Stiffness before growth",
         before=[
-            f"{wings.tangent_modulus() / 1e9:.2f} GPa; plane strain with one small open slot {published.tangent_modulus() / 1e9:.2f} GPa."
+            (
+                f"{wings.tangent_modulus() / 1e9:.2f} GPa; plane strain with one small open slot "
+                f"{published.tangent_modulus() / 1e9:.2f} GPa."
+            )
         ],
     )
 

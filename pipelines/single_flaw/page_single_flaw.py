@@ -28,8 +28,9 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
     run = Run(places[name])
     page = Page(
         "Wing cracks from a single flaw",
-        "Specimen of Wong et al. (2002), 50 × 170 mm, an open flaw of half-length 10 mm at 30° from the horizontal, between"
-        " frictionless platens; computed by DDA and DDM coupled, as in Khanizadeh Bahabadi et al. (2023), Figure 11.",
+        "Specimen of Wong et al. (2002), 50 × 170 mm, an open flaw of half-length 10 mm at 30° from the horizontal, "
+        "between frictionless platens; computed by DDA and DDM coupled, as in Khanizadeh Bahabadi et al. (2023), "
+        "Figure 11.",
     )
     page.facts(key_results(run))
     add_pictures(page, run)

@@ -18,16 +18,18 @@ from geomech.report.part import Part
 G = 9.81
 
 LIMITS = (
-    """Of ten joints the first bridge, at the toe, where the block pushes out, takes all others with it under a dead load: each that breaks
-    leaves more to the next. With the load led back to what the tips just bear (variant "followed") every bridge needs a load
-    of its own, none of them more than the first. All bridges tearing at once, with the strength that rock of this toughness has in a
-    specimen (Zhang 2002), would hold many times as much: joints' ends concentrate stress, and what limit equilibrium calls the
-    strength of a bridge is not the material's but that of cracks as long as joints.""",
-    """Einstein et al. let bridges of this kind tear straight across the joints' dip, at 90° to it. The cracks leave at 70.5°, as
-    pure shear bids, and turn on; from end to end they lie between the two, and meet the next joint some way up from its
-    end. A bridge that cracks enter from both sides is crossed at 90°.""",
-    """The slope stands under the gravity of the whole block alone, without the stress that erosion or excavation leaves. The
-    ground reaches as deep as it is wide: blocks press on what they stand on linearly, and in shallow ground that doubles K.""",
+    """Of ten joints the first bridge, at the toe, where the block pushes out, takes all others with it under a dead
+    load: each that breaks leaves more to the next. With the load led back to what the tips just bear (variant
+    "followed") every bridge needs a load of its own, none of them more than the first. All bridges tearing at once,
+    with the strength that rock of this toughness has in a specimen (Zhang 2002), would hold many times as much: joints'
+    ends concentrate stress, and what limit equilibrium calls the strength of a bridge is not the material's but that of
+    cracks as long as joints.""",
+    """Einstein et al. let bridges of this kind tear straight across the joints' dip, at 90° to it. The cracks leave at
+    70.5°, as pure shear bids, and turn on; from end to end they lie between the two, and meet the next joint some way
+    up from its end. A bridge that cracks enter from both sides is crossed at 90°.""",
+    """The slope stands under the gravity of the whole block alone, without the stress that erosion or excavation
+    leaves. The ground reaches as deep as it is wide: blocks press on what they stand on linearly, and in shallow ground
+    that doubles K.""",
 )
 
 
@@ -206,7 +208,8 @@ def draw(seen: StepPath, file: Path) -> None:
     loads.scatter(length[grows], at[grows], c=colours(scale(at[grows])), s=26, zorder=3)
     loads.axhline(seen.alone, color=ink, ls="--", lw=1)
     loads.text(
-        0.98, seen.alone, "first tip, crack solver alone", transform=loads.get_yaxis_transform(), ha="right", va="bottom",
+        0.98, seen.alone, "first tip, crack solver alone", transform=loads.get_yaxis_transform(), ha="right",
+        va="bottom",
         fontsize=8,
     )  # fmt: skip
     loads.set(ylim=(0, 1.15 * at.max()), xlabel="new crack, m", ylabel="multiple of gravity")

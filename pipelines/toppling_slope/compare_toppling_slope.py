@@ -13,11 +13,11 @@ INK, BASE = "#2f3136", "#e6e3dc"
 
 LIMITS = """\
 What this does and does not say
-  - The published calculation is limit equilibrium of rigid blocks. Elastic columns lean by their own give, which takes a
-    little more friction: tan φ = 0.790, 0.787, 0.785 for E = 10, 100 and 1000 GPa.
-  - Forces are those a quarter of a per cent below the limit, 1.5 s after the friction dropped: blocks creep, and all that
-    must slide does. Above the limit friction holds forces back, and what they are depends on how the slope came to rest
-    (100 kN and more of difference).
+  - The published calculation is limit equilibrium of rigid blocks. Elastic columns lean by their own give, which takes
+    a little more friction: tan φ = 0.790, 0.787, 0.785 for E = 10, 100 and 1000 GPa.
+  - Forces are those a quarter of a per cent below the limit, 1.5 s after the friction dropped: blocks creep, and all
+    that must slide does. Above the limit friction holds forces back, and what they are depends on how the slope came to
+    rest (100 kN and more of difference).
   - The printed heights step down by 6 m above the crest (5 m at the tops and 1 m at the bases), though 5.2 m is printed
     for the tops; weights and forces of the table go with 5 m."""
 

@@ -112,7 +112,8 @@ def report(runs: Mapping[str, Watch]) -> str:
     for name, run in runs.items():
         if run.broke is not None:
             lines.append(
-                f"  {name:10s} {run.force / 1e3:11.2f} {run.statics / 1e3:18.2f} {run.broke[0]:10.4f} {run.breaks:27.4f}"
+                f"  {name:10s} {run.force / 1e3:11.2f} {run.statics / 1e3:18.2f} {run.broke[0]:10.4f} "
+                f"{run.breaks:27.4f}"
             )
     lines += ["Then: acceleration under full gravity", f"  {'':10s} m/s²      Newton's    way, m"]
     for name, run in runs.items():

@@ -30,12 +30,12 @@ LADDERS = {
 LENGTHS = (2e-3, 3e-3, 4e-3)
 #: Why the ways of handing forces on differ.
 SPRINGS = """\
-The platens touch the specimen by springs at its corners. Spread over the face, their forces are the uniform stress of the
-test. Left at the corners, they reach the cracks unevenly. By Kelvin's solution (equations 2-4) about three quarters of a
-corner's force go into the rest of the infinite plane, which is not there."""
+The platens touch the specimen by springs at its corners. Spread over the face, their forces are the uniform stress of
+the test. Left at the corners, they reach the cracks unevenly. By Kelvin's solution (equations 2-4) about three quarters
+of a corner's force go into the rest of the infinite plane, which is not there."""
 GUESS = """\
-Were equation 4's u the motion of the boundary and not what the spring gives, forces at the loaded end would be {:.0f} times as
-large: a guess, no more, at how initiation stresses so low were found."""
+Were equation 4's u the motion of the boundary and not what the spring gives, forces at the loaded end would be {:.0f}
+times as large: a guess, no more, at how initiation stresses so low were found."""
 
 
 def family(name: str) -> str:
@@ -73,7 +73,10 @@ def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
         headers,
         loads(FACES) + loads({name: wishes for name, wishes in READINGS.items() if wishes}),
         [
-            "Initiation, MPa: the load at which the first tip reaches the printed toughness, by maximum tangential stress.",
+            (
+                "Initiation, MPa: the load at which the first tip reaches the printed toughness, by maximum tangential "
+                "stress."
+            ),
             "Slots are open at first and stay so; closed cracks slide.",
         ],
     )
@@ -93,7 +96,10 @@ def first_steps(folder: Path, overrides: Sequence[str]) -> list[Part]:
         rows,
         [
             "Largest error at any tip, in hundredths of the largest K of that mode, against this study's settings.",
-            "These are within 2·10⁻⁵ of finer elements, and K within 3·10⁻⁹ of the crack solver alone under the exact tractions.",
+            (
+                "These are within 2·10⁻⁵ of finer elements, and K within 3·10⁻⁹ of the crack solver alone under the "
+                "exact tractions."
+            ),
         ],
         [
             SPRINGS,
@@ -118,7 +124,10 @@ def whole_runs(runs: Mapping[str, Watch]) -> list[Part]:
     headers = ["run", "φ to crack 1", "initiation, MPa", "coalescence, MPa", "line, °", "largest way apart, mm", "end"]
     found = []
     if any(of_family(runs, which) for which in FAMILIES):
-        note = "Largest way apart: of any grown point from the path of this study's run with the same φ; what lies beyond a tip is left out."
+        note = (
+            "Largest way apart: of any grown point from the path of this study's run with the same φ; what lies "
+            "beyond a tip is left out."
+        )
         found.append(Part("Whole runs by other readings, faces and settings", headers, rows, after=[note]))
     for which, told in LADDERS.items():
         members = of_family(runs, which)
@@ -196,7 +205,8 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
         headers += [f"{1e3 * length:.0f} mm long, MPa", "off, %"]
     headers += ["paths apart, mm", "joined, MPa", "off, %", "computed in, s"]
     note = (
-        "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is so long;"
-        " increments run to coalescence, the others to 200 MPa. Paths apart: largest distance of a grown point from the finest one's cracks."
+        "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is "
+        "so long; increments run to coalescence, the others to 200 MPa. Paths apart: largest distance of a grown point "
+        "from the finest one's cracks."
     )
     return Part(f"Convergence: {told.split(',')[0].split(' (')[0]}", headers, rows, [note])

@@ -154,9 +154,10 @@ def _loads(runs: dict[int, Watch]) -> Part:
     headers = ["φ", "initiation, MPa", "σ√(πb)/K_Ic", "coalescence, MPa", "σ√(πb)/K_Ic", "σ_F/σ_c"]
     headers += ["strain then, 10⁻³", "at coalescence, 10⁻³", "how the run ended"]
     after.append(
-        "Coalescence: the inner wings run towards each other and tips join what is nearer than 1 mm. With finer increments the load"
-        " tends to 218, 351, about 340 and 227 MPa (φ = 0, 30, 60, 90); at φ = 0 and 30 growth is unstable there, and any join"
-        " length from 1 to 2 mm gives the same. Increments of 1 mm miss the peaks between them, by 3 to 10 %: see convergence."
+        "Coalescence: the inner wings run towards each other and tips join what is nearer than 1 mm. With finer "
+        "increments the load tends to 218, 351, about 340 and 227 MPa (φ = 0, 30, 60, 90); at φ = 0 and 30 growth is "
+        "unstable there, and any join length from 1 to 2 mm gives the same. Increments of 1 mm miss the peaks between "
+        "them, by 3 to 10 %: see convergence."
     )
     after.append("σ_F is taken as the stress of coalescence. The paper prints no numbers with Figures 16 and 17.")
     return Part("Loads and strains (Figures 15, 16, 17)", headers, rows, after=after)
@@ -233,16 +234,17 @@ def _disagreements(runs: dict[int, Watch]) -> Part:
             for phi, load in loads.items()
         )
 
-    words = [
-        f"With the printed toughness of {published.K_IC / MPA:g} MPa√m no slot starts to grow below {first:.1f} MPa, above the",
-        f"strength of the intact material ({published.UNIAXIAL_STRENGTH / MPA:g} MPa): the printed initiation stresses of 2-5 MPa",
-        "cannot follow from it. Loads go with toughness, so compare the normalised ones. The paper finds initiation and",
-        "coalescence stresses higher at φ = 30 and 60 than at 0 and 90. Coalescence agrees, initiation does not: crack 1 is",
-        f"the same in all four, and is what starts first (normalised, initiation {listed('initiation')}; coalescence",
-        f"{listed('coalescence')}). Table 4 prints |K_I|, but slots under compression have K_I < 0; its zeros at φ = 30",
-        "and 60 belong to faces that touch, while its other rows are those of open slots: one specimen cannot have both. φ is",
-        "told as measured from the horizontal, but the pairs φ = 0 with 90 and 30 with 60 in Table 4 and Figures 15 and 16",
-        "only stand where it counts from crack 1. Table 3's lines at φ = 0 to 60 are geometry first: the straight line from",
-        "tip to tip has nearly their slopes.",
-    ]
-    return Part("Where the paper contradicts itself", before=[" ".join(words)])
+    words = (
+        f"With the printed toughness of {published.K_IC / MPA:g} MPa√m no slot starts to grow below {first:.1f} MPa, "
+        f"above the strength of the intact material ({published.UNIAXIAL_STRENGTH / MPA:g} MPa): the printed "
+        "initiation stresses of 2-5 MPa cannot follow from it. Loads go with toughness, so compare the normalised "
+        "ones. The paper finds initiation and coalescence stresses higher at φ = 30 and 60 than at 0 and 90. "
+        "Coalescence agrees, initiation does not: crack 1 is the same in all four, and is what starts first "
+        f"(normalised, initiation {listed('initiation')}; coalescence {listed('coalescence')}). Table 4 prints |K_I|, "
+        "but slots under compression have K_I < 0; its zeros at φ = 30 and 60 belong to faces that touch, while its "
+        "other rows are those of open slots: one specimen cannot have both. φ is told as measured from the horizontal, "
+        "but the pairs φ = 0 with 90 and 30 with 60 in Table 4 and Figures 15 and 16 only stand where it counts from "
+        "crack 1. Table 3's lines at φ = 0 to 60 are geometry first: the straight line from tip to tip has nearly "
+        "their slopes."
+    )
+    return Part("Where the paper contradicts itself", before=[words])

@@ -28,16 +28,16 @@ def write_page(runs: Mapping[str, Watch], folder: Path, out: Path, overrides: Se
     by_phi = by_angle(base or runs)
     page = Page(
         "Two cracks under uniaxial compression",
-        "Specimens of Haeri et al. (2014), computed by DDA and DDM coupled as Khanizadeh Bahabadi et al. (2023) did (KB 2023),"
-        " beside what both print.",
+        "Specimens of Haeri et al. (2014), computed by DDA and DDM coupled as Khanizadeh Bahabadi et al. (2023) did "
+        "(KB 2023), beside what both print.",
     )
     facts = {f"φ = {phi}°: initiation, coalescence": _pair(run) for phi, run in by_phi.items()}
     page.facts(facts)
     page.section("The specimens")
     page.text(
-        "60 × 120 mm between frictionless platens, two open slots of 10 mm, 20 mm apart on the axis, crack 1 (upper) at 45° and"
-        " crack 2 turned from it by φ. E = 17 GPa, ν = 0.21, K_Ic = 2 MPa√m; the load rises by 0.2 MPa/s. Compression is given"
-        " positive here."
+        "60 × 120 mm between frictionless platens, two open slots of 10 mm, 20 mm apart on the axis, crack 1 (upper) "
+        "at 45° and crack 2 turned from it by φ. E = 17 GPa, ν = 0.21, K_Ic = 2 MPa√m; the load rises by 0.2 MPa/s. "
+        "Compression is given positive here."
     )
     with tempfile.TemporaryDirectory() as drawings:
         _fill(page, runs, by_phi, folder, out, overrides, Path(drawings))
@@ -85,7 +85,8 @@ def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings
     if not others:
         page.section("Whole runs by other readings, faces and settings; convergence")
         page.text(
-            "Not made: they take some minutes. geomech run pipelines/two_cracks --variant all makes them, and adds them here."
+            "Not made: they take some minutes. geomech run pipelines/two_cracks --variant all makes them, and adds "
+            "them here."
         )
     for part in told:
         if part.title.startswith("Where"):
@@ -137,7 +138,10 @@ def _figures(by_phi: Mapping[int, Watch], drawings: Path) -> list[tuple[Path, st
     )
     if 0 in by_phi and np.isfinite(by_phi[0].load("initiation")):
         fit = published.INITIATION_STRESS_MPA["experiment"][0] * MPA / by_phi[0].load("initiation")
-        caption = f"Figure 15 with one effective toughness of {fit * published.K_IC / MPA:.2f} MPa√m, fitted to the experiment's initiation at φ = 0."
+        caption = (
+            f"Figure 15 with one effective toughness of {fit * published.K_IC / MPA:.2f} MPa√m, fitted to the "
+            "experiment's initiation at φ = 0."
+        )
         theirs = {key: span for key, span in ranges.items() if "experiment" in key}
         made.append((against(stresses(fit), drawings / "f15b.svg", name, "axial stress, MPa", theirs), caption))
     ratio = {"σ_F/σ_c": curve("coalescence", lambda run: run.load("coalescence") / published.UNIAXIAL_STRENGTH)}

@@ -24,7 +24,8 @@ def test_views_go_on_sharing_memory_and_keep_their_layout(tmp_path):
     turned = np.asfortranarray(whole)
     rows = np.zeros(4, [("a", float), ("b", int, 2)])
     stored = {
-        "whole": whole, "part": whole[1:5:2, ::-3], "turned": turned, "column": turned[:, 3], "field": rows["b"], "rows": rows,
+        "whole": whole, "part": whole[1:5:2, ::-3], "turned": turned, "column": turned[:, 3], "field": rows["b"],
+        "rows": rows,
         "none": whole[:0], "frozen": whole[2:3].copy(),
     }  # fmt: skip
     stored["frozen"].flags.writeable = False

@@ -55,7 +55,13 @@ def test_closing_lines_name_what_moved():
     summary = {
         "motion": {"condition": "sliding", "unbalanced_ratio": 0.1, "kinetic_energy": 5.0},
         "key_blocks": [
-            {"block": "wedge", "displacement_m": 0.2, "class": "key block, slides", "direction_deg": -40.0, "factor_of_safety": 0.9}
+            {
+                "block": "wedge",
+                "displacement_m": 0.2,
+                "class": "key block, slides",
+                "direction_deg": -40.0,
+                "factor_of_safety": 0.9,
+            }
         ],
     }  # fmt: skip
     lines = closing(summary)

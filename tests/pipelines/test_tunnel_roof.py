@@ -55,7 +55,8 @@ def test_shorter_bridges_are_nearer_to_half_planes(tmp_path):
     """The bridge's force from K_I = P/√(πc): its error falls with c, and so does what the roof's bending shears it."""
     errors, shears = [], []
     for half in (0.2, 0.1, 0.05):
-        cracks = f'[{{name="parting left", points=[[-2,7],[-{half},7]]}}, {{name="parting right", points=[[2,7],[{half},7]]}}]'
+        left, right = f"[[-2,7],[-{half},7]]", f"[[2,7],[{half},7]]"
+        cracks = f'[{{name="parting left", points={left}}}, {{name="parting right", points={right}}}]'
         out = tmp_path / f"{half}"
         assert (
             main(

@@ -69,7 +69,8 @@ def runs(tmp_path_factory):
     for name in ("one", "other"):
         made.write(folder / name, [Histories(), Series(interior_every=0), Summary()])
     (folder / "other" / "run.log").write_text(
-        "2026-01-01 00:00:00,1 WARNING geomech.dda: blocks <overlap>\n    & so on\n2026-01-01 00:00:01,1 INFO    geomech.run: ended\n"
+        "2026-01-01 00:00:00,1 WARNING geomech.dda: blocks <overlap>\n    & so on\n2026-01-01 00:00:01,1 INFO    "
+        "geomech.run: ended\n"
     )
     return folder
 

@@ -213,7 +213,12 @@ ADDED = [
     ("[zones.rok]\n", "zones.rok", "no zone 'rok'", "did you mean 'rock'?"),
     ('[zones.rock]\nmaterial = "stone"\n', "zones.rock.material", "no material 'stone'", "rock"),
     ("[cracks.flow]\n", "cracks.flow", "no crack 'flow'", "did you mean 'flaw'?"),
-    ('[joints.rough]\nedges = ["*"]\n[cracks.flaw]\njoint = "tough"\n', "cracks.flaw.joint", "no joint 'tough'", "'rough'"),
+    (
+        '[joints.rough]\nedges = ["*"]\n[cracks.flaw]\njoint = "tough"\n',
+        "cracks.flaw.joint",
+        "no joint 'tough'",
+        "'rough'",
+    ),
     (
         '[joints.glue]\ntensile_strength_pa = 1e6\n[cracks.flaw]\naperture = "slot"\njoint = "glue"\n',
         "cracks.flaw.joint", "cannot have the tensile strength", "closed",

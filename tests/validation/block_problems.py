@@ -25,7 +25,8 @@ def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
 
 
 def system_of(
-    polygons, joints: list[JointLaw] | float, *, rock: Material | None = None, fixed: int = 1, joint_index=None, names=None,
+    polygons, joints: list[JointLaw] | float, *, rock: Material | None = None, fixed: int = 1, joint_index=None,
+    names=None,
     **settings,
 ) -> dda.BlockSystem:  # fmt: skip
     """Blocks of one rock, the first ``fixed`` of them fixed; ``joints`` may be one friction angle (rad). Dynamic steps

@@ -142,7 +142,8 @@ def test_impact_keeps_momentum_and_gains_no_energy(dt, ratio):
     assert mass @ state.velocity[:, :2] == pytest.approx(momentum, rel=1e-9)
     _, least = exact.plastic_impact_bounds((mass[0], mass[1]), (4.0, -1.0))
     print(
-        f"dt {dt} penalty {ratio} E: {moving[-1] / start:.3f} of the energy is left, plastic impact leaves {least / start:.3f}"
+        f"dt {dt} penalty {ratio} E: {moving[-1] / start:.3f} of the energy is left, plastic impact leaves "
+        f"{least / start:.3f}"
     )
     assert 0.999 * least < moving[-1] and max(moving) <= start * (1 + 1e-9)
 

@@ -66,7 +66,11 @@ BATTERY = {
     "collinear": ([], lines([[-1, 0], [-0.02, 0]], [[0.02, 0], [1, 0]]), MIXED),
     "parallel": ([], lines([[-1, 0], [1, 0]], [[-0.7, 0.1], [1.3, 0.1]]), MIXED),
     "star of three": ([], star(3), MIXED),
-    "T of 90": ([], joined([[-1, 0], [0, 0], [1, 0], [0, 1]], np.array([[0, 1], [1, 2], [1, 3]]), np.array([0, 0, 1])), MIXED),
+    "T of 90": (
+        [],
+        joined([[-1, 0], [0, 0], [1, 0], [0, 1]], np.array([[0, 1], [1, 2], [1, 3]]), np.array([0, 0, 1])),
+        MIXED,
+    ),
     "kink of 30": ([], kinked(30, 0.3), MIXED),
     "short kink of 45": ([], kinked(45, 0.01), MIXED),
     "kink of 110": ([], kinked(110, 0.3), MIXED),

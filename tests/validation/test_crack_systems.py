@@ -33,7 +33,8 @@ def junction(ways):
     """Arms of length 1 from the origin."""
     n = len(ways)
     return Cracks(
-        nodes=np.vstack([np.zeros((1, 2)), ways]), segments=np.array([[0, k + 1] for k in range(n)]), crack=np.arange(n),
+        nodes=np.vstack([np.zeros((1, 2)), ways]), segments=np.array([[0, k + 1] for k in range(n)]),
+        crack=np.arange(n),
         block=np.zeros(n, int), birth_cycle=np.zeros(n, int), aperture=np.full(n, math.inf),
         surface=np.zeros(n + 1, bool), names=tuple("abcdef"[:n]),
     )  # fmt: skip

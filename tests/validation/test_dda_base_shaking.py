@@ -93,7 +93,8 @@ def test_block_slides_on_a_shaken_base_as_newmark_says(case, frame, contact):
         errors.append(np.abs(rows[:, 1] - np.interp(rows[:, 0], times, expected)).max() / most)
     order = np.log(errors[0] / errors[1]) / np.log(steps[0] / steps[1])
     print(
-        f"{case}, {frame} frame, {contact}: slips {1e3 * most:.2f} mm at most, error at dt = {', '.join(f'{1e3 * dt:g}' for dt in steps)} ms: "
+        f"{case}, {frame} frame, {contact}: slips {1e3 * most:.2f} mm at most, error at dt = "
+        f"{', '.join(f'{1e3 * dt:g}' for dt in steps)} ms: "
         + ", ".join(f"{e:.1e}" for e in errors)
         + f", order {order:.1f}"
     )

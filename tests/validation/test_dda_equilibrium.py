@@ -22,8 +22,8 @@ def rest(system: dda.BlockSystem, **more) -> dda.Equilibrium:
     found = dda.equilibrium(system, State.at_rest(system.blocks), WEIGHT, **more)
     h = found.history
     print(
-        f"{system.blocks.n_blocks} blocks: {found.reason}; {len(h)} steps, {h['iterations'].sum()} open–close iterations, "
-        f"{h['cuts'].sum()} cuts"
+        f"{system.blocks.n_blocks} blocks: {found.reason}; {len(h)} steps, {h['iterations'].sum()} open–close "
+        f"iterations, {h['cuts'].sum()} cuts"
     )
     return found
 

@@ -101,7 +101,8 @@ def test_beam_of_two_blocks(youngs_modulus):
     crown = -(state.vertices - system.blocks.vertices)[10, 1]
     rigid = masonry.three_hinge_thrust(span, thickness, weight)
     print(
-        f"E = {youngs_modulus:.0e}: thrust {got / rigid:.6f} of the rigid one ({thrust / rigid:.6f}), sag {crown:.4e} m ({sag:.4e})"
+        f"E = {youngs_modulus:.0e}: thrust {got / rigid:.6f} of the rigid one ({thrust / rigid:.6f}), sag {crown:.4e} "
+        f"m ({sag:.4e})"
     )
     # Strains enter to second order, W/E' squared, and the friction spring under the corner as W/penalty.
     strain = thrust / (thickness * youngs_modulus)

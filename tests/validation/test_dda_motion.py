@@ -233,7 +233,7 @@ def test_column_shortens_under_its_weight_and_a_load():
 def test_two_stacked_blocks_slide_together_when_only_the_lower_joint_is_weak():
     angle = np.radians(30)
     blocks = Blocks.from_polygons(
-        [turned(rectangle(-20, -1, 20, 0), angle), turned(rectangle(4, 0, 6, 1), angle), turned(rectangle(4.5, 1, 5.5, 2), angle)],
+        [turned(rectangle(*box), angle) for box in ((-20, -1, 20, 0), (4, 0, 6, 1), (4.5, 1, 5.5, 2))],
         fixed=[True, False, False],
         edge_names=[[["", "", "slope", ""]], [[""] * 4], [[""] * 4]],
     )  # fmt: skip

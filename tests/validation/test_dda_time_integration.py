@@ -176,7 +176,8 @@ def test_schemes_that_keep_an_acceleration_gain_no_energy_from_a_bounce(newmark,
         if touched and not pressed:
             top = max(top, s["kinetic_energy"] + 2500.0 * 9.81 * height)
     print(
-        f"β, γ = {newmark}, ϱ = {radius}, dt = {dt:g} s: {top / (2500.0 * 9.81 * 0.001):.4f} of the energy after a bounce"
+        f"β, γ = {newmark}, ϱ = {radius}, dt = {dt:g} s: {top / (2500.0 * 9.81 * 0.001):.4f} of the energy after a "
+        "bounce"
     )
     assert 0 < top < 2500.0 * 9.81 * 0.001
 

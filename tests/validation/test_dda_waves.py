@@ -50,7 +50,8 @@ def test_standing_waves_have_the_frequencies_of_the_chain(mode):
     state = march(system, struck(system, speed, -1e-3 * ratio * np.sin(phase)), Loads(), end, dt)
     got = float(state.velocity[:, 0] @ speed / (speed @ speed))
     print(
-        f"q h = {q:.4f}: ω = {omega:.2f} rad/s, after {seen * end / 2 / np.pi:.3f} periods {got:.8f} ({np.cos(seen * end):.8f})"
+        f"q h = {q:.4f}: ω = {omega:.2f} rad/s, after {seen * end / 2 / np.pi:.3f} periods {got:.8f} "
+        f"({np.cos(seen * end):.8f})"
     )
     # The blocks' geometry follows the wave: strains of 1e-6.
     assert got == pytest.approx(np.cos(seen * end), abs=1e-6)
@@ -84,7 +85,8 @@ def test_a_pulse_runs_and_comes_back_from_the_end(fixed_end):
     continuum = half(-(25 - travelled)) + (-1 if fixed_end else 1) * half(2 * n - (25 + travelled))
     error = np.abs(got - continuum).max() / 0.5e-3
     print(
-        f"{'fixed' if fixed_end else 'free'} end: speed {speed:.1f} m/s, pulse against the continuum {error:.3f} of its height"
+        f"{'fixed' if fixed_end else 'free'} end: speed {speed:.1f} m/s, pulse against the continuum {error:.3f} of "
+        "its height"
     )
     # (q h)²/24 of dispersion over 75 blocks, a pulse of ten: a few per cent.
     assert error < 0.05

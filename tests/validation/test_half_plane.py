@@ -381,7 +381,8 @@ def test_all_loads_together():
     heavy = body(cracks, 6, holes=[hole])
     load = ddm.BodyLoad(
         body_force=[0, -1.0], k0=0.4, remote_stress=[2.0, 0, 0], hole_pressure=0.7, crack_pressure=0.2,
-        sides=[(((-3, 0), (-1, 0)), np.array([0, -3.0]))], points=[[0.3, -1.0], [2.5, 0.0]], forces=[[1.0, 2.0], [0.5, -1.0]],
+        sides=[(((-3, 0), (-1, 0)), np.array([0, -3.0]))], points=[[0.3, -1.0], [2.5, 0.0]],
+        forces=[[1.0, 2.0], [0.5, -1.0]],
     )  # fmt: skip
     sol = heavy.solve(load)
     k = factors(sol)

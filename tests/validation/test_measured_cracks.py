@@ -83,7 +83,8 @@ def test_wings_of_a_closed_crack_with_friction_grow_into_the_load():
         way = step.tips["direction"][1]
         directions.append(math.degrees(math.atan2(way[1], way[0])))
         print(
-            f"l/c = {length / HALF:.1f}: {step.load_factor:.1f} MPa, {ratios[-1]:.3f} of the formula, {directions[-1]:.1f}°"
+            f"l/c = {length / HALF:.1f}: {step.load_factor:.1f} MPa, {ratios[-1]:.3f} of the formula, "
+            f"{directions[-1]:.1f}°"
         )
     assert steps[0].tips["angle"] == pytest.approx(math.acos(1 / 3), abs=0.02)
     assert (np.diff(loads) > 0).all()

@@ -136,8 +136,9 @@ class TraceFile(Table):
     )
     layers: dict[str, str] = Field(
         {},
-        description='what its layers (or sets; wildcards) are: { "J1*" = "joint:bedding", "Rock" = "zone:rock" }, also "crack:", '
-        '"hole", "edge:", "load:", "fixed", "bolt:", "water", "monitor:"; "" leaves it to the layer\'s name; layers that it '
+        description='what its layers (or sets; wildcards) are: { "J1*" = "joint:bedding", "Rock" = "zone:rock" }, also '
+        '"crack:", "hole", "edge:", "load:", "fixed", "bolt:", "water", "monitor:"; "" leaves it to the '
+        "layer's name; layers that it "
         "does not mean are left out (unset: all are read)",
     )
     unit: Unit | None = Field(
@@ -161,13 +162,13 @@ class Geometry(Table):
     traces: Annotated[tuple[TraceFile, ...], Strict(False)] = Field((), description="files with traces of the field")
     unit: Unit | None = Field(
         None,
-        description="unit that the model and the traces are drawn in (unset: what DXF and STEP files say, else m; Gmsh says "
-        "mm in every STEP file that it writes)",
+        description="unit that the model and the traces are drawn in (unset: what DXF and STEP files say, else m; Gmsh "
+        "says mm in every STEP file that it writes)",
     )
     origin: Pair | None = Field(
         None,
-        description="world coordinates of the run's origin, [x, y], m: all coordinates here and in files are the world's "
-        "(unset: [0, 0], or near the rock where traces lie far away)",
+        description="world coordinates of the run's origin, [x, y], m: all coordinates here and in files are the "
+        "world's (unset: [0, 0], or near the rock where traces lie far away)",
     )
     joint_sets: Annotated[tuple[JointSetShape, ...], Strict(False)] = Field(
         (), description="joints by statistics, in order: later sets may end on those before"
@@ -182,7 +183,8 @@ class Geometry(Table):
     shortest_crack_m: NotNegative = Field(0.0, description="dead ends shorter than this are trimmed, m")
     smallest_block_m2: NotNegative = Field(
         0.0,
-        description="smaller blocks join a neighbour across the joint set that comes last, never across a drawn joint, m²",
+        description="smaller blocks join a neighbour across the joint set that comes last, never across a drawn joint, "
+        "m²",
     )
     tolerance_m: Positive | None = Field(
         None, description="nearer than this, crack ends touch outlines and cracks, m (unset: 1e-6 of the largest side)"

@@ -308,8 +308,10 @@ class LoadsTable(Table):
     gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
     leading_edge: str | None = Field(
         None,
-        description="edges whose traction is the load of a run, positive in compression; of a zone that is moved, what it takes "
-        'to move it over their length; "gravity": the weight ρgh of a column as high as what moves (unset: the first traction\'s)',
+        description="edges whose traction is the load of a run, positive in compression; of a zone that is moved, what "
+        "it takes "
+        'to move it over their length; "gravity": the weight ρgh of a column as high as what moves (unset: the first '
+        "traction's)",
     )
     tractions: Annotated[tuple[TractionTable, ...], Strict(False)] = Field((), description="tractions on named edges")
     forces: Annotated[tuple[ForceTable, ...], Strict(False)] = Field((), description="forces on points")

@@ -36,13 +36,13 @@ class OutputTable(Table):
     interior: bool = Field(True, description="write stress inside cracked rock (interior.pvd)")
     interior_every: Annotated[int, Field(ge=1)] = Field(
         5,
-        description="write the interior every n-th cycle while cracks grow, every 10 n-th while none does; at the first "
-        "load, with events, before and after a block is cut and at the end always",
+        description="write the interior every n-th cycle while cracks grow, every 10 n-th while none does; at the "
+        "first load, with events, before and after a block is cut and at the end always",
     )
     checkpoint_every: Annotated[int, Field(ge=0)] | None = Field(
         None,
-        description="store the run for `geomech resume` every n cycles, 0 never (unset: every half minute, less often where "
-        "that takes more than a fiftieth of the time); at the end and after Ctrl-C too, if not 0",
+        description="store the run for `geomech resume` every n cycles, 0 never (unset: every half minute, less often "
+        "where that takes more than a fiftieth of the time); at the end and after Ctrl-C too, if not 0",
     )
     configuration: Literal["reference", "current"] = Field(
         "reference", description='coordinates in files: "reference" with displacement, or "current"'
@@ -55,7 +55,9 @@ class RenderTable(Table):
     )
     width_px: Annotated[int, Field(ge=64)] = Field(800, description="width of pictures, pixels")
     deformation_scale: NotNegative | None = Field(
-        None, description="displacements are drawn this much larger (unset: so that they are seen, and blocks not inside others)"
+        None,
+        description="displacements are drawn this much larger (unset: so that they are seen, and blocks not "
+        "inside others)",
     )
     crack_colour: Literal["birth", "opening"] = Field("birth", description="what the colour of cracks means")
     gif: bool = Field(True, description="also make a moving picture of the growth")

@@ -53,7 +53,8 @@ class JointTable(Table):
     )
     tensile_strength_pa: NotNegative = Field(
         0.0,
-        description="tensile strength, Pa, until the joint slips or parts: a face parts where its edge, N/l + 6 M/l^2, reaches it",
+        description="tensile strength, Pa, until the joint slips or parts: a face parts where its edge, N/l + 6 M/l^2, "
+        "reaches it",
     )
     residual_friction_angle_deg: Annotated[float, Field(ge=0, lt=90)] | None = Field(
         None, description="friction angle after slip, degrees (unset: as before)"
