@@ -19,8 +19,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numba import njit
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly, contact_states
@@ -121,6 +119,9 @@ def clusters(which: np.ndarray, found: ContactSet, order: np.ndarray) -> list[np
     pairs = np.where(order[pairs] < 0, pairs[::-1], pairs)
     _, at = np.unique(pairs, return_inverse=True)
     first, second = at.reshape(2, -1)
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_array((np.ones(len(rows)), (first, second)), (at.max() + 1,) * 2)
     _, label = connected_components(graph, directed=False)
     out = []
