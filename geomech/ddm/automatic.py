@@ -27,6 +27,8 @@ _log = logging.getLogger(__name__)
 
 #: (relative error of K, order that reaches it).
 _ORDERS = ((1e-2, 2), (1e-4, 4), (1e-5, 6), (1e-7, 8))
+#: The order for smaller errors.
+HIGHEST = 10
 #: Elements are graded by this ratio: half as many layers do what those of 0.3 do.
 _RATIO = 0.15
 _PER_SIDE = 2
@@ -48,7 +50,7 @@ def _check(target: float) -> None:
 
 
 def _order_for(target: float) -> int:
-    return next((p for error, p in _ORDERS if target >= 0.999 * error), shapes.MAX_ORDER)
+    return next((p for error, p in _ORDERS if target >= 0.999 * error), HIGHEST)
 
 
 def _of_order(settings: DdmSettings, order: int, target: float) -> DdmSettings:
@@ -101,7 +103,7 @@ def solve_to(
     _check(target_error)
     # What is graded for twice the target is a tenth finer the second time.
     order = _order_for(min(10 * target_error, 0.5))
-    settings = _of_order(DdmSettings(nodes=nodes), min(order, shapes.MAX_ORDER - 2), min(2 * target_error, 0.5))
+    settings = _of_order(DdmSettings(nodes=nodes), min(order, HIGHEST - 2), min(2 * target_error, 0.5))
     before = Body(loops, cracks, material, settings, **body).solve(load)
     reached = False
     while not reached and settings.order < shapes.MAX_ORDER:

@@ -95,7 +95,7 @@ class DdmTable(Table):
     target_error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
         None, description="relative error of K asked for; order, elements and grading then follow from it"
     )
-    order: Annotated[int, Field(ge=0, le=10)] = Field(4, description="polynomial order of the elements")
+    order: Annotated[int, Field(ge=0, le=12)] = Field(4, description="polynomial order of the elements")
     nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points of an element")
     elements_per_crack: Annotated[int, Field(ge=1)] = Field(4, description="elements of a straight crack")
     elements_per_side: Annotated[int, Field(ge=1)] = Field(6, description="elements of a block's side")
