@@ -160,7 +160,7 @@ class Attempt:
             springs, gap, weight, curved = self._over_the_step(found)
             geometry = middle.contacts(found.geometry, found.block, found.other, self._along(found))
             vectors = assembly.contact_vectors(found.block, found.other, geometry, order, middle.moments)
-            middle.turn_back(vectors, found.block, found.other)
+            middle.turn_back(vectors, found.block, found.other, geometry)
             if held is not None and self.n_free:
                 hold(held, self.matrix, self.right, vectors, found.block, found.other, order)
             if not self.n_free:
@@ -230,7 +230,7 @@ class Attempt:
         along = self._along(found)
         geometry = self.middle.contacts(found.geometry, *blocks, along)
         vectors = assembly.contact_vectors(*blocks, geometry, all_blocks, self.middle.moments)
-        self.middle.turn_back(vectors, *blocks)
+        self.middle.turn_back(vectors, *blocks, geometry)
         across, slid = (sliding(vectors, scaled, all_blocks, *blocks, way) for way in (0, 1))
         end = Middle.of(increment, 1.0, self.vertices, system.owner, self.moments)
         went = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]

@@ -24,7 +24,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from ..conventions import rotate_stress
 from .basis import displacement_matrix
 
 
@@ -80,19 +79,41 @@ def _contacts(geometry, block, other, affine, centroid, turn, edge):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _turn_strains_back(vectors, block, other, turn):
-    """Turn the strain columns of ``vectors`` (n, 2, 12), in place, by −``turn`` of their blocks: F ⊗ x is a tensor."""
+def _to_start(xx, yy, xy, moment, affine, turn):
+    """What forces F at arms x, Σ x ⊗ F with this symmetric part and ``moment``, do to strains on the axes of the start:
+    the symmetric part of G⁻¹ (Σ x ⊗ F) R, arms and forces as the block's own, unturned and unstrained, has them."""
+    c, s = np.cos(turn), np.sin(turn)
+    up, low = xy + 0.5 * moment, xy - 0.5 * moment
+    a, b, d, e = c * xx + s * up, c * up - s * xx, c * low + s * yy, c * yy - s * low
+    gxx, gxy, gyx, gyy = 1.0 + affine[2], affine[3], affine[4], 1.0 + affine[5]
+    size = gxx * gyy - gxy * gyx
+    return (gyy * a - gxy * d) / size, (gxx * e - gyx * b) / size, 0.5 * (gyy * b - gxy * e + gxx * d - gyx * a) / size
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _strains_back(vectors, block, other, geometry, size, affine, turn):
+    """As `Middle.turn_back`; ``size`` (n_blocks,) m is √area."""
     for k in range(vectors.shape[0]):
         for side in range(2):
-            r = turn[block[k]] if side == 0 else turn[other[k]]
-            if r == 0.0:
-                continue
-            c, s, at = np.cos(r), -np.sin(r), 6 * side + 3
+            b = block[k] if side == 0 else other[k]
+            at = 6 * side
             for way in range(2):
-                xx, yy, xy = vectors[k, way, at], vectors[k, way, at + 1], vectors[k, way, at + 2]
-                vectors[k, way, at] = c * c * xx + s * s * yy - 2 * s * c * xy
-                vectors[k, way, at + 1] = s * s * xx + c * c * yy + 2 * s * c * xy
-                vectors[k, way, at + 2] = s * c * (xx - yy) + (c * c - s * s) * xy
+                v = vectors[k, way]
+                if v[at] == 0.0 and v[at + 1] == 0.0:
+                    continue  # a block without unknowns
+                moment = v[at + 2]
+                if side == 1 and way == 1:
+                    # The edge is strained at the foot of the vertex, about which the shear has another moment.
+                    moment += geometry[k, 3] / size[b]
+                v[at + 3], v[at + 4], v[at + 5] = _to_start(v[at + 3], v[at + 4], v[at + 5], moment, affine[b], turn[b])
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _rows_back(rows, owner, affine, turn):
+    """Bring the strain columns of ``rows`` (n, 6) of the blocks ``owner`` (n,) to the start, in place."""
+    for k in range(rows.shape[0]):
+        b, v = owner[k], rows[k]
+        v[3], v[4], v[5] = _to_start(v[3], v[4], v[5], v[2], affine[b], turn[b])
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,29 +160,25 @@ class Middle:
             return geometry
         return _contacts(geometry, block, other, self.affine, self.start, self.turn, along)
 
-    def turn_back(self, vectors: np.ndarray, block: np.ndarray, other: np.ndarray) -> None:
-        """Bring `contact_vectors` (n, 2, 12) made on this geometry to the axes of strain, in place."""
+    def turn_back(self, vectors: np.ndarray, block: np.ndarray, other: np.ndarray, geometry: np.ndarray) -> None:
+        """Bring `contact_vectors` (n, 2, 12) made of this ``geometry`` (n, 7) to the axes of strain, in place."""
         if self.turn is not None:
-            _turn_strains_back(vectors, block, other, self.turn)
+            size = np.sqrt(self.moments[:, 0])
+            _strains_back(vectors, block, other, geometry, size, self.affine, self.turn)
 
     def loads_back(self, load: np.ndarray) -> np.ndarray:
         """(n_blocks, 6) generalised forces ``load`` on this geometry, on the axes of strain."""
-        if self.turn is None or not load[:, 3:].any():
+        if self.turn is None or not load[:, 2:].any():
             return load
         out = load.copy()
-        out[:, 3:] = rotate_stress(load[:, 3:], -self.turn)
+        _rows_back(out, np.arange(len(out)), self.affine, self.turn)
         return out
 
-    def displacement(self, points: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    def displacement(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
         """T (..., 2, 6), as `displacement_matrix` gives it, of points (..., 2) on this geometry, which follow the blocks
         ``owner`` (...), for strains on the axes of the start."""
         matrix = displacement_matrix(points, self.moments[owner, 1:3])
         if self.turn is not None:
-            c, s = np.cos(self.turn[owner]), np.sin(self.turn[owner])
-            strain = matrix[..., 3:].copy()
-            for k in range(2):
-                x, y, g = strain[..., k, 0], strain[..., k, 1], strain[..., k, 2]
-                matrix[..., k, 3] = c * c * x + s * s * y + 2 * s * c * g
-                matrix[..., k, 4] = s * s * x + c * c * y - 2 * s * c * g
-                matrix[..., k, 5] = s * c * (y - x) + (c * c - s * s) * g
+            each = np.repeat(np.ravel(owner), 2)
+            _rows_back(matrix.reshape(-1, 6), each, self.affine, self.turn)
         return matrix
