@@ -71,6 +71,25 @@ def test_a_block_turns_on_its_corner_as_a_pendulum(settings):
     assert missed[1][0] < 0.29 * missed[0][0] < 4e-5 and (np.array(missed)[:, 1] < 1e-4).all()
 
 
+@pytest.mark.parametrize("settings", [{}, {"contact": "augmented"}], ids=["springs", "multipliers"])
+def test_a_block_that_falls_over_in_statics_stays_on_its_corner_and_gains_no_energy(settings):
+    """Nothing holds it: it turns by some 0.02 rad a step about a corner, which would lift off the floor by 1e-4 of the
+    block, or be pressed in, if it went straight on."""
+    system = above(regular(5, 0.5, -12.0, 0.0) @ np.array([[1.0, 0.0], [0.2, 1.0]]), 60.0, dynamic_factor=0.0, **settings)
+    state, budget = State.at_rest(system.blocks), dda.EnergyBudget()
+    size = float(np.sqrt(system.blocks.areas()[1]))
+    for _ in range(6):
+        result = system.step(state, WEIGHT, 0.12)
+        state, budget = result.state, budget.after(result.energy, result.state.time)
+        touching = result.contacts[(result.contacts["state"] != OPEN) & (result.contacts["block"] == 1)]
+        assert len(touching) == 1
+        # The floor's top is y = 0; known to a thousandth of the radius of corners.
+        assert np.abs(state.vertices[touching["vertex"], 1] - touching["gap"]).max() < 2e-8 * size
+    print(f"turned by {state.rotation[1]:.3f}, residual {budget.residual / budget.turnover:.1e}")
+    assert abs(state.rotation[1]) > 0.1
+    assert abs(budget.residual) < 1e-6 * budget.turnover
+
+
 @pytest.mark.parametrize("corners", [3, 4, 7])
 @pytest.mark.parametrize("short", [2e-2, 1e-3, 2e-4, 1e-4, 1e-6])
 def test_a_corner_that_comes_to_the_end_of_a_face_is_not_pushed_on(short, corners):
