@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..model import CHANGES, Blocks
@@ -75,6 +77,12 @@ def _stepping(c: Check) -> None:
     run, dda = c.tables.run, c.tables.dda
     if run is None or dda is None:
         return
+    if "mechanism" in run.stop_at and dda.dynamic_factor > 0:
+        c.refuse(
+            ("run", "stop_at"),
+            '"mechanism" is told of in static runs only, and dda.dynamic_factor is not 0: in dynamics blocks just move',
+            "leave it out, or set dda.dynamic_factor = 0",
+        )
     if run.stepping == "events":
         for key, hinders, way_out in (
             ("dynamic_factor", dda.dynamic_factor > 0, "set dda.dynamic_factor = 0"),
@@ -164,7 +172,9 @@ def _zones(c: Check) -> None:
             # A zone that has its table already is not the one that is meant.
             free = [zone for zone in known if zone not in given]
             c.refuse(
-                ("zones", name), f"the geometry has no zone {name!r}", nearest(name, free) if free else _are(known)
+                ("zones", name),
+                f"the geometry has no zone {name!r}",
+                next((told for told in map(partial(nearest, name), (free, known)) if "did you" in told), _are(known)),
             )
     if len(materials) > 1:
         for name in known:

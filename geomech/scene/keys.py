@@ -108,6 +108,9 @@ def expected(annotation: Any) -> str:
         if annotation == known:
             return text
     inner = bare(annotation)
+    if isinstance(inner, type) and issubclass(inner, BaseModel):
+        needed = [field.alias or name for name, field in inner.model_fields.items() if field.is_required()]
+        return f"{{ {', '.join([*(f'{key} = …' for key in needed), '…'])} }}"
     for known, text in _SHAPES.items():
         # Field keeps the metadata of an Annotated type apart, so compare what is left as well.
         if inner == bare(known) and inner not in _SIMPLE:

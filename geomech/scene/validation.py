@@ -124,6 +124,8 @@ def _header(path: Path) -> str:
 
 def _hint(given: str, what: str) -> str:
     """What to change where a text stands for something that is no text."""
+    if what.startswith('["'):
+        return f'write an array, ["{given}"]: '
     if "number" in what and re.fullmatch(DECIMAL_COMMA, given.strip()):
         return f"write a decimal point, {given.strip().replace(',', '.')}: "
     if "number" in what and _is_number(given) or what == "true or false" and given.strip() in ("true", "false"):

@@ -571,3 +571,16 @@ def test_dead_ends_that_may_grow_say_where_toughness_belongs(errors_of):
     found = errors_of(("k_ic_pa_sqrt_m = 1e6", ""), add=joints)
     (error,) = [error for error in found if "fracture toughness" in error.message]
     assert "[materials.rock]" in error.way_out
+
+
+def test_a_value_where_a_table_belongs_is_told_what_it_needs(errors_of):
+    found = errors_of(overrides=["monitors=3", "run.stop_at=split"])
+    assert any("{ name = …, … }" in error.message for error in found)
+    assert any('write an array, ["split"]' in error.way_out for error in found)
+    (error,) = errors_of(overrides=['zones.rok.material="rock"'])
+    assert "did you mean" in error.way_out
+
+
+def test_a_mechanism_is_for_static_runs(errors_of):
+    (error,) = errors_of(overrides=['run.stop_at=["mechanism"]', "dda.dynamic_factor=1"])
+    assert "run.stop_at" in error.place and "static runs only" in error.message
