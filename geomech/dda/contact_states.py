@@ -82,8 +82,8 @@ def check_states(
     Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on
     a corner holds until it has slid off by its ``reach`` (n,) m; lines that its vertex was ``behind`` (n,) as the step
     began are not those by which it comes in. ``slack`` (m) is the
-    round-off of coordinates: gaps below it decide nothing; slip, which is counted from the step's start, is known a
-    thousand times better.
+    round-off of coordinates: gaps below it decide nothing, nor does what they make of friction; slip, which is counted
+    from the step's start, is known a thousand times better.
     """
     n = state.shape[0]
     new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
@@ -124,14 +124,14 @@ def check_states(
         elif state[c] == STICK:
             strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
             excess = abs(forces[c, 1]) - strength
-            if excess > 1e-9 * strength + 1e-3 * shear[c] * slack:
+            if excess > 1e-9 * strength + (1e-3 * shear[c] + peak[c] * normal[c]) * slack:
                 new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
                 new_direction[c] = np.sign(forces[c, 1])
                 violation[c] = excess
         elif friction[c] > 0.0 or sliding[c] > 0.0:
             strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
             trial = direction[c] * (shear0[c] - shear[c] * slide)
-            if strength - trial > 1e-9 * strength + 1e-3 * shear[c] * slack:
+            if strength - trial > 1e-9 * strength + (1e-3 * shear[c] + friction[c] * normal[c]) * slack:
                 # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial

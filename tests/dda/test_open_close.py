@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from geomech import dda
+from geomech.bench import block_scenes
 from geomech.dda import open_close
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
@@ -118,3 +120,26 @@ def test_a_path_that_arrives_proposes_its_states_though_some_contacts_hardly_tou
     states, spent = open_close._proposed(_PathOf(undecided, arrived), bonded, set(), 60, False)
     assert (states is not None) == (taken is not None)
     assert spent == (taken or 3)
+
+
+def test_a_wall_at_rest_is_asked_for_nothing_but_its_round_off():
+    """A fifth of its contacts are at their strength, known no better than the gaps of coordinates: none is to be
+    switched from step to step for digits that are not there."""
+    blocks = block_scenes.wall(200)
+    system = dda.BlockSystem(
+        blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(1.0, dynamic=False)
+    )
+    state = State.at_rest(blocks)
+    for _ in range(3):
+        state = system.step(state, block_scenes.WEIGHT).state
+    state = replace(state, velocity=np.zeros_like(state.velocity))
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01))
+    before, iterations = state.vertices, []
+    for _ in range(8):
+        result = system.step(state, block_scenes.WEIGHT)
+        state = result.state
+        iterations.append(result.statistics["open_close_iterations"])
+        strength = np.tan(block_scenes.FRICTION) * result.contacts["normal_force"]
+        assert (np.abs(result.contacts["shear_force"]) <= strength * (1 + 1e-8) + 1e-2).all()
+    assert np.mean(iterations) <= 2.0
+    assert np.abs(state.vertices - before).max() < 1e-13
