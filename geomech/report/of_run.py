@@ -210,15 +210,13 @@ def _add_events(page: Page, run: Run) -> None:
     page.section("Events")
     load, pascals = stress_unit(largest_of(run.events["load"]))
     length, metres = _unit_of_places(run)
+    led = [f"load, {load}"] if run.led else []
     rows = [
-        [e["kind"], int(e["cycle"]), float(e["time"])]
-        + [float(e["load"]) / pascals, *(float(e[x]) / metres for x in "xy"), e["detail"]]
+        [str(e["kind"]), int(e["cycle"]), float(e["time"]), *([float(e["load"]) / pascals] if led else [])]
+        + [*(float(e[x]) / metres for x in "xy"), str(e["detail"])]
         for e in run.events[:LISTED]
     ]
-    page.table(
-        ["event", "cycle", "time, s", f"load, {load}", f"x, {length}", f"y, {length}", "what"],
-        [[str(cell) if isinstance(cell, np.str_) else cell for cell in row] for row in rows],
-    )
+    page.table(["event", "cycle", "time, s", *led, f"x, {length}", f"y, {length}", "what"], rows)
     if len(run.events) > LISTED:
         page.text(f"{len(run.events) - LISTED} more in events.csv.")
 
