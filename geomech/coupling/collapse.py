@@ -54,7 +54,7 @@ def unheld(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> 
         return ()
     block, detail = found
     told = event(now, "mechanism", result.state, now.blocks.vertices[int(now.blocks.vertex_start[block])], detail)
-    load = f" and a load of {told.load / 1e6:.4g} MPa" if told.load else ""
+    load = f" and a load of {told.load / 1e3:.4g} kPa" if told.load else ""
     log.warning(
         "cycle %d, t = %g s%s: %s. What they move by from here on means nothing in a static run: follow it with "
         "dda.dynamic_factor = 1, find its limit with `geomech safety`, or end here: "

@@ -10,6 +10,8 @@ from typing import Any
 
 from geomech.model import Cycle, Problem, counted
 
+from .units import stress_text
+
 _log = logging.getLogger("geomech.run")
 
 
@@ -44,8 +46,8 @@ class RunLog:
     def on_cycle(self, cycle: Cycle) -> None:
         for event in cycle.events:
             _log.info(
-                "cycle %d, t = %g s, load %.4g MPa: %s at (%.6g, %.6g) %s",
-                event.cycle, event.time, event.load / 1e6, event.kind, *event.point, event.detail,
+                "cycle %d, t = %g s, load %s: %s at (%.6g, %.6g) %s",
+                event.cycle, event.time, stress_text(event.load), event.kind, *event.point, event.detail,
             )  # fmt: skip
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
