@@ -71,7 +71,8 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     blocks = [now.blocks.names[b] for b in np.array(list(now.solutions), int)[lost]]
     raise dda.NotConverged(
         f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and the cracks in it find no common strain in "
-        f"{COMPLIANCE_PASSES} passes (they differ by {differences.max():.2g} of it): try a shorter time step, or finer elements in [ddm]"
+        f"{COMPLIANCE_PASSES} passes (they differ by {differences.max():.2g} of it): try a shorter time step, or finer "
+        "elements in [ddm]"
     )
 
 

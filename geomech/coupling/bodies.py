@@ -74,8 +74,8 @@ def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
 def boundary_loads(
     problem: Problem, blocks: Blocks, state: State, motion: Motion, result, bodies: dict
 ) -> dict[int, BoundaryLoad]:
-    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state``; ``motion`` leads to its
-    vertices: on that geometry the forces are in equilibrium."""
+    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state``; ``motion`` leads to
+    its vertices: on that geometry the forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
     strengths = [joint.tensile_strength for joint in problem.joints]
     rigid = np.array([material.rigid for material in problem.materials], bool)

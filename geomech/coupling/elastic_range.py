@@ -33,8 +33,8 @@ class ElasticRange:
         most, name = float(strain[b]), blocks.names[b] if blocks.names else f"block {b}"
         if most > REFUSED:
             raise dda.NotConverged(
-                f"{name} is strained by {100 * most:.3g} % at t = {time:g} s: no linear elastic body. Its loads are beyond its "
-                "stiffness, or it hangs by a thread of rock: shorten the time step, or cut it where it hangs"
+                f"{name} is strained by {100 * most:.3g} % at t = {time:g} s: no linear elastic body. Its loads are "
+                "beyond its stiffness, or it hangs by a thread of rock: shorten the time step, or cut it where it hangs"
             )
         if most >= 2.0 * self.told:
             self.told = most

@@ -21,12 +21,14 @@ from .cracked_blocks import CrackedBlocks
 _SAME_PLACE = 0.02
 
 _DOES = {
-    "opening": "opens", "parting": "is apart", "closure": "closes", "slip": "begins to slip", "sliding": "slides", "stick": "sticks",
+    "opening": "opens", "parting": "is apart", "closure": "closes", "slip": "begins to slip", "sliding": "slides",
+    "stick": "sticks",
     "debonding": "loses bonds",
 }  # fmt: skip
 #: … and which states contacts or nodes take by it.
 _TAKES = {
-    "opening": (OPEN,), "parting": (OPEN,), "closure": (STICK, SLIP), "slip": (SLIP,), "sliding": (SLIP,), "stick": (STICK,),
+    "opening": (OPEN,), "parting": (OPEN,), "closure": (STICK, SLIP), "slip": (SLIP,), "sliding": (SLIP,),
+    "stick": (STICK,),
 }  # fmt: skip
 
 

@@ -125,7 +125,8 @@ class Attempt:
         self.order = system.free if self.pattern is None else self.pattern.order
         self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
             self.order, self.moments, self.density, system.stiffness, system.compliance, self.begun, self.stress,
-            self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt, self.heavier,
+            self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt,
+            self.heavier,
             scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.n_free,
         )  # fmt: skip
 
@@ -220,8 +221,8 @@ class Attempt:
         return True
 
     def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:
-        """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), which leads to ``vertices``: by what these go
-        beyond what the equations of this middle make of it."""
+        """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), which leads to ``vertices``: by what these
+        go beyond what the equations of this middle make of it."""
         system, found, scaled = self.system, self.found, increment.copy()
         if found.lumped is not None:
             found = found.lumped
@@ -290,7 +291,8 @@ class Attempt:
         system = self.system
         return advance(
             increment, self.carried, self.dt, system.scheme.static, self.vertices, system.vertex_start, self.moments,
-            self.tangent, self.stress0, self.crack_compliance, self.crack_offset, self.given, self.crack_strain, system.turns,
+            self.tangent, self.stress0, self.crack_compliance, self.crack_offset, self.given, self.crack_strain,
+            system.turns,
         )  # fmt: skip
 
     def _move(self) -> None:
@@ -366,7 +368,8 @@ class Attempt:
         new_stress, acceleration = self.new_stress, self.acceleration
         if len(system.rigid):
             new_stress[system.rigid] = mean_stress(
-                system.rigid, rows, load, middle.moments, self.density, acceleration, self.carried[:, 2], self.turn, turn,
+                system.rigid, rows, load, middle.moments, self.density, acceleration, self.carried[:, 2], self.turn,
+                turn,
             )  # fmt: skip
         if scheme.mass_damping:
             acceleration = acceleration + scheme.mass_damping / dt * self.increment
@@ -426,9 +429,11 @@ class Attempt:
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
         energy = StepEnergy._make(
             step_energies(
-                self.increment, self.state.velocity, self.carried, self.velocity, self.acceleration, self.dt, self.gravity,
+                self.increment, self.state.velocity, self.carried, self.velocity, self.acceleration, self.dt,
+                self.gravity,
                 load, scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.density,
-                self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance, system.stiffness,
+                self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance,
+                system.stiffness,
                 found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
                 found.arc + np.zeros(len(found)), settled.lifted,
                 settled.slip, self.slid, settled.normal_force, found.shear, settled.shear_force, end_shear,

@@ -132,7 +132,8 @@ class BoltSet:
         compression = np.array([bolt.compression for bolt in own])
         most = column("yield_force")
         bolt_set = cls(
-            bolts=bolts, number=number, pairs=pairs, ends=ends, length=length, trial=trial, dowel=rows["shear_force"].copy(),
+            bolts=bolts, number=number, pairs=pairs, ends=ends, length=length, trial=trial,
+            dowel=rows["shear_force"].copy(),
             stiffness=k, shear_stiffness=column("shear_stiffness"), least=np.where(compression, -most, 0.0), most=most,
             strength=column("shear_strength"), slack=~compression,
             geometric=np.clip(trial, 0.0, most) / length, axial=np.zeros(len(own), int), across=np.zeros(len(own), int),

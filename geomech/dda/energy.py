@@ -307,7 +307,8 @@ class EnergyBudget:
         gain = residual - min(0.0, float(totals[_SUMS["scheme"]]))
         if gain > warned * turnover:
             log.warning(
-                "t = %g s: the blocks have gained %.3g J/m without work, %.2g of all energy turned over: shorten the time step",
+                "t = %g s: the blocks have gained %.3g J/m without work, %.2g of all energy turned over: shorten the "
+                "time step",
                 time, gain, gain / turnover,
             )  # fmt: skip
             warned = 2.0 * gain / turnover

@@ -158,7 +158,8 @@ def equilibrium(
             if min(forces[since:]) >= min(forces[:since]):
                 return answer(
                     False, True,
-                    f"no equilibrium: blocks have moved {travelled.max():.3g} m, and {_IN_VAIN} steps brought no more balance",
+                    f"no equilibrium: blocks have moved {travelled.max():.3g} m, and {_IN_VAIN} steps brought no more "
+                    "balance",
                 )  # fmt: skip
         moves_far = statistics["max_displacement_ratio"] > _NEARLY * static.allowed_ratio
         dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)

@@ -24,7 +24,8 @@ PANEL = 18
 _gemm = types.ExternalFunction(
     "numba_xxgemm",
     types.intc(
-        types.char, types.char, types.char, types.intp, types.intp, types.intp, types.voidptr, types.voidptr, types.intp,
+        types.char, types.char, types.char, types.intp, types.intp, types.intp, types.voidptr, types.voidptr,
+        types.intp,
         types.voidptr, types.intp, types.voidptr, types.voidptr, types.intp,
     ),
 )  # fmt: skip

@@ -63,7 +63,8 @@ class Pairs:
 
 
 class ImposedMotion:
-    """The motion that ``loads`` give from ``start`` to ``end`` (s), acting where blocks are in the ``middle`` of the step.
+    """The motion that ``loads`` give from ``start`` to ``end`` (s), acting where blocks are in the ``middle`` of the
+    step.
 
     ``totals`` (k,) is what they have imposed at ``end``, ``before`` the same at the start as an earlier step has left
     it (else taken at ``start``): statics may seek equilibrium at one time in many steps. ``increment`` and ``rate``
@@ -72,7 +73,8 @@ class ImposedMotion:
     """
 
     def __init__(
-        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, middle: Middle, point_at, before: np.ndarray,
+        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, middle: Middle, point_at,
+        before: np.ndarray,
         start: float, end: float,
     ) -> None:  # fmt: skip
         n = blocks.n_blocks
@@ -115,7 +117,8 @@ class ImposedMotion:
         if self.fixed[motion.block]:
             if max(at) > 2:
                 raise ValueError(
-                    f"{self._name(motion.block)} is fixed, and so rigid: its strains cannot be imposed, only u0, v0 and r0"
+                    f"{self._name(motion.block)} is fixed, and so rigid: its strains cannot be imposed, only u0, v0 "
+                    "and r0"
                 )
             self.increment[motion.block, at] += by
             self.rate[motion.block, at] += rate

@@ -98,9 +98,10 @@ def settled_together(
 def states_that_fit(
     given: np.ndarray, answers: np.ndarray, kn: np.ndarray, friction: np.ndarray, firm: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """State and direction (k,) of contacts with strengths ``friction`` N + ``firm`` (k,), that fit each other; None where
-    none are found. (What is open is taken to keep its ``firm`` part.) ``given`` (2 k,) m: gaps, then motion along less that of S₀, without their forces; ``answers``
-    (2 k, 2 k) m/N to unit forces along normals, then edges, what springs give, by 1/``kn`` and 1/kₛ, included."""
+    """State and direction (k,) of contacts with strengths ``friction`` N + ``firm`` (k,), that fit each other; None
+    where none are found. (What is open is taken to keep its ``firm`` part.) ``given`` (2 k,) m: gaps, then motion along
+    less that of S₀, without their forces; ``answers`` (2 k, 2 k) m/N to unit forces along normals, then edges, what
+    springs give, by 1/``kn`` and 1/kₛ, included."""
     basic = _solved(*_complementarity(given, answers, kn, friction, firm))
     if basic is None:
         return None
@@ -112,8 +113,8 @@ def states_that_fit(
 
 
 def clusters(which: np.ndarray, found: ContactSet, order: np.ndarray) -> list[np.ndarray]:
-    """The contacts ``which`` (n,) bool in sets (n,) bool that have no free block in common; ``order`` (n_blocks,) −1 for
-    fixed blocks."""
+    """The contacts ``which`` (n,) bool in sets (n,) bool that have no free block in common; ``order`` (n_blocks,) −1
+    for fixed blocks."""
     rows = np.flatnonzero(which)
     pairs = np.stack([found.block[rows], found.other[rows]])
     pairs = np.where(order[pairs] < 0, pairs[::-1], pairs)

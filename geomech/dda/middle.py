@@ -135,8 +135,8 @@ class Middle:
     def of(
         cls, increment: np.ndarray | None, part: float, vertices: np.ndarray, owner: np.ndarray, moments: np.ndarray
     ) -> Middle:
-        """``part`` of the way of ``increment`` (n_blocks, 6) from ``vertices``, whose blocks are ``owner`` (n_vertices,)
-        and have these ``moments``; None: the start."""
+        """``part`` of the way of ``increment`` (n_blocks, 6) from ``vertices``, whose blocks are ``owner``
+        (n_vertices,) and have these ``moments``; None: the start."""
         if increment is None:
             return cls(vertices, moments)
         affine, start = _affine(increment, part), np.ascontiguousarray(moments[:, 1:3])
@@ -175,8 +175,8 @@ class Middle:
         return out
 
     def displacement(self, points: np.ndarray, owner: np.ndarray | int) -> np.ndarray:
-        """T (..., 2, 6), as `displacement_matrix` gives it, of points (..., 2) on this geometry, which follow the blocks
-        ``owner`` (...), for strains on the axes of the start."""
+        """T (..., 2, 6), as `displacement_matrix` gives it, of points (..., 2) on this geometry, which follow the
+        blocks ``owner`` (...), for strains on the axes of the start."""
         matrix = displacement_matrix(points, self.moments[owner, 1:3])
         if self.turn is not None:
             each = np.repeat(np.ravel(owner), 2)

@@ -49,8 +49,8 @@ def _eliminate_shared(
     factors,
     units,
 ):
-    """Claim ``tasks`` by ``claimed`` (1,) until none are left, and wait until all are done; ``awaited`` (k,) says of how
-    many each still waits for what they pass on, ``told`` (2,) how many are done, and how many have failed."""
+    """Claim ``tasks`` by ``claimed`` (1,) until none are left, and wait until all are done; ``awaited`` (k,) says of
+    how many each still waits for what they pass on, ``told`` (2,) how many are done, and how many have failed."""
     space = None
     while True:
         q = add_at_once(claimed, 0, 1)

@@ -166,8 +166,8 @@ class _Equations:
         self._side = np.empty(6 * self.pattern.n)
 
     def together(self, which: np.ndarray, states: _States, answer: _Answer) -> _States:
-        """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in common
-        at a time; where none are found, as the ``answer`` calls for."""
+        """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in
+        common at a time; where none are found, as the ``answer`` calls for."""
         found = self.found
         fixed = found, self.vectors, answer.springs, answer.gap
         for some in clusters(which, found, self.pattern.order):
@@ -219,12 +219,14 @@ class _Equations:
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
         *called, violation = check_states(
-            forces, found.partner, found.reach, found.behind, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
+            forces, found.partner, found.reach, found.behind, state, direction, bonded, known.normal, known.shear,
+            known.friction, known.sliding,
             known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
         )  # fmt: skip
         if (faces := found.faces) is not None:
             check_faces(
-                faces.start, faces.rows, faces.arm, faces.length, forces, state, bonded, known.normal, known.shear, known.friction,
+                faces.start, faces.rows, faces.arm, faces.length, forces, state, bonded, known.normal, known.shear,
+                known.friction,
                 known.peak, known.hold, known.cohesion, known.tension, known.keeps, self.slack, *called, violation,
             )  # fmt: skip
         return _Answer(unknowns, forces, _States(*called), violation, missed, slip, springs, gap)

@@ -44,12 +44,13 @@ class Stopped:
 
     @classmethod
     def of(
-        cls, found: ContactSet, geometry: np.ndarray, settled: Settled, slid: np.ndarray, velocity: np.ndarray, centroid: np.ndarray,
+        cls, found: ContactSet, geometry: np.ndarray, settled: Settled, slid: np.ndarray, velocity: np.ndarray,
+        centroid: np.ndarray,
         mass: np.ndarray, dt: float, slack: float,
     ) -> Stopped | None:  # fmt: skip
         """None where nothing stops. ``geometry`` (n, 7) of the contacts at the end of the step, ``slid`` (n,) m along
-        the edge in it; ``velocity`` (n_blocks, 6), ``centroid`` (n_blocks, 2), ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry no
-        farther in a step than the ``slack`` (m) of contacts one upon the other are none."""
+        the edge in it; ``velocity`` (n_blocks, 6), ``centroid`` (n_blocks, 2), ``mass`` (n_blocks,) kg, infinite if
+        fixed. Speeds that carry no farther in a step than the ``slack`` (m) of contacts one upon the other are none."""
         stuck = (found.state == SLIP) & (settled.state == STICK) & (found.direction != 0.0)
         rows = np.flatnonzero(stuck | ((settled.state == SLIP) & (settled.direction != 0.0)))
         if not len(rows):
@@ -117,7 +118,8 @@ def stop(
         # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their
         # friction.
         assembly.assemble_contacts(
-            data, side, matrix, np.zeros((pattern.n, 6)), pattern.stride, pattern.diagonal, pattern.upper, pattern.lower,
+            data, side, matrix, np.zeros((pattern.n, 6)), pattern.stride, pattern.diagonal, pattern.upper,
+            pattern.lower,
             found.block, found.other, pattern.order, vectors, state, np.ones(n), nothing, springs.normal, springs.shear,
             nothing, push, nothing, pull,
         )  # fmt: skip

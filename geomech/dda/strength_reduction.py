@@ -153,7 +153,8 @@ def factor_of_safety(
         raise NothingToReduce("all blocks are fixed: none could fail")
     if loads.base is not None and loads.base.frame == "ground":
         raise NothingToReduce(
-            'statics know no ground that moves: leave the base\'s motion out, or give it the frame "base", in which it is the'
+            'statics know no ground that moves: leave the base\'s motion out, or give it the frame "base", in which it '
+            "is the"
             " weight's own kind of force, the one of the time that is asked for"
         )
     trials: list[Trial] = []

@@ -241,8 +241,8 @@ class BlockSystem:
         )  # fmt: skip
         if self.scheme.static and not holds and loads.gravity.at(time).any():
             raise ValueError(
-                "no block is fixed, so that under gravity all of them fall and statics finds no equilibrium: fix a block, or "
-                "let velocity be carried (dynamic_factor = 1)"
+                "no block is fixed, so that under gravity all of them fall and statics finds no equilibrium: fix a "
+                "block, or let velocity be carried (dynamic_factor = 1)"
             )
 
     def _refuse_crushed(self, state: State) -> None:

@@ -53,7 +53,8 @@ class QuietEdges:
             if len(named) == 0:
                 known = ", ".join(repr(n) for n in blocks.edge_names if n) or "none"
                 raise ValueError(
-                    f"a viscous boundary is on edges named {boundary.edge_name!r}, but no edge has that name (names: {known})"
+                    f"a viscous boundary is on edges named {boundary.edge_name!r}, but no edge has that name (names: "
+                    f"{known})"
                 )
             named = named[~fixed[blocks.vertex_block[named]]]
             wave = np.zeros(2) if boundary.incoming is None else boundary.incoming.at(time)

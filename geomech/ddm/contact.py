@@ -107,7 +107,10 @@ def _whereabouts(body: Body, node: int | None) -> str:
         tip = int(np.argmin(left))
         if left[tip] < BY_A_THREAD * body._extent:
             (x, y), crack = cracks.nodes[cracks.tips[tip]], body.tip_elements[0]["crack"][tip]
-            said += f"; from the tip of {cracks.names[crack]!r} at ({x:.6g}, {y:.6g}) only {left[tip]:.2g} m of rock are left to a side"
+            said += (
+                f"; from the tip of {cracks.names[crack]!r} at ({x:.6g}, {y:.6g}) only {left[tip]:.2g} m of rock are "
+                "left to a side"
+            )
     return said
 
 
@@ -121,7 +124,10 @@ def _judge(body: Body, settled: Settled) -> None:
         here = at[crack[at] == number]
         length, own = float(c.length[here].sum()), float(c.length[crack == number].sum())
         x, y = c.start[here[0]]
-        where = f"faces of {cracks.names[number]!r} beside ({x:.6g}, {y:.6g}) are open in no state that holds at all their points"
+        where = (
+            f"faces of {cracks.names[number]!r} beside ({x:.6g}, {y:.6g}) are open in no state that holds at all "
+            "their points"
+        )
         if length > UNDECIDED * own or (c.kind[here] != shapes.ORDINARY).any():
             raise NotConverged(f"{where}, over {length:.3g} m: give it an aperture, friction, or a finer mesh")
         _log.warning(

@@ -88,8 +88,9 @@ class HalfPlane:
         if np.hypot(*pulled) > _BORNE * np.abs(stress).max():
             along, out = self.turned(pulled)
             raise ValueError(
-                f"remote_stress: the free surface of the half-plane bears none of the traction ({along:g} Pa along it, {out:g} Pa "
-                "out of it) that this stress has there; only a stress parallel to the surface stands in a half-plane"
+                f"remote_stress: the free surface of the half-plane bears none of the traction ({along:g} Pa along it, "
+                f"{out:g} Pa out of it) that this stress has there; only a stress parallel to the surface stands in a "
+                "half-plane"
             )
 
     def check_force(self, gradient: np.ndarray) -> None:

@@ -19,8 +19,8 @@ class OutOfEquilibrium(ValueError):
     def __init__(self, force: np.ndarray, moment: float, relative: float):
         self.force, self.moment, self.relative = force, moment, relative
         super().__init__(
-            f"the loads are out of equilibrium: force ({force[0]:.6g}, {force[1]:.6g}) N/m, moment {moment:.6g} N about "
-            f"the centroid, {relative:.3g} of the loads' size"
+            f"the loads are out of equilibrium: force ({force[0]:.6g}, {force[1]:.6g}) N/m, moment {moment:.6g} N "
+            f"about the centroid, {relative:.3g} of the loads' size"
         )
 
 

@@ -89,7 +89,8 @@ def crowding(
 
 @_jit
 def _crowding(
-    start, end, length, tip, source, meeting, n_edges, apart, across, chained, beside, span, at_node, at_boundary, images,
+    start, end, length, tip, source, meeting, n_edges, apart, across, chained, beside, span, at_node, at_boundary,
+    images,
     sweep, reach,
 ):  # fmt: skip
     n, least_apart = len(start), min(apart, across)
@@ -164,7 +165,8 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
         tip = np.where(kind == shapes.ORDINARY, 0, kind)
         start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
         crowded = crowding(
-            start, end, tip, source, meeting, n_edges, APART, ACROSS, chained, beside, span, AT_NODE, AT_BOUNDARY, images
+            start, end, tip, source, meeting, n_edges, APART, ACROSS, chained, beside, span, AT_NODE, AT_BOUNDARY,
+            images
         )  # fmt: skip
         length = np.hypot(*(end - start).T)
         cut = (crowded > 1 + 1e-9) & (length > 2 * FLOOR * extent)

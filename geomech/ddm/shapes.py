@@ -37,8 +37,8 @@ def nodes(family: str, order: int) -> np.ndarray:
     (centres of p+1 equal sub-elements). Raises ValueError for another family or an order outside 0 … 12."""
     if not (isinstance(order, (int, np.integer)) and 0 <= order <= MAX_ORDER):
         raise ValueError(
-            f"the order of an element must be an integer from 0 to {MAX_ORDER}, got {order!r} (beyond, round-off grows faster "
-            "than the error falls: take more elements, or grade them)"
+            f"the order of an element must be an integer from 0 to {MAX_ORDER}, got {order!r} (beyond, round-off grows "
+            "faster than the error falls: take more elements, or grade them)"
         )
     n = order + 1
     if family == "chebyshev":

@@ -215,9 +215,9 @@ class Solution:
 
         Where there is no rock, outside the outline, in a hole and above the surface of a half-plane, it is nan, and so
         are the displacement and all else. On a boundary, and nearer to it than a millionth of the body's extent, it is
-        the rock's; on a crack that of the upper face (left of its segment), or the lower with ``side`` −1. At crack tips it is that a fiftieth of the
-        element's length beside, and so it is nearer than that to other ends of elements (corners, crack nodes): the
-        discrete field has no value there.
+        the rock's; on a crack that of the upper face (left of its segment), or the lower with ``side`` −1. At crack
+        tips it is that a fiftieth of the element's length beside, and so it is nearer than that to other ends of
+        elements (corners, crack nodes): the discrete field has no value there.
         """
         return self._total(points, side)[0]
 

@@ -103,8 +103,8 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
         s = int(np.argmax(digits))
         x, y = segments[s, 0]
         raise ValueError(
-            f"{name(s)}: its segment of {cracks.lengths[s]:.3g} m at ({x:g}, {y:g}) is too short for coordinates that large, which "
-            f"have steps of {digits[s] * cracks.lengths[s]:.1g} m: count them from an origin near the rock"
+            f"{name(s)}: its segment of {cracks.lengths[s]:.3g} m at ({x:g}, {y:g}) is too short for coordinates that "
+            f"large, which have steps of {digits[s] * cracks.lengths[s]:.1g} m: count them from an origin near the rock"
         )
     fresh = np.ones(n, bool) if fresh is None else fresh
     new = np.flatnonzero(fresh)
@@ -209,7 +209,8 @@ def _check_folds(cracks: Cracks, new: np.ndarray, name) -> None:
         first, second = name(one[k] // 2), name(two[k] // 2)
         if first != second:
             raise ValueError(
-                f"{first} and {second} meet at ({x:g}, {y:g}) at less than 10°: end one of them before the other, or draw one crack"
+                f"{first} and {second} meet at ({x:g}, {y:g}) at less than 10°: end one of them before the other, or "
+                "draw one crack"
             )
         raise ValueError(f"{first}: folds back on itself at ({x:g}, {y:g}), by more than 170°")
 

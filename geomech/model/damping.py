@@ -14,7 +14,7 @@ def rayleigh_coefficients(fractions: tuple[float, float], frequencies: tuple[flo
     alpha, beta = 2 * p * q * (q * x - p * y) / (q * q - p * p), 2 * (q * y - p * x) / (q * q - p * p)
     if min(alpha, beta) < -1e-12 * max(alpha * q, beta / q, 1e-300):
         raise ValueError(
-            f"fractions {x:g} and {y:g} of critical damping at {frequencies[0]:g} and {frequencies[1]:g} Hz need a negative "
-            "coefficient, which would drive the blocks; bring the fractions closer together"
+            f"fractions {x:g} and {y:g} of critical damping at {frequencies[0]:g} and {frequencies[1]:g} Hz need a "
+            "negative coefficient, which would drive the blocks; bring the fractions closer together"
         )
     return max(float(alpha), 0.0), max(float(beta), 0.0)

@@ -44,7 +44,8 @@ class Roughness:
                 raise ValueError(f"{what} of a rough joint must be positive, got {value!r} m")
         if self.length is not None and self.length < self.sample_length:
             raise ValueError(
-                f"length of a rough joint must not be below its sample's {self.sample_length:g} m, got {self.length!r} m"
+                f"length of a rough joint must not be below its sample's {self.sample_length:g} m, got {self.length!r} "
+                "m"
             )
 
     @property

@@ -36,8 +36,8 @@ CONTACT = np.dtype(
         (
             "bonded",
             np.int64,
-        ),  # 1 while cohesion and tensile strength hold, 0 once they are lost, 2 after slip that wears cohesion, 3 cracked from
-        # the edge of its face: cohesion holds while it is pressed
+        ),  # 1 while cohesion and tensile strength hold, 0 once they are lost, 2 after slip that wears cohesion, 3
+        # cracked from the edge of its face: cohesion holds while it is pressed
         ("wear", np.float64),  # m, length of the way it has slid, to and fro
         ("lift", np.float64),  # m, faces forced apart by sliding; negative: a gap that the geometry has not
         ("inset", np.bool_),  # a bond whose springs stand inside its face, as the bending of its blocks wants them

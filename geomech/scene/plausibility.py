@@ -87,8 +87,8 @@ def _increment(c: Check) -> None:
         if increment > largest:
             c.warn(
                 ("growth", "increment_m"),
-                f"an advance of {increment:g} m is more than all of {blocks.names[b]!r}, which is {largest:.3g} m: a tip "
-                "crosses it at a stroke",
+                f"an advance of {increment:g} m is more than all of {blocks.names[b]!r}, which is {largest:.3g} m: a "
+                "tip crosses it at a stroke",
                 "is it in metres? Unset, it is a tenth of the shortest crack",
             )
             return
@@ -99,7 +99,8 @@ def _weightless(c: Check) -> None:
     if loads.in_situ is not None and loads.gravity_ramp_s > 0:
         c.warn(
             ("loads", "gravity_ramp_s"),
-            "blocks take their in-situ stress at time 0, when gravity is still 0: nothing bears it, and weight comes on afterwards",
+            "blocks take their in-situ stress at time 0, when gravity is still 0: nothing bears it, and weight comes "
+            "on afterwards",
             "leave `gravity_ramp_s` out",
         )
 
@@ -115,9 +116,10 @@ def _sudden_weight(c: Check) -> None:
     if any(loads.gravity_m_s2) and t.dda.dynamic_factor > 0:
         c.warn(
             ("geometry", "dead_ends") if "dead_ends" in c.data["geometry"] else ("loads", "gravity_m_s2"),
-            f"all weight comes on at once, and {bridges} cracks before rock bridges feel up to twice of it: blocks may split in the "
-            "first steps that would stand",
-            'let it come by and by (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the stress of the '
+            f"all weight comes on at once, and {bridges} cracks before rock bridges feel up to twice of it: blocks may "
+            "split in the first steps that would stand",
+            'let it come by and by (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the '
+            "stress of the "
             "ground (loads.in_situ)",
         )
 
@@ -150,9 +152,9 @@ def _shallow(c: Check) -> None:
         others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
         c.warn(
             ("geometry",),
-            f"{blocks.names[block]!r} holds cracks and lies on a fixed block with a side of {length:.3g} m, {slenderness:.2g} times "
-            f"as long as the block is deep{others}: it presses on it linearly, and bends where it would not on a true base; K "
-            "of its cracks may be twice what it should be",
+            f"{blocks.names[block]!r} holds cracks and lies on a fixed block with a side of {length:.3g} m, "
+            f"{slenderness:.2g} times as long as the block is deep{others}: it presses on it linearly, and bends where "
+            "it would not on a true base; K of its cracks may be twice what it should be",
             'say run.boundary_stress = "bases", or draw it deeper '
             f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
         )

@@ -88,9 +88,9 @@ def test_blocks_press_on_their_base_as_the_crack_solver_has_it(wide):
 
 
 def test_wide_blocks_lift_off_their_base_at_its_ends():
-    """Three times as wide as deep, the slab stands on 62 % of its base: on a longer piece, held, the reaction at the end
-    pulls, on a shorter one it presses, singular like r^(−½), and K of that piece is the one that is found (2e-3; with
-    all of the base held K is 13 % less)."""
+    """Three times as wide as deep, the slab stands on 62 % of its base: on a longer piece, held, the reaction at the
+    end pulls, on a shorter one it presses, singular like r^(−½), and K of that piece is the one that is found (2e-3;
+    with all of the base held K is 13 % less)."""
     ends = []
     for half in (0.90, 0.95):
         reactions = alone(3.0, ((-half, 0.0), (half, 0.0))).reactions
@@ -122,9 +122,7 @@ def test_cracks_of_which_the_faces_close_are_told_to_the_base():
     lines = [np.array([[0.0, 0.15], [0.0, 0.35]]), np.array([[0.2, 0.5], [0.4, 0.8]])]
     problem = replace(problem, cracks=Cracks.from_polylines(lines, aperture=[np.inf, 0.0]))
     solution, tips = last(problem)
-    body = ddm.Body(
-        [problem.blocks.loops(0)[0]], problem.cracks, ROCK, supports=[ddm.Support(0, hold="normal")]
-    )
+    body = ddm.Body([problem.blocks.loops(0)[0]], problem.cracks, ROCK, supports=[ddm.Support(0, hold="normal")])
     held = body.solve(ddm.BodyLoad(sides={3: (0.0, -STRIP)}))
     assert solution.closed.any()
     for name in ("k_i", "k_ii"):

@@ -75,7 +75,9 @@ def test_a_block_turns_on_its_corner_as_a_pendulum(settings):
 def test_a_block_that_falls_over_in_statics_stays_on_its_corner_and_gains_no_energy(settings):
     """Nothing holds it: it turns by some 0.02 rad a step about a corner, which would lift off the floor by 1e-4 of the
     block, or be pressed in, if it went straight on."""
-    system = above(regular(5, 0.5, -12.0, 0.0) @ np.array([[1.0, 0.0], [0.2, 1.0]]), 60.0, dynamic_factor=0.0, **settings)
+    system = above(
+        regular(5, 0.5, -12.0, 0.0) @ np.array([[1.0, 0.0], [0.2, 1.0]]), 60.0, dynamic_factor=0.0, **settings
+    )
     state, budget = State.at_rest(system.blocks), dda.EnergyBudget()
     size = float(np.sqrt(system.blocks.areas()[1]))
     for _ in range(6):

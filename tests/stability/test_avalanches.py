@@ -69,9 +69,10 @@ def test_an_avalanche_makes_no_energy_and_lets_no_block_into_another(n, seconds,
                 overlap = max(overlap, deepest_overlap(blocks, state.vertices, moments)[3])
                 strained = max(strained, float(np.abs(moments[free, 0] / areas[free] - 1).max()))
     print(
-        f"{n} blocks, {seconds:g} s, {steps} steps, {cuts} cuts: penetration {deepest / size:.1e}, overlap {overlap:.1e} of a "
-        f"block, strain {strained:.1e}; residual {budget.residual / budget.turnover:.1e}, brought in by overlap "
-        f"{budget.overlap / budget.turnover:.1e}, moving {budget.last.kinetic / budget.turnover:.1e} of all energy"
+        f"{n} blocks, {seconds:g} s, {steps} steps, {cuts} cuts: penetration {deepest / size:.1e}, overlap "
+        f"{overlap:.1e} of a block, strain {strained:.1e}; residual {budget.residual / budget.turnover:.1e}, brought "
+        f"in by overlap {budget.overlap / budget.turnover:.1e}, moving {budget.last.kinetic / budget.turnover:.1e} of "
+        "all energy"
     )
     assert not caplog.records
     # Springs of 40 E' give by v √(m/k), 1e-3 of a block, under an impact at 20 m/s.

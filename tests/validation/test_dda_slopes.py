@@ -90,7 +90,8 @@ def test_plane_failure_with_water_in_the_plane_and_behind(depth):
 
     found = limit(stands, 30, 70)
     print(
-        f"z = {depth} m, U = {uplift / 1e3:.1f}, V = {thrust / 1e3:.1f} kN: {found:.4f}° needed, should be {expected:.4f}°"
+        f"z = {depth} m, U = {uplift / 1e3:.1f}, V = {thrust / 1e3:.1f} kN: {found:.4f}° needed, should be "
+        f"{expected:.4f}°"
     )
     assert found == pytest.approx(expected, abs=0.02)
 
@@ -214,7 +215,8 @@ def test_toppling_slope_carries_the_published_forces():
     for n in range(1, 17):
         print(
             f"{n:5d} {base[n, 0] / 1e3:8.1f} {toppling_slope.PUBLISHED_R[n - 1]:8.1f} {base[n, 1] / 1e3:10.1f}"
-            f" {toppling_slope.PUBLISHED_S[n - 1]:8.1f} {thrust[n + 1] / 1e3:12.1f} {toppling_slope.PUBLISHED_P[n - 1]:8.1f}"
+            f" {toppling_slope.PUBLISHED_S[n - 1]:8.1f} {thrust[n + 1] / 1e3:12.1f} "
+            f"{toppling_slope.PUBLISHED_P[n - 1]:8.1f}"
         )
     # 0.15 % of friction above the limit and 0.1 % of elastic tilt move the thrusts by 40 kN of 4837.
     assert base[1:, 0] / 1e3 == pytest.approx(toppling_slope.PUBLISHED_R, abs=25)
