@@ -25,6 +25,7 @@ from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .elastic_range import ElasticRange
 from .event_steps import SETTLED, TOGETHER, EventSteps
+from .first_change import FirstChange
 from .growing import births, growth_of_tips, initiations, part_here, take_growth
 from .load_balance import LoadBalance
 from .mechanism import Mechanism
@@ -80,6 +81,8 @@ class Coupling:
                     'equilibrium "" or "start"'
                 )
             self.events = EventSteps(problem)
+        #: What contacts and faces do; by other steps told where it is asked for, at the end of the step it happens in.
+        self.changes = FirstChange(problem.run.events or ()) if self.events is None else self.events.changes
         self.follows = problem.run.control == "toughness"
         if self.follows and self.events is None:
             raise ValueError('control "toughness" needs stepping "events"')
@@ -185,7 +188,7 @@ class Coupling:
             may_grow = growth_pass < growing.max_passes
             if self.follows and not self.events.reached:
                 may_grow = False  # on the way to a lower load
-            events = pending if self.events is None else pending + self.events.changes.events(now, found)
+            events = pending + self.changes.events(now, found)
             stops = stops or self._stops(events)
             growth = None
             if may_grow and not stops:

@@ -63,7 +63,7 @@ class EventSteps:
         #: Whether the last first pass ended at an event.
         self.reached = False
         #: What contacts and faces do on the way.
-        self.changes = FirstChange(run.events)
+        self.changes = FirstChange(("contacts", "faces") if run.events is None else run.events)
 
     def first_pass(self, now: CrackedBlocks, end: float) -> Balance:
         """The blocks moved to the next event, or towards it as far as one step goes, at most to the time ``end``; with

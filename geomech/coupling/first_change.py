@@ -38,7 +38,8 @@ SHORT, MORE, MUCH_MORE, LESS = 1 / 8, 1.5, 3.0, 0.25
 
 
 class FirstChange:
-    """Where contacts and faces, those of the ``kinds`` "contacts" and "faces", change their states."""
+    """Where contacts and faces, those of the ``kinds`` "contacts" and "faces", change their states; and what to tell of
+    it, whatever the steps (`events`)."""
 
     def __init__(self, kinds: tuple[str, ...]) -> None:
         self.kinds = tuple(kind for kind in kinds if kind in ("contacts", "faces"))

@@ -145,7 +145,8 @@ class RunSettings:
     ``stepping`` "fixed": steps of `DdaSettings.time_step`; "events": static steps that end where a tip has just reached
     its toughness or, as ``events`` says, a contact or a crack face changes its state, otherwise as long as blocks may
     move in one, or ``longest_step`` s. ``control`` "load": loads and imposed motion rise with time; "toughness" (with
-    "events"): they are those at which the most driven tip has K_eq = K_Ic, more or less than before.
+    "events"): they are those at which the most driven tip has K_eq = K_Ic, more or less than before. What ``events``
+    names is told of by other steps as well, when they end; None: all of it by steps to events, nothing by others.
     ``boundary_stress`` says how contact forces load cracked blocks: "contacts" spread over faces, "bases" so, and on
     fixed and guided blocks as on a rigid base, "springs" at points, "kelvin-springs" at points of the infinite plane. Without ``skip`` every body is made anew and
     every answer worked out anew in every pass, though nothing about it has changed: the same results, for comparison.
@@ -155,7 +156,7 @@ class RunSettings:
     stop_at: tuple[str, ...] = ("coalescence", "split")
     boundary_stress: str = "contacts"
     stepping: str = "fixed"
-    events: tuple[str, ...] = ("tips", "contacts", "faces")
+    events: tuple[str, ...] | None = None
     longest_step: float | None = None
     control: str = "load"
     skip: bool = True

@@ -39,6 +39,7 @@ def check(c: Check) -> None:
         _rigid(c)
     _statics(c)
     _stepping(c)
+    _told(c)
 
 
 def _times(c: Check) -> None:
@@ -100,24 +101,26 @@ def _stepping(c: Check) -> None:
                     f"steps to the next event are for static runs, and dda.{key} is {str(value).lower()}",
                     f'{way_out}, or stepping = "fixed"',
                 )
-        if run.events is not None and not set(run.events) - {"tips"}:
-            for kind in sorted(set(run.stop_at) & set(CHANGES)):
-                c.refuse(
-                    ("run", "stop_at"),
-                    f'"{kind}" is of contacts and crack faces, and run.events names neither',
-                    'add "contacts" or "faces" to run.events, or leave it out',
-                )
         return
-    given = c.data.get("run", {})
     for key, belongs in (
         ("control", run.control != "load"),
         ("longest_step_s", run.longest_step_s is not None),
-        ("events", "events" in given),
     ):
         if belongs:
             c.refuse(("run", key), f'run.{key} belongs to stepping "events"', 'set run.stepping = "events"')
+
+
+def _told(c: Check) -> None:
+    """What ends a run has to be told of."""
+    run = c.tables.run
+    if run is None or (run.events is None and run.stepping == "events") or set(run.events or ()) - {"tips"}:
+        return
     for kind in sorted(set(run.stop_at) & set(CHANGES)):
-        c.refuse(("run", "stop_at"), f'"{kind}" is told of by stepping "events" only', 'set run.stepping = "events"')
+        if run.events is None:
+            what, way_out = "fixed steps tell of these where run.events names them", 'say run.events = ["contacts", "faces"]'
+        else:
+            what, way_out = "run.events names neither", 'add "contacts" or "faces" to run.events'
+        c.refuse(("run", "stop_at"), f'"{kind}" is of contacts and crack faces, and {what}', way_out)
 
 
 def _growth_lengths(c: Check) -> None:

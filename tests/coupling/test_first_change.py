@@ -190,3 +190,34 @@ def test_loads_of_tips_do_not_depend_on_what_else_is_watched():
         kinds = [event.kind for cycle in seen for event in cycle.events]
         assert kinds[:3] == (["slip", "sliding", "initiation"] if "faces" in events else ["initiation"] * 2 + kinds[2:])
     assert loads[0] == pytest.approx(loads[1], rel=1e-6) and numbers[1] < numbers[0]
+
+
+def test_fixed_steps_tell_what_happens_in_them_where_it_is_asked_for():
+    """The pushed block of above in steps of a second: the same events in the same order, at the end of the step in which
+    the exact one lies; none without asking. A run ends with one that it is to stop at."""
+    exact, _ = told(standing(0.0, [1000.0], stop_at=("sliding",)))
+    end = exact[-1][1] + 3.0
+    events, number = told(standing(0.0, [1000.0], stepping="fixed", events=("contacts",), stop_at=(), end_time=end))
+    events = [each for each in events if each[0] != "mechanism"]
+    assert [(kind, detail) for kind, _, detail in events] == [(kind, detail) for kind, _, detail in exact]
+    late = np.array([time for _, time, _ in events]) - [time for _, time, _ in exact]
+    assert (late > -1e-9).all() and (late < 1.0).all()
+    without, same = told(standing(0.0, [1000.0], stepping="fixed", stop_at=(), end_time=end))
+    assert same == number and not {kind for kind, *_ in without} - {"mechanism"}
+    stopped, _ = told(standing(0.0, [1000.0], stepping="fixed", events=("contacts",), stop_at=("sliding",)))
+    assert stopped == events
+
+
+def test_a_block_that_falls_tells_when_it_comes_down():
+    """From 1 mm above its base: √(2 h/g), to a step of 0.2 ms; both its corners at once."""
+    height, dt = 1e-3, 2e-4
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    problem = standing(0.0, [0.0])
+    blocks = Blocks.from_polygons([3 * square - [1.0, 3.0], square + [0.0, height]], fixed=[True, False])
+    fall = replace(
+        problem, blocks=blocks, loads=Loads(gravity=History.constant([0.0, -G])),
+        dda=DdaSettings(time_step=dt, dynamic_factor=1.0),
+        run=RunSettings(end_time=0.05, events=("contacts",), stop_at=("closure",)),
+    )  # fmt: skip
+    ((kind, time, _),) = told(fall)[0]
+    assert kind == "closure" and 0 <= time - np.sqrt(2 * height / G) < 2 * dt

@@ -71,8 +71,7 @@ SPOILT = [
         "set dda.dynamic_factor = 0",
     ),
     ("[run]", '[run]\ncontrol = "toughness"', "run.control", 'belongs to stepping "events"', "run.stepping"),
-    ("[run]", '[run]\nevents = ["tips"]', "run.events", 'belongs to stepping "events"', "run.stepping"),
-    ("[run]", '[run]\nstop_at = ["sliding"]', "run.stop_at", 'told of by stepping "events" only', "run.stepping"),
+    ("[run]", '[run]\nstop_at = ["sliding"]', "run.stop_at", "fixed steps tell of these", "run.events = "),
     (
         "[run]",
         '[run]\nstepping = "events"\nevents = ["tips"]\nstop_at = ["parting"]',

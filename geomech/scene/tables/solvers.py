@@ -169,7 +169,7 @@ class RunTable(Table):
         description="the run ends at the first event of these kinds; a mechanism is when blocks of a static run slide or turn "
         "without bound. Of the contacts of two blocks, or the faces of a crack, the first that opens is an opening, the last "
         "one a parting; the first that slips a slip, the last one a sliding; what meets a closure, what sticks again a stick, "
-        'a lost bond a debonding: these need stepping "events"',
+        'a lost bond a debonding: these need stepping "events", or run.events',
     )
     stepping: Literal["fixed", "events"] = Field(
         "fixed",
@@ -180,7 +180,8 @@ class RunTable(Table):
         None,
         description='what steps of stepping "events" end at, and events.csv tells: tips that reach their toughness (always), crack '
         "faces and contacts of blocks that open, close, slip, stick or lose their bond; loads are exact, of more than a hundred "
-        "contacts to 1e-3, and what comes in a rush is taken together (unset: tips and faces, and contacts of up to 30 blocks)",
+        "contacts to 1e-3, and what comes in a rush is taken together (unset: tips and faces, and contacts of up to 30 blocks). "
+        "Fixed and dynamic steps tell of contacts and faces too, at the end of the step it happens in (unset: they do not)",
     )
     longest_step_s: Positive | None = Field(
         None,
