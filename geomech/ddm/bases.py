@@ -93,21 +93,28 @@ class _Faces:
     def __init__(self, body: Body, segments: np.ndarray, bases: Sequence[Base]):
         self.body, self.bases, self.segments = body, bases, segments
         self.first = np.cumsum([0, *(len(base.rows) + 1 for base in bases)])
-        n, g = int(self.first[-1]), body.boundary
-        self.weights = np.zeros((n, g.n_unknowns))
-        self.resultants = np.zeros((2 * len(bases), n))
-        for k, base in enumerate(bases):
-            ends = segments[base.rows]
+        self._key = b"".join(segments[base.rows].tobytes() for base in bases)
+        if self._key not in body.on_bases:
+            body.on_bases.clear()
+            body.on_bases[self._key] = self._geometry()
+        self.weights, self.resultants = body.on_bases[self._key]
+
+    def _geometry(self) -> tuple[np.ndarray, np.ndarray]:
+        body, g, n = self.body, self.body.boundary, int(self.first[-1])
+        weights, resultants = np.zeros((n, g.n_unknowns)), np.zeros((2 * len(self.bases), n))
+        for k, base in enumerate(self.bases):
+            ends = self.segments[base.rows]
             places = np.concatenate([[0.0], np.cumsum(np.hypot(*(ends[:, 1] - ends[:, 0]).T))])
             own = slice(self.first[k], self.first[k + 1])
-            self.weights[own] = _weights(g, ends[0, 0], ends[-1, 1], places, body._extent)
+            weights[own] = _weights(g, ends[0, 0], ends[-1, 1], places, body._extent)
             length = np.diff(places)
             for i, j, near in ((0, 1, places[:-1]), (1, 0, places[1:])):
                 at = self.first[k] + i + np.arange(len(length))
-                self.resultants[2 * k, at] += 0.5 * length
+                resultants[2 * k, at] += 0.5 * length
                 # ∫ hat s ds: a third of the way from its own node to the other.
                 far = places[j : j + len(length)]
-                self.resultants[2 * k + 1, at] += 0.5 * length * (2 * near + far) / 3
+                resultants[2 * k + 1, at] += 0.5 * length * (2 * near + far) / 3
+        return weights, resultants
 
     def pressures(self, tractions: np.ndarray) -> np.ndarray:
         """(n,) Pa at the nodes, of ``tractions`` (m, 2, 2) that go on from piece to piece."""
@@ -128,27 +135,29 @@ class _Faces:
     def compliance(self, solution: Solution) -> np.ndarray:
         """(n, n) ∫ hat · u ds of unit pressures, m²/Pa, while the cracks' faces keep the states of ``solution``."""
         body = self.body
-        key = (
-            b"".join(self.segments[base.rows].tobytes() + base.per_pressure.tobytes() for base in self.bases)
-            + solution.face_states.key
-        )
+        key = self._key + b"states" + solution.face_states.key
         if key not in body.on_bases:
             body.on_bases.clear()
-            body.on_bases[key] = self._compliance(solution)
-        return body.on_bases[key]
+            body.on_bases[self._key], body.on_bases[key] = (self.weights, self.resultants), self._of_tractions(solution)
+        n = int(self.first[-1])
+        way = np.concatenate([np.tile(base.per_pressure, (len(base.rows) + 1, 1)) for base in self.bases])
+        return body.on_bases[key][:, :n] * way[:, 0] + body.on_bases[key][:, n:] * way[:, 1]
 
-    def _compliance(self, solution: Solution) -> np.ndarray:
-        body = self.body
+    def _of_tractions(self, solution: Solution) -> np.ndarray:
+        """(n, 2 n) the same of unit tractions at the nodes, along x and then along y: shear changes its share of the
+        pressure from step to step."""
+        body, n = self.body, int(self.first[-1])
         rows = np.concatenate([base.rows for base in self.bases])
         y, reduced = body.unit_answers(self.segments[rows])
-        of_nodes = np.zeros((len(rows), 4, int(self.first[-1])))
+        of_nodes = np.zeros((len(rows), 4, 2, n))
         done = 0
         for k, base in enumerate(self.bases):
             m = len(base.rows)
             here, node = done + np.arange(m), self.first[k] + np.arange(m)
-            of_nodes[here, :2, node], of_nodes[here, 2:, node + 1] = base.per_pressure, base.per_pressure
+            for axis in (0, 1):
+                of_nodes[here, axis, axis, node] = of_nodes[here, 2 + axis, axis, node + 1] = 1.0
             done += m
-        mix = of_nodes.reshape(4 * len(rows), -1)
+        mix = of_nodes.reshape(4 * len(rows), 2 * n)
         moves = -(y @ mix)
         if body.faces.n:
             moves -= body._w @ body._jumps_of(-(reduced @ mix), solution)

@@ -137,8 +137,8 @@ class Body:
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}
-        #: How unit pressures move faces on bases, by face and states of the cracks (`bases`).
-        self.on_bases: dict[bytes, np.ndarray] = {}
+        #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`bases`).
+        self.on_bases: dict[bytes, object] = {}
         self._assemble(previous, holds, many)
 
     @property

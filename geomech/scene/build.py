@@ -102,12 +102,12 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
     )
 
 
-def _events(tables: SceneTables, blocks: Blocks) -> tuple[str, ...]:
+def _events(tables: SceneTables, blocks: Blocks) -> tuple[str, ...] | None:
     """What steps from event to event end at, and other steps tell of."""
     if tables.run.events is not None:
         return ("tips", *tables.run.events)
     if tables.run.stepping == "fixed":
-        return ("tips",)
+        return None
     watched = blocks.n_blocks <= MOST_WATCHED or bool(set(tables.run.stop_at) & set(CHANGES))
     return ("tips", "contacts", "faces") if watched else ("tips", "faces")
 

@@ -133,7 +133,7 @@ class GrowthTable(Table):
     approach_steps: NotNegative = Field(
         0.0,
         description="where a tip comes nearer to another crack than so many increments, all tips of its block take shorter ones, so many "
-        "to what is left; 12 lets loads at which cracks join depend hardly on the increment (0: they do not)",
+        "to what is left; 16 lets loads at which cracks join depend hardly on the increment (0: they do not)",
     )
     max_passes: Annotated[int, Field(ge=1)] = Field(200, description="growth passes at one load")
     correct: bool = Field(
