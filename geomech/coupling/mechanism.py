@@ -22,6 +22,9 @@ HELD = 1e-2
 #: rock leave less than the former part, and blocks that settle fade faster: a column of 100 m, in steps of 10 ms, by a
 #: third.
 FADES, STEPS = 0.1, 5
+#: What flies, with nearly all its weight to move it, may still land: it is told of when it has gone this part of its
+#: size.
+FLYING, GONE = 0.99, 0.05
 #: So many blocks are named.
 NAMED = 4
 
@@ -44,9 +47,11 @@ class Mechanism:
         self.ratios = [*self.ratios[-STEPS:], ratio]
         if self.told or len(self.ratios) <= STEPS or ratio < (1.0 - FADES) * self.ratios[0]:
             return None
-        self.told = True
         speed = np.hypot(*result.state.velocity[:, :2].T)
         speed[np.asarray(blocks.fixed, bool)] = 0.0
+        if ratio > FLYING and not _has_gone(int(np.argmax(speed)), result, blocks):
+            return None
+        self.told = True
         moving = np.flatnonzero(speed > 0.1 * speed.max())
         moving = moving[np.argsort(-speed[moving], kind="stable")]
         named = ", ".join(blocks.names[b] if blocks.names else f"block {b}" for b in moving[:NAMED].tolist())
@@ -55,3 +60,9 @@ class Mechanism:
             f"nothing holds {named}{f' and {others} more' if others > 0 else ''}: {100 * ratio:.2g} % of the forces on "
             "a block are left over, step after step"
         )
+
+
+def _has_gone(block: int, result: dda.StepResult, blocks: Blocks) -> bool:
+    own = slice(blocks.vertex_start[block], blocks.vertex_start[block + 1])
+    way = np.hypot(*(result.state.vertices[own] - blocks.vertices[own]).T)
+    return bool(way.min() > GONE * np.sqrt(blocks.areas()[block]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,3 +74,15 @@ def test_a_mechanism_begins_with_the_load_that_makes_it():
     gravity = History(times, 9.81 * np.stack([np.sin(turned), -np.cos(turned)], axis=1))
     (told,) = [event for cycle in cycles(on_a_slope(0.0, 30.0, gravity)) for event in cycle.events]
     assert 0.1 < told.time < 0.17 and "slider" in told.detail
+
+
+@pytest.mark.parametrize(("floor", "told"), [(-6e-3, 0), (-3.0, 1)])
+def test_what_falls_may_still_land(floor, told):
+    """A block over a gap of 6 mm, which takes a dozen static steps of 10 ms, and one over a gap of three times its
+    size."""
+    base = np.array([[-1, -5], [2, -5], [2, floor], [-1, floor]], float)
+    problem = on_a_slope(0.0, 30.0)
+    blocks = Blocks.from_polygons([base, SQUARE], fixed=[True, False], names=["base", "slider"])
+    problem = replace(problem, blocks=blocks, run=RunSettings(end_time=1.5, stop_at=("mechanism",)))
+    found = [event for cycle in cycles(problem) for event in cycle.events]
+    assert [event.kind for event in found] == ["mechanism"] * told
