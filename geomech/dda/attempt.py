@@ -35,6 +35,9 @@ from .viscous_boundary import QuietEdges
 if TYPE_CHECKING:
     from .system import BlockSystem
 
+#: A moving step whose faces still seek their place after this many times the iterations that states may take is cut, so
+#: often at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
+_LABOUR, _EASED = 6, 3
 #: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
 _PLACED = 20
 #: … and so often for the gaps that blocks which turn come to, until these are known to this part of the radius of
@@ -183,6 +186,8 @@ class Attempt:
             better = found.misplaced(settled)
             if better is None:
                 break
+            if self._laboured():
+                raise Unsettled(f"contacts have not settled in {self.iterations} open-close iterations")
             if tries % _PLACED == 0:
                 # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
                 # this one.
@@ -192,6 +197,12 @@ class Attempt:
             raise Unsettled("faces do not settle on the part of them that touches")
         self.found, self.settled, self.unknowns = found, settled, unknowns
         self.vectors, self.weight = vectors, weight
+
+    def _laboured(self) -> bool:
+        """Whether shorter steps are likely to come sooner to where this one goes."""
+        if self.system.scheme.static or self.cuts >= _EASED:
+            return False
+        return self.iterations > _LABOUR * self.system.settings.max_open_close_iterations
 
     def _bent(self) -> bool:
         """Give contacts the gaps that the motion really leads to, and the forces of the step the place that they have
