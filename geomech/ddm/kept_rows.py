@@ -22,8 +22,9 @@ class _Roomy:
         self.n, self.rows = len(rows), rows
 
     def __getstate__(self) -> np.ndarray:
-        """Without the room, which may hold anything."""
-        return self.rows[: self.n].copy()
+        """Without the room, which may hold anything; row- or column-major as they are: products differ by it in their
+        last bits."""
+        return self.rows if self.n == len(self.rows) else self.rows[: self.n].copy(order="K")
 
     def __setstate__(self, rows: np.ndarray) -> None:
         self.n, self.rows = len(rows), rows

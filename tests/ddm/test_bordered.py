@@ -9,6 +9,7 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm import Body, BodyLoad
+from geomech.ddm.kept_rows import KeptRows
 from geomech.ddm.work import Work
 from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
 
@@ -90,6 +91,32 @@ def test_bodies_that_grow_apart_keep_their_own():
             k = factors(body)
             assert np.abs(k - alone).max() < 1e-12 * np.abs(alone).max()
             assert np.array_equal(factors(again), k)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_rows_that_are_stored_multiply_bit_for_bit(order):
+    """Row- or column-major, whole and with more behind them, and what grows from both: layout decides last bits."""
+    rng = np.random.default_rng(1)
+    before, after = (Body([], network(n), ROCK, SETTINGS).faces for n in (0, 2))
+    kept = KeptRows.whole(np.array(rng.normal(size=(before.n_unknowns, 150)), order=order), before)
+    was, more = after.found_in(before), rng.normal(size=(after.n_unknowns, 150))
+    assert (was < 0).any() and (was >= 0).any()
+
+    def grown(rows: KeptRows) -> KeptRows:
+        return rows.grown(after, was, lambda k: more[after.unknowns(k)])
+
+    right, left = rng.normal(size=(150, 3)), {e.n: rng.normal(size=(e.n_unknowns, 3)) for e in (before, after)}
+    again = pickle.loads(pickle.dumps(kept))
+    for one, other in [
+        (kept, again),
+        (grown(kept), pickle.loads(pickle.dumps(grown(kept)))),
+        (grown(kept), grown(again)),
+    ]:
+        x = left[len(one.at)]
+        for k in (0, slice(None)):
+            assert np.array_equal(one @ right[:, k], other @ right[:, k])
+            assert np.array_equal(one.T @ x[:, k], other.T @ x[:, k])
+        assert one.dense.strides == other.dense.strides
 
 
 def test_what_does_not_pivot_well_is_factored_anew(monkeypatch):
