@@ -70,8 +70,12 @@ def measure(quick: bool = False) -> Measured:
     """The table; leaves ``work_precision.png`` and ``work_precision.json`` in `FOLDER`. ``quick`` takes few sizes, the
     same ones on every machine; else constant elements are given `RATIO` times this solver's time to `ERROR` at
     least."""
+    from ..ddm import Body
     from ..render.work_precision import draw
 
+    # Kernels are compiled before anything is measured, or read from where they are kept.
+    first = crack_problems.specimen()
+    Body([first.outline], first.cracks, crack_problems.ROCK).solve(first.load)
     points = [point for name in PROBLEMS for point in _curves(name, quick)]
     surface = [
         Point(free_surface.PROBLEM, method, size, unknowns, error, timed(again)[1])
