@@ -431,8 +431,9 @@ class Attempt:
             settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs
         )
         return StepResult(
-            new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, statistics
-        )
+            new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, found.arcs,
+            statistics,
+        )  # fmt: skip
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
         """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""

@@ -153,6 +153,12 @@ class ContactSet:
             return replace(self, arc=arc, swing=swing)
         return replace(self.lumped, arc=arc, swing=swing).placed(self.points)
 
+    @property
+    def arcs(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) m each: the arc and the swing of the contacts at their corners."""
+        found = self if self.lumped is None else self.lumped
+        return found.arc + np.zeros(len(self)), found.swing + np.zeros(len(self))
+
     def cornered(self, better: ContactSet) -> ContactSet:
         """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other
         parts."""

@@ -46,6 +46,7 @@ class StepResult:
     energy         the terms of the step's energy balance
     vertices       (n_vertices, 2) m, that geometry: the middle of the step in dynamics (`dda.middle`)
     turn           (n_blocks,) rad, by which blocks have turned there since the step began
+    arcs           (n_contacts,) m each, the arc and the swing that the contacts have followed (`contact_set`)
     reserve        (n_contacts,) N, how far each of ``contacts`` is from leaving its state (`contact_states.reserves`)
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
                    worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
@@ -62,6 +63,7 @@ class StepResult:
     reserve: np.ndarray
     vertices: np.ndarray
     turn: np.ndarray
+    arcs: tuple[np.ndarray, np.ndarray]
     statistics: dict[str, float] = field(default_factory=dict)
 
 

@@ -180,6 +180,9 @@ class BlockSystem:
         found = self.finder.find(state, vertices, _WINDOW * limit)
         if like is not None:
             found = found.like(like.state.contacts)
+            if self.scheme.static and found.tried is not None:
+                # (In motion the step's arcs are those that the velocity foresees.)
+                found = found.along(*like.arcs)
         reason, before, broken = "", np.inf, np.zeros(0, np.int64)
         cuts = 0
         while True:
