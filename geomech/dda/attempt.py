@@ -428,8 +428,9 @@ class Attempt:
             **acted,
         }
         reserve = reserves(
-            settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs
-        )
+            settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs,
+            system.slack,
+        )  # fmt: skip
         return StepResult(
             new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, found.arcs,
             statistics,

@@ -13,6 +13,10 @@ from numba import njit
 
 from ..model import OPEN, SLIP, STICK
 
+#: Strengths are known to this part of themselves; slip, which is counted from the step's start, to this part of the
+#: round-off of coordinates.
+_KNOWN, _OF_SLIP = 1e-9, 1e-3
+
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _move(unknowns, block, other, order, vectors, c, k):
@@ -81,9 +85,8 @@ def check_states(
 
     Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on
     a corner holds until it has slid off by its ``reach`` (n,) m; lines that its vertex was ``behind`` (n,) as the step
-    began are not those by which it comes in. ``slack`` (m) is the
-    round-off of coordinates: gaps below it decide nothing, nor does what they make of friction; slip, which is counted
-    from the step's start, is known a thousand times better.
+    began are not those by which it comes in. ``slack`` (m) is the round-off of coordinates: gaps below it decide
+    nothing, nor does what they make of friction.
     """
     n = state.shape[0]
     new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
@@ -118,32 +121,36 @@ def check_states(
         for k in range(2):
             p = partner[c, k]
             out = out or (p >= 0 and forces[p, 2] > reach[c] and gap < 0.0)
-        if -forces[c, 0] > pull * (1.0 + 1e-9) + normal[c] * slack or out:
+        if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack or out:
             new_state[c], new_bonded[c] = OPEN, 0
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:
             strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
             excess = abs(forces[c, 1]) - strength
-            if excess > 1e-9 * strength + (1e-3 * shear[c] + peak[c] * normal[c]) * slack:
+            if excess > _KNOWN * strength + (_OF_SLIP * shear[c] + peak[c] * normal[c]) * slack:
                 new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
                 new_direction[c] = np.sign(forces[c, 1])
                 violation[c] = excess
         elif friction[c] > 0.0 or sliding[c] > 0.0:
             strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
             trial = direction[c] * (shear0[c] - shear[c] * slide)
-            if strength - trial > 1e-9 * strength + (1e-3 * shear[c] + friction[c] * normal[c]) * slack:
+            if strength - trial > _KNOWN * strength + (_OF_SLIP * shear[c] + friction[c] * normal[c]) * slack:
                 # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial
     return new_state, new_direction, new_bonded, violation
 
 
-def reserves(state, bonded, normal_force, shear_force, gap, springs) -> np.ndarray:
+def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> np.ndarray:
     """(n,) N: how far contacts in these states are from leaving them, linear in the load while all states stand. Open
     ones: the force that closing their gap would make; sticking ones: what is left of their strength, or of what presses
-    them; sliding ones the latter."""
-    lifts = normal_force + np.where(bonded == 1, springs.tension, 0.0)
+    them; sliding ones the latter. They leave them where `check_states` says so, beyond what the rounding ``slack`` (m)
+    of coordinates makes of forces: that is where nothing is left."""
+    rounding = springs.normal * slack
+    pull = np.where(bonded == 1, springs.tension, 0.0)
+    lifts = normal_force + pull * (1.0 + _KNOWN) + rounding
     held = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
     strength = np.maximum(0.0, springs.peak * normal_force + held)
-    closed = np.where(state == STICK, np.minimum(lifts, strength - np.abs(shear_force)), lifts)
-    return np.where(state == OPEN, springs.normal * gap, closed)
+    excess = _KNOWN * strength + (_OF_SLIP * springs.shear + springs.peak * springs.normal) * slack
+    closed = np.where(state == STICK, np.minimum(lifts, strength + excess - np.abs(shear_force)), lifts)
+    return np.where(state == OPEN, springs.normal * gap + rounding, closed)
