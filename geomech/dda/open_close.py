@@ -46,6 +46,9 @@ _LITTLE, _MORE = 12, 5
 #: Before that, where no more than so many are wrong, the states of those that were in the last iterations (these and so
 #: many more) are sought together, so many times; no more than so many with each other.
 _SOUGHT, _LATELY, _TOGETHER, _JOINED = 40, 3, 12, 80
+#: It takes two solutions for each contact and one for each set of them: so many in all, as many as twenty iterations of
+#: the path. (A wall under sudden weight has a dozen of sets at once, and takes 27 iterations without.)
+_SOLUTIONS = 60
 #: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path
 #: takes fifteen; it is asked after so many iterations.
 _FEW, _CAUTIOUS = 40, 12
@@ -165,16 +168,22 @@ class _Equations:
         self._data = np.empty(self.pattern.size)
         self._side = np.empty(6 * self.pattern.n)
 
-    def together(self, which: np.ndarray, states: _States, answer: _Answer) -> _States:
+    def together(self, which: np.ndarray, states: _States, answer: _Answer, budget: int) -> tuple[_States | None, int]:
         """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in
-        common at a time; where none are found, as the ``answer`` calls for."""
-        found = self.found
+        common at a time; where none are found, as the ``answer`` calls for. And the solutions spent; None where they
+        would be more than the ``budget``."""
+        found, spent = self.found, 0
         fixed = found, self.vectors, answer.springs, answer.gap
-        for some in clusters(which, found, self.pattern.order):
+        parts = clusters(which, found, self.pattern.order)
+        if 2 * which.sum() + len(parts) > budget:
+            return None, 0
+        for some in parts:
             proposal = None
             wider = with_neighbours(some, states.state, states.bonded, found, self.pattern.order)
             for group in (some, wider):
-                if proposal is None and group.sum() <= _JOINED:
+                cost = 2 * int(group.sum()) + 1
+                if proposal is None and group.sum() <= _JOINED and spent + cost <= budget:
+                    spent += cost
                     try:
                         proposal = settled_together(
                             group, states.state, states.direction, self.pattern, self.matrix, self.right, *fixed
@@ -184,7 +193,7 @@ class _Equations:
                         break
             called = some & (answer.violation > 0)
             states = states.switched(called, answer.called) if proposal is None else _States(*proposal, states.bonded)
-        return states
+        return states, spent
 
     def answer(self, states: _States, normal_force: np.ndarray, slip: np.ndarray) -> _Answer:
         """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises
@@ -360,7 +369,7 @@ def settle(
     few, small = len(found) <= _FEW, pattern.solver is None
     iteration, most = 0, max_iterations
     # Contacts (n,) that were wrong in the last iterations, when few were, and how often they were sought together.
-    lately, joint = [], 0
+    lately, joint, left = [], 0, _SOLUTIONS
     # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states
     # fits.
     closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
@@ -402,8 +411,9 @@ def settle(
             lately = [*lately[-_LATELY:], wrong]
             if (stuck or joint) and joint < _TOGETHER:
                 joint += 1
-                proposal = equations.together(np.any(lately, axis=0), states, answer)
-                if proposal.key not in seen:
+                proposal, spent = equations.together(np.any(lately, axis=0), states, answer, left)
+                left -= spent
+                if proposal is not None and proposal.key not in seen:
                     states = proposal
                     continue
                 joint = _TOGETHER

@@ -110,3 +110,21 @@ def test_states_of_a_few_are_those_of_the_whole_step(monkeypatch):
         assert np.array_equal(np.sum(parts, axis=0), which)
         touched = [set(found.block[p]) | set(found.other[p]) for p in parts]
         assert all(not (a & b) - {0} for i, a in enumerate(touched) for b in touched[:i])
+
+
+def test_a_wall_that_comes_to_bear_on_many_joints_is_not_sought_set_by_set():
+    """Dozens of sets of contacts would take forty substitutions an iteration: more than the states of all together."""
+    from geomech import dda
+    from geomech.bench import block_scenes
+
+    blocks = block_scenes.wall(990)
+    law = JointLaw("joint", friction_angle=block_scenes.FRICTION)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [law], settings=block_scenes.settings(0.01))
+    state = system.step(State.at_rest(blocks), block_scenes.WEIGHT).state
+    counts = system._sparse[1].solver.counts
+    before = counts["substitutions"]
+    result = system.step(state, block_scenes.WEIGHT)
+    iterations = result.statistics["open_close_iterations"]
+    print(f"{counts['substitutions'] - before} substitutions in {iterations} iterations")
+    assert iterations < 40
+    assert counts["substitutions"] - before < 6 * iterations
