@@ -107,9 +107,13 @@ def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watch
     except _TimeUp as up:
         verdict, message = LONG, str(up)
     except Exception as error:  # noqa: BLE001 (any but those known is what is looked for)
-        reason = reason_of(error, begun=number > 0) or ""
-        verdict = REFUSED if reason else WRONG
-        message = str(error) if reason else traceback.format_exc(limit=-3)
+        if isinstance(error.__cause__, _TimeUp):
+            # It came within a compiled function, which makes another error of it.
+            verdict, message = LONG, str(error.__cause__)
+        else:
+            reason = reason_of(error, begun=number > 0) or ""
+            verdict = REFUSED if reason else WRONG
+            message = str(error) if reason else traceback.format_exc(limit=-3)
     finally:
         log.removeHandler(heard)
     faults, told, worst = (), (), {}

@@ -110,6 +110,10 @@ class FirstChange:
             changed = seen.changes(now, base)
             if changed:
                 found, high, changes = last, seen, changed
+                # What has changed here, and not yet in a pass farther on, is not looked for from there: backwards.
+                low = [each for each in low if way * (high.time - each.time) > 0]
+                if not low:
+                    break
             elif at is not None and aim != at + 0.25 * way * within:
                 # Most of the way, or all that is taken together, and nothing has changed.
                 self.expected = at

@@ -35,11 +35,12 @@ def test_slopes_run_to_their_end(seed):
 #: where moments were taken from; parts that closed by more than they were apart; moments weighed against the inertia of
 #: unstrained blocks; a dynamic step cut shorter once its cracks had grown; shears of a bond against each other, told of
 #: at the corners of their face; a ring of cracks that closed through the mouth they share; slabs that lean in statics,
-#: whose corners went straight on.
+#: whose corners went straight on; a change sought from a pass that lay beyond it, backwards.
 MENDED = {
     0: "less than 3°", 1: "has no length", 10: "did not settle", 14: "less than 3°", 66: "dt = inf", 74: "balance",
     105: "energy", 124: "time goes back", 145: "not inside the outline", 149: "energy", 189: "energy", 219: "overlap",
     231: "balance", 268: "balance", 291: "energy",
+    426: "time goes back",
 }  # fmt: skip
 
 
@@ -62,6 +63,16 @@ def test_what_does_not_hold_is_wrong_unless_a_warning_says_so(monkeypatch):
     monkeypatch.setattr(fuzzed_slopes._Heard, "__init__", lambda self: super(type(self), self).__init__())
     found = watched(34)
     assert found.verdict == REPORTED and not found.faults and "strain" in found.told[0]
+
+
+def test_time_that_is_up_in_a_compiled_function_is_no_error(monkeypatch):
+    def compiled(problem):
+        yield from ()
+        raise SystemError("returned a result with an exception set") from fuzzed_slopes._TimeUp("dda.solve")
+
+    monkeypatch.setattr("geomech.coupling.cycles", compiled)
+    found = watched(34)
+    assert found.verdict == LONG and found.message == "dda.solve" and not found.reason
 
 
 def test_only_named_reasons_refuse(monkeypatch):
