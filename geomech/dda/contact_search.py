@@ -19,6 +19,9 @@ from .near_pairs import boxes
 
 # Corners and edges that interpenetrate by less than this angle (sine, about 3°) still count as touching face to face.
 _ANGLE = 0.05
+# A corner outside an edge whose neighbour is nearer to it may yet come first or as well where their face leans to the edge
+# by less than this (sine): what hits with one end of a face turns flat in the same step.
+_TURN = 0.25
 # Two entrance lines nearer in direction than this are the same line.
 _PARALLEL = 0.0025
 # Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
@@ -49,6 +52,18 @@ def _against(vertices, next_vertex, previous_vertex, vertex, edge):
         and _dot_to(vertices, vertex, previous_vertex[vertex], ty, -tx) >= -_ANGLE
     )
     return feasible, ty, -tx, px * ty - py * tx, px * tx + py * ty, length
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, window):
+    """Whether a ``vertex`` outside an edge of the normal (nx, ny) by this ``gap``, with neighbours outside as well, may
+    be turned to it though one is nearer, in a step in which corners come nearer by the ``window`` at most."""
+    for neighbour in (next_vertex[vertex], previous_vertex[vertex]):
+        dx, dy = vertices[neighbour, 0] - vertices[vertex, 0], vertices[neighbour, 1] - vertices[vertex, 1]
+        length, rise = np.sqrt(dx * dx + dy * dy), dx * nx + dy * ny
+        if rise < -min(window, _TURN * length) or gap + rise < -_ANGLE * length:
+            return False
+    return True
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -253,8 +268,13 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                     ):
                         continue
                     feasible, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
-                    if not feasible or abs(gap) > window or along < -window or along > length + window:
+                    if abs(gap) > window or along < -window or along > length + window:
                         continue
+                    if not feasible:
+                        if gap <= 0.0 or along < 0.0 or along > length:
+                            continue
+                        if not _may_turn_to(vertices, next_vertex, previous_vertex, v, nx, ny, gap, window):
+                            continue
                     # In a re-entrant corner a vertex may be past an edge's end by what it penetrates, not round the
                     # next corner.
                     if along < 0.0 and not convex[edge] and _nearer(vertices, v, previous_vertex[edge], edge):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from geomech import dda
 from geomech.dda.contact_search import describe_contacts, find_contacts
 from geomech.dda.near_pairs import boxes, near_pairs
-from geomech.model import Blocks
+from geomech.model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
@@ -170,3 +171,44 @@ def test_corners_round_a_short_riser_do_not_overlap(window):
         partners = table[row, 2:][table[row, 2:] >= 0]
         assert (gap[partners] > -1e-12).any()
     assert (np.abs(gap) < 1e-12).sum() >= 8
+
+
+def leaning(angle: float) -> np.ndarray:
+    """A square of 1 m on its left corner at (1, 1), its base leaning by ``angle``."""
+    c, s = np.cos(angle), np.sin(angle)
+    return rectangle(0, 0, 1, 1) @ np.array([[c, s], [-s, c]]) + [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    "angle, window, met", [(0.04, 0.2, 2), (0.1, 0.2, 2), (0.2, 0.3, 2), (0.1, 0.05, 1), (0.3, 0.4, 1)]
+)
+def test_a_face_that_leans_may_turn_flat_in_the_step(angle, window, met):
+    table, geometry, _ = search([rectangle(0, 0, 4, 1), leaning(angle)], window=window)
+    assert pairs(table) == ({(4, 2), (5, 2)} if met == 2 else {(4, 2)})
+    assert geometry[-1, 3] == pytest.approx(np.sin(angle) if met == 2 else 0.0, abs=1e-14)
+
+
+def test_two_squares_that_turn_to_each_other_within_a_step_do_not_overlap():
+    corner, lean, spin = np.array([0.05, 1.0]), 0.075, 6.0
+    upper = 0.9 * (leaning(lean) - 1.0) + corner
+    system = dda.BlockSystem(
+        Blocks.from_polygons([rectangle(0, 0, 1.4, 1), upper]),
+        [Material("rock", 10e9, 0.25, density=2600.0)],
+        [JointLaw("joint", friction_angle=0.5)],
+        settings=DdaSettings(dynamic_factor=1.0, max_displacement_ratio=0.2),
+    )
+    state = State.at_rest(system.blocks)
+    for b, rate in enumerate((spin, -spin)):
+        x, y = system.blocks.vertices[4 * b : 4 * b + 4].mean(axis=0) - corner
+        state.velocity[b, :3] = -rate * y, rate * x, rate  # both about the corner that touches
+    energy = np.inf
+    for _ in range(3):
+        result = system.step(state, Loads(), 1e-2)
+        state = result.state
+        base = state.vertices[[2, 3, 5]]
+        (tx, ty), (x, y) = base[1] - base[0], base[2] - base[0]
+        assert tx * y - ty * x < 1e-4  # the corner that comes down is outside the lower one's top
+        assert result.statistics["worst_penetration"] < 1e-4
+        after = sum(result.statistics[name] for name in ("kinetic_energy", "elastic_energy", "contact_energy"))
+        assert after < energy * (1 + 1e-9)
+        energy = after
