@@ -17,9 +17,11 @@ MAY_IMPORT = {
     "conventions": BASE,
     "reference": BASE,
     "model": BASE,
-    "dda": BASE,
-    "ddm": BASE,
-    "coupling": BASE | {"dda", "ddm"},
+    # How kernels are kept between runs: the solvers' own.
+    "compiled": set(),
+    "dda": BASE | {"compiled"},
+    "ddm": BASE | {"compiled"},
+    "coupling": BASE | {"compiled", "dda", "ddm"},
     "shapes": BASE - {"reference"},
     "scene": BASE - {"reference"} | {"shapes"},
     # Output and pictures take records; they know nothing of how they were solved.
@@ -51,7 +53,7 @@ ONLY_IN = {
     "imageio": {"render"},
     "pydantic": {"scene"},
     "meshio": {"shapes", "output", "bench"},
-    "numba": {"dda", "ddm", "coupling"},
+    "numba": {"compiled", "dda", "ddm", "coupling"},
     "shapely": {"shapes", "scene", "coupling", "output", "render"},
 }
 #: Heavy ones are imported where they are used, never when a module is.

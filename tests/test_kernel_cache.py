@@ -51,7 +51,7 @@ def test_an_upgrade_of_what_a_kernel_calls_compiles_it_anew(tmp_path):
     (tmp_path / "pkg").mkdir()
     (tmp_path / "pkg" / "__init__.py").touch()
     (tmp_path / "pkg" / "above.py").write_text(
-        "from geomech.ddm.compiled import kept\nfrom .below import shifted\n"
+        "from geomech.compiled import kept\nfrom .below import shifted\n"
         "@kept(nogil=True)\ndef scaled(x):\n    return 2.0 * shifted(x)\n"
     )
     code = "from pkg.above import scaled\nprint(scaled(1.0), sum(scaled.stats.cache_hits.values()))"
@@ -76,7 +76,7 @@ def test_kernels_that_call_into_other_files_are_stamped_by_those_too():
 
     from numba.core.dispatcher import Dispatcher
 
-    from geomech.ddm.compiled import WithCalled, compiled_in
+    from geomech.compiled import WithCalled, compiled_in
 
     reaching, kernels, constants = 0, 0, set()
     for package in ("dda", "ddm", "coupling", "model"):

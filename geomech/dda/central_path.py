@@ -23,6 +23,7 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 from . import assembly, contact_states
 from .assembly import add_block, begin
@@ -83,7 +84,7 @@ def add_forces(right, block, other, order, vectors, normal, shear):
                 right[6 * i + a] += normal[c] * vectors[c, 0, at] + shear[c] * vectors[c, 1, at]
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift):
     """Fill ``data`` with the blocks' own part and contacts that answer a motion by dN = −``normal`` (n − κ t)·Δu and
     dS = −``shear`` t·Δu + ``slope`` dN."""

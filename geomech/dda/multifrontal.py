@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from ..compiled import kept
 from .blas_threads import blas_threads
 from .dissection import Tree, plan
 from .fronts import backward, eliminate, forward, working_space
@@ -24,7 +25,7 @@ _jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 THREADED, THREADED_SOLUTION = 500, 4000
 
 
-@_jit
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _eliminate_shared(
     claimed,
     awaited,
@@ -78,7 +79,7 @@ def _mark_above(touched, parent):
             touched[parent[f]] = True
 
 
-@_jit
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _substitute_shared(
     claimed,
     awaited,

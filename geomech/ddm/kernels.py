@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiled import kept
+from ..compiled import kept
 from .lanes import (
     WIDTH,
     angle,

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..compiled import kept
 from ..model.polygon import signed_area
-from .compiled import kept
 
 _jit = kept(error_model="numpy", nogil=True)
 
