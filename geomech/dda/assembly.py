@@ -153,7 +153,7 @@ def begin(data, matrix, stride, diagonal):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True, inline="always")
-def add_block(lines, first, step, push, drag, pull, across, mine, its):
+def _add_block(lines, first, step, push, drag, pull, across, mine, its):
     """Add the 6 × 6 of ``push`` ⊗ ``pull`` + ``drag`` ⊗ ``across`` (12,) whose rows begin at ``mine`` and columns at
     ``its`` to every ``step``-th of the ``lines`` of `begin`. (Written out and inlined: two thirds of the time of
     loops.)"""
@@ -168,6 +168,19 @@ def add_block(lines, first, step, push, drag, pull, across, mine, its):
         lines[line, 3] += p * u3 + d * t3
         lines[line, 4] += p * u4 + d * t4
         lines[line, 5] += p * u5 + d * t5
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True, inline="always")
+def add_contact(lines, i, j, diagonal, stride, upper, lower, push, drag, pull, across):
+    """Add what a contact of the blocks with unknowns ``i`` and ``j`` (−1: none) does to the ``lines`` of `begin`, as
+    `_add_block`; ``upper`` and ``lower`` are where the blocks that couple them begin."""
+    if i >= 0:
+        _add_block(lines, diagonal[i] // 6, stride[i] // 6, push, drag, pull, across, 0, 0)
+    if j >= 0:
+        _add_block(lines, diagonal[j] // 6, stride[j] // 6, push, drag, pull, across, 6, 6)
+    if i >= 0 and j >= 0:
+        _add_block(lines, upper // 6, stride[i] // 6, push, drag, pull, across, 0, 6)
+        _add_block(lines, lower // 6, stride[j] // 6, push, drag, pull, across, 6, 0)
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -224,13 +237,7 @@ def assemble_contacts(
             if k >= 0:
                 right[6 * k + a % 6] += given * t - pressed * push[a]
             push[a] *= kn
-        if i >= 0:
-            add_block(lines, diagonal[i] // 6, stride[i] // 6, push, drag, pull, across, 0, 0)
-        if j >= 0:
-            add_block(lines, diagonal[j] // 6, stride[j] // 6, push, drag, pull, across, 6, 6)
-        if i >= 0 and j >= 0:
-            add_block(lines, upper[c] // 6, stride[i] // 6, push, drag, pull, across, 0, 6)
-            add_block(lines, lower[c] // 6, stride[j] // 6, push, drag, pull, across, 6, 0)
+        add_contact(lines, i, j, diagonal, stride, upper[c], lower[c], push, drag, pull, across)
     return symmetric
 
 

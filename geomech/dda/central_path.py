@@ -26,7 +26,7 @@ from numba import njit
 from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 from . import assembly, contact_states
-from .assembly import add_block, begin
+from .assembly import add_contact, begin
 from .contact_springs import Springs
 from .contacts import ContactSet
 
@@ -97,13 +97,7 @@ def assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, 
             push[a], drag[a] = kn * (n + friction * t), ks * t
             pull[a], across[a] = n - rise * t, t
         i, j = order[block[c]], order[other[c]]
-        if i >= 0:
-            add_block(lines, diagonal[i] // 6, stride[i] // 6, push, drag, pull, across, 0, 0)
-        if j >= 0:
-            add_block(lines, diagonal[j] // 6, stride[j] // 6, push, drag, pull, across, 6, 6)
-        if i >= 0 and j >= 0:
-            add_block(lines, upper[c] // 6, stride[i] // 6, push, drag, pull, across, 0, 6)
-            add_block(lines, lower[c] // 6, stride[j] // 6, push, drag, pull, across, 6, 0)
+        add_contact(lines, i, j, diagonal, stride, upper[c], lower[c], push, drag, pull, across)
 
 
 def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
