@@ -147,7 +147,7 @@ def _told_end(folder: Path) -> str | None:
 
 def _refuse_finished(end: str, changes: Mapping[str, Any], header: Mapping[str, Any], scene: Any) -> None:
     """Unless what ended the run has been changed so that it goes on."""
-    if scene is None or end == "collapse":
+    if scene is None or end in ("collapse", "out of sight"):
         raise Finished(f"the run has ended ({end}): there is nothing to go on with")
     settings = scene.problem().run
     if end == "end of the scene":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +28,7 @@ def born_first(
 def bear_in_blocks(
     cracks: Cracks,
     blocks: Blocks,
+    limits: Callable[[int], list[np.ndarray]],
     materials: Sequence[Material],
     solutions: dict,
     settings: GrowthSettings,
@@ -35,7 +36,7 @@ def bear_in_blocks(
     enough: float = 1.0,
 ):
     """``cracks`` with those that are born in the most overstressed block, as a `Growth`, and the births; (None, ())
-    when no block is strained to ``enough`` times its strength. One block at a time: the others then carry other
+    when no block is strained to ``enough`` times its strength; ``limits(block)``: loops about its rock. One block at a time: the others then carry other
     loads."""
     from ..ddm.growth import Growth
     from ..ddm.initiation import bear
@@ -47,4 +48,4 @@ def bear_in_blocks(
     of_block = np.flatnonzero(cracks.block == where)
     best = [replace(birth, segment=int(of_block[birth.segment])) if birth.segment >= 0 else birth for birth in best]
     grown = np.zeros(sum(len(solution.tips) for solution in solutions.values()))
-    return Growth(bear(cracks, blocks.loops, best, cycle, where), grown, ()), best
+    return Growth(bear(cracks, limits, best, cycle, where), grown, ()), best

@@ -28,9 +28,11 @@ def elastic_bodies(
     whatever has not is reused; the rest is made side by side. ``works``: the counts of what was done, of bodies without
     an earlier one new ones at the end.
     """
-    cracked = np.arange(blocks.n_blocks) if problem.growth.initiation else np.unique(cracks.block)
+    every = problem.growth.initiation or problem.endless is not None
+    cracked = np.arange(blocks.n_blocks) if every else np.unique(cracks.block)
     rigid = np.array([m.rigid for m in problem.materials], bool)
-    cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
+    if problem.endless is None:
+        cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
     if removed is not None:
         cracked = cracked[~removed[cracked]]
     if not len(cracked):
@@ -48,7 +50,7 @@ def elastic_bodies(
         work = works[-1] if old is None else old.work
         if not problem.run.skip:
             old = None
-        bodies[b] = None if old is None else old.found_again(blocks.loops(b), own, material)
+        bodies[b] = None if old is None else old.found_again(_loops(problem, blocks, b), own, material)
         if bodies[b] is not None:
             work.bodies_kept += 1
             continue
@@ -56,12 +58,26 @@ def elastic_bodies(
 
     def made(of: tuple) -> Body:
         b, own, material, old, work = of
+        surface = None if problem.endless is None else problem.endless.surface
         return ddm.Body(
-            blocks.loops(b), own, material, problem.ddm, previous=old, face_laws=problem.face_laws, work=work
+            [] if problem.endless is not None else blocks.loops(b),
+            own,
+            material,
+            problem.ddm,
+            previous=old,
+            holes=[] if problem.endless is None else _loops(problem, blocks, b),
+            face_laws=problem.face_laws,
+            work=work,
+            half_plane=None if surface is None else ddm.HalfPlane(*surface),
         )
 
     bodies.update(zip([of[0] for of in to_make], side_by_side(made, to_make)))
     return bodies, nodes_of
+
+
+def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:
+    """The loops that bound the rock of ``block``: of rock without an end its holes."""
+    return blocks.loops(block) if problem.endless is None else blocks.loops(block)[1:]
 
 
 def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:

@@ -67,6 +67,11 @@ class CrackedBlocks:
             self._motion = state, Motion.of(self.blocks, state.vertices)
         return self._motion[1]
 
+    def limits(self, block: int) -> list[np.ndarray]:
+        """Loops about the rock that cracks of ``block`` may grow in; of rock without an end those about what is not
+        rock."""
+        return self.blocks.loops(block) if self.problem.endless is None else self.bodies[block].limits
+
     # -- the elastic bodies --------------------------------------------------------------------------------------------
 
     def take_cracks(self, cracks: Cracks) -> None:

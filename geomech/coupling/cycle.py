@@ -24,6 +24,7 @@ from .balance import Balance, balanced
 from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .elastic_range import ElasticRange
+from .endless import endless_pass, out_of_sight
 from .event_steps import SETTLED, TOGETHER, EventSteps
 from .first_change import FirstChange
 from .growing import births, growth_of_tips, initiations, part_here, take_growth
@@ -73,6 +74,8 @@ class Coupling:
             self.now = CrackedBlocks(problem)
         self.length = dda.StepLength(problem.dda)
         self.static = problem.dda.dynamic_factor == 0.0
+        if problem.endless is not None and (not self.static or problem.dda.equilibrium):
+            raise ValueError('rock without an end is for static runs: dynamic_factor = 0 and equilibrium ""')
         self.events: EventSteps | None = None
         if problem.run.stepping == "events":
             if not self.static or problem.dda.equilibrium == "loads":
@@ -139,7 +142,7 @@ class Coupling:
 
     def _load_step(self):
         """All passes at one load. Returns True when a stop event happened."""
-        now, growing = self.now, self.problem.growth
+        now, growing, endless = self.now, self.problem.growth, self.problem.endless is not None
         static = self.static
         # Near enough to the toughness to grow, and to grow with another.
         enough, together = (1.0, 1.0) if self.events is None else (1.0 - SETTLED, 1.0 - TOGETHER)
@@ -161,12 +164,16 @@ class Coupling:
                 return True
         for growth_pass in range(begun.next_pass, growing.max_passes + 1):
             now.number += 1
+            if endless and not now.bodies:
+                # Cracks have cut a piece off, which nothing holds.
+                yield self._still(pending, growth_pass)
+                return True
             try:
                 if self.events is not None and growth_pass == 0:
                     found = self.events.first_pass(now, self.problem.run.end_time)
                     dt = found.result.dt
                 else:
-                    found = balanced(now, dt, load_time) if until is None else self._until(until)
+                    found = self._pass(dt, load_time) if until is None else self._until(until)
             except dda.NotConverged as failure:
                 if not (stops or self._stops(pending)):
                     raise
@@ -176,7 +183,7 @@ class Coupling:
                 yield self._still(pending, growth_pass)
                 return True
             result, solutions = found.result, found.solutions
-            if now.bodies:
+            if now.bodies and not endless:
                 strain = self.range.check(now.motion(result.state), now.blocks, result.state.time)
                 self.balance.check(now.loads, now.blocks, strain, result.state.time)
             if static:
@@ -194,6 +201,9 @@ class Coupling:
             if may_grow and not stops:
                 longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, whole, now.loads)
                 growth = growth_of_tips(now, tips, enough, together, longest)
+            if growth is not None and endless:
+                gone = out_of_sight(now, growth, result.state)
+                growth, events, stops = None if gone else growth, events + gone, stops or bool(gone)
             if growth is None and may_grow and not stops and growing.initiation:
                 growth, born = births(now, solutions, result.state, enough)
                 events += born
@@ -209,7 +219,7 @@ class Coupling:
                 events += initiations(now, tips, result.state)
                 stops = self._stops(events)
             # Blocks part where the pass has left them, in equilibrium with what their faces bear.
-            parts = part_here(now, growth, result.state)
+            parts = not endless and part_here(now, growth, result.state)
             ends = growth is None or self.follows or (parts and not static)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed
@@ -219,7 +229,7 @@ class Coupling:
             if abs(gone_by - result.dt) > 1e-9 * result.dt:
                 # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
                 statistics["dt"] = gone_by
-            if now.bodies:
+            if now.bodies and not endless:
                 now.crack_energy.passed(tips, now.blocks, now.problem.materials, now.hanging)
                 if ends or parts:
                     now.crack_energy.after(now.state, result.state, now.blocks, now.felt(), now.hanging)
@@ -254,6 +264,9 @@ class Coupling:
             self.between()
         raise AssertionError("unreachable: the last pass takes no growth")
 
+    def _pass(self, dt: float, load_time: float | None) -> Balance:
+        return (balanced if self.problem.endless is None else endless_pass)(self.now, dt, load_time)
+
     def _until(self, until: float) -> Balance:
         """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of
         that time: where the blocks now need shorter steps, it takes as many as lead there, and all but the last are
@@ -282,7 +295,9 @@ class Coupling:
         return record(self.now, self.now.state, np.empty(0, TIP), {}, events, growth_pass, {})
 
     def _stops(self, events: tuple[Event, ...]) -> bool:
-        return any(event.kind in self.problem.run.stop_at for event in events)
+        # What a split leaves of rock without an end nothing holds.
+        ends = ("split",) if self.problem.endless is not None else ()
+        return any(event.kind in (*self.problem.run.stop_at, *ends) for event in events)
 
 
 def _go_on() -> None:

@@ -23,6 +23,7 @@ from ..model import History, Loads, Problem
 from .balance import Balance, balanced
 from .cracked_blocks import CrackedBlocks
 from .crossing import Crossing
+from .endless import endless_pass
 from .first_change import FOUND, FirstChange
 from .growing import drive
 
@@ -50,6 +51,8 @@ class EventSteps:
 
     def __init__(self, problem: Problem) -> None:
         run, histories = problem.run, _histories(problem.loads)
+        if problem.endless is not None:
+            histories += problem.endless.histories
         self.time_step, self.follows = problem.dda.time_step, run.control == "toughness"
         self._corners = np.unique(np.concatenate([np.asarray(h.times, dtype=float) for h in histories]))
         # Between the corners of piecewise linear histories a step may take any length; within a sinusoid it may not.
@@ -166,7 +169,8 @@ class EventSteps:
     def _solve(self, now: CrackedBlocks, time: float, free: bool = False) -> Balance:
         way = time - now.state.time
         # The length of a static step is no more than its inertia: short ones would hold the blocks back.
-        found = balanced(now, max(abs(way), self.time_step), None if free and way >= self.time_step else time)
+        solved = balanced if now.problem.endless is None else endless_pass
+        found = solved(now, max(abs(way), self.time_step), None if free and way >= self.time_step else time)
         way = found.result.state.time - now.state.time
         if way != 0:
             self._pace = found.result.statistics["max_displacement_ratio"] / abs(way)

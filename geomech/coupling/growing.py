@@ -10,6 +10,7 @@ from ..model import Event, State
 from .balance import Balance
 from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
+from .endless import take_endless
 from .mean_stress import rotated_mean_stress
 from .record import event
 from .split_forces import contacts_after, holds_together
@@ -37,7 +38,7 @@ def growth_of_tips(
 
     def grow():
         with now.timed("growth"):
-            return advance(now.cracks, now.blocks.loops, tips, now.problem.growth, k_ic, now.number, longest)
+            return advance(now.cracks, now.limits, tips, now.problem.growth, k_ic, now.number, longest)
 
     def look_ahead(cracks):
         nonlocal trial
@@ -75,7 +76,7 @@ def births(now: CrackedBlocks, solutions: dict, state: State, enough: float = 1.
 
     with now.timed("growth"):
         growth, born = bear_in_blocks(
-            now.cracks, now.blocks, now.problem.materials, solutions, now.problem.growth, now.number, enough
+            now.cracks, now.blocks, now.limits, now.problem.materials, solutions, now.problem.growth, now.number, enough
         )
     names = growth.cracks.names[now.cracks.n_cracks :] if growth is not None else ()
     return growth, tuple(
@@ -117,6 +118,8 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         other = f" {names[join.other_crack]}" if join.other_crack >= 0 else " the surface"
         events.append(event(now, join.kind, state, join.point, f"{names[join.crack]} meets{other}"))
     split = None
+    if now.problem.endless is not None:
+        return tuple(events) + take_endless(now, growth.cracks, state)
     if growth.joins:
         with now.timed("growth"):
             split = split_blocks(now.blocks, now.state, growth.cracks, _mean_stress(now.state, solutions))

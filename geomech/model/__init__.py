@@ -4,6 +4,7 @@ from .blocks import Blocks
 from .bolt import BOLT, GROUND, Bolt, CrossesNoJoint, grouted_bolt
 from .cracks import Cracks
 from .damping import rayleigh_coefficients
+from .endless import EndlessRock, Fluid
 from .history import History, Wave, baseline_corrected, read_record
 from .imposed_motion import UNKNOWNS, BaseMotion, BlockMotion, PointMotion
 from .in_situ import InSituStress
@@ -37,8 +38,10 @@ __all__ = [
     "DdaSettings",
     "DdmSettings",
     "EdgeTraction",
+    "EndlessRock",
     "Event",
     "Excavation",
+    "Fluid",
     "GrowthSettings",
     "History",
     "InSituStress",

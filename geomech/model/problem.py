@@ -9,6 +9,7 @@ import numpy as np
 
 from .blocks import Blocks
 from .cracks import Cracks
+from .endless import EndlessRock
 from .in_situ import InSituStress
 from .joint import JointLaw
 from .loads import Loads
@@ -174,7 +175,8 @@ class Problem:
     ``load_edge`` names the edges whose traction is the scene's leading load (normal component, positive in
     compression), or what it takes to move their block, or is `WEIGHT`; ``in_situ`` is the stress that the blocks have,
     at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose
-    approach over their distance is the axial strain.
+    approach over their distance is the axial strain. ``endless``: the only block, which is fixed, is a piece of rock
+    without an end.
     """
 
     title: str
@@ -194,6 +196,7 @@ class Problem:
     gauge: tuple[tuple[int, tuple[float, float]], tuple[int, tuple[float, float]]] | None = None
     monitors: dict[str, tuple[int, tuple[float, float]]] = field(default_factory=dict)
     origin: tuple[float, float] = (0.0, 0.0)  # world coordinates of (0, 0), m
+    endless: EndlessRock | None = None
 
     @property
     def inventory(self) -> str:

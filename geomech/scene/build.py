@@ -30,6 +30,7 @@ from .actions import actions_of, force_history, in_situ_of, profile_of, traction
 from .checks import carrier, gauge_carriers, material_of
 from .drawing import Drawing
 from .edges import contact_names, joint_names
+from .endless import endless_of
 from .errors import Check
 from .held_blocks import fixed_blocks, held_unknowns
 from .joints import joint_law
@@ -80,6 +81,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         face_laws=face_laws,
         loads=_loads(tables, check),
         in_situ=in_situ_of(tables),
+        endless=endless_of(tables, drawing),
         dda=_dda(tables),
         ddm=DdmSettings(**tables.ddm.model_dump()),
         growth=_growth(tables, cracks),

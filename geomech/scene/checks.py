@@ -357,7 +357,7 @@ def _toughness(c: Check) -> None:
         name = material_of(t, zone)
         if name in t.materials and t.materials[name].k_ic_pa_sqrt_m is None:
             needy.setdefault(name, cracks.names[k])
-        if fixed[b]:
+        if fixed[b] and not (zone in t.zones and t.zones[zone].body != "block"):
             c.warn(
                 ("zones", zone, "fixed"),
                 f"crack {cracks.names[k]!r} lies in the fixed {_block_or_zone(t, zone)}, which is not strained",

@@ -8,6 +8,7 @@ from ..model import Blocks
 from .action_checks import records_are_sound
 from .actions import force_history, traction_history
 from .checks import blocks_at, material_of
+from .endless import endless_zone
 from .errors import Check
 from .held_blocks import fixed_blocks
 from .tables import SceneTables
@@ -18,7 +19,7 @@ def check_loads(c: Check) -> None:
     if c.drawing is None or c.drawing.blocks is None:
         return
     t, blocks = c.tables, c.drawing.blocks
-    if t.zones is None or t.materials is None:
+    if t.zones is None or t.materials is None or endless_zone(t) is not None:
         return
     fixed = fixed_blocks(t, c.drawing)
     if t.loads is not None and not records_are_sound(c):

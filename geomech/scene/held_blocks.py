@@ -24,7 +24,10 @@ def holds(name: str) -> bool:
 def fixed_blocks(tables: SceneTables, drawing: Drawing) -> np.ndarray:
     """(n_blocks,) whether each block stands still."""
     zones = tables.zones or {}
-    fixed = np.array([zone in zones and zones[zone].fixed for zone in drawing.zones], dtype=bool)
+    # Rock without an end does not move either; its cracks do.
+    fixed = np.array(
+        [zone in zones and (zones[zone].fixed or zones[zone].body != "block") for zone in drawing.zones], dtype=bool
+    )
     for name in drawing.blocks.edge_names:
         if name.partition(":")[0] == FIXED:
             fixed[drawing.blocks.vertex_block[drawing.blocks.edges_named(name)]] = True

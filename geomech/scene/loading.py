@@ -16,6 +16,7 @@ from .build import build_problem
 from .checks import check
 from .drawing import Drawing, draw
 from .drawn_marks import with_marks
+from .endless import check_endless
 from .equilibrium import check_loads
 from .errors import Check, Fault, SceneError
 from .keys import describe_keys
@@ -185,6 +186,7 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
     sections = Check(tables, data, drawing, place, faults, warnings)
     check(sections)
     check_actions(sections)
+    check_endless(sections)
     check_loads(sections)
     if faults:
         raise SceneError(places.sorted(faults))

@@ -11,8 +11,10 @@ from ..model import Blocks, Cracks, History, counted
 from .actions import force_history, traction_history
 from .checks import material_of
 from .drawing import Drawing
+from .endless import rising_history
 from .held_blocks import holds
 from .tables import SceneTables
+from .tables.loads import Rising
 
 #: Longer lists are cut after so many lines.
 SHOWN = 8
@@ -67,6 +69,8 @@ def _zones(tables: SceneTables, drawing: Drawing) -> list[str]:
         text += f", {blocks} blocks" if blocks > 1 else ""
         if entry is not None and (entry.fixed or entry.guided):
             text += ", fixed" if entry.fixed else f", guided along {entry.guided}"
+        if entry is not None and entry.body != "block":
+            text += f", a piece of the {'infinite ' if entry.body == 'plane' else ''}{entry.body}"
         lines.append(text)
     return lines
 
@@ -105,6 +109,10 @@ def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
     if any(tables.loads.gravity_m_s2):
         x, y = tables.loads.gravity_m_s2
         lines.append(f"gravity ({x:g}, {y:g}) m/s²")
+    for table in tables.loads.remote:
+        lines.append("far away, [xx, yy, xy]: " + _rising(table, end))
+    for table in tables.loads.fluids:
+        lines.append(f"fluid in {' and '.join(table.fills)}: " + _rising(table, end))
     for text, count in (
         ("motions of blocks", len(tables.loads.motions)),
         ("motions of points", len(tables.loads.point_motions)),
@@ -119,6 +127,11 @@ def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
     if tables.loads.in_situ is not None:
         lines.append("in-situ stress")
     return lines or ["none"]
+
+
+def _rising(table: Rising, end: float) -> str:
+    value = ", ".join(_scaled(part, "Pa") for part in rising_history(table).at(end).tolist())
+    return value if table.value_pa is not None else f"{value} at {end:g} s"
 
 
 def _course(history: History, end: float, unit: str, sense: str) -> str:

@@ -303,6 +303,49 @@ class InSituTable(Table):
         return self
 
 
+class Rising(Table):
+    """What acts in rock without an end: exactly one of value, rate, or times with values."""
+
+    start_s: NotNegative = Field(0.0, description="the rate counts from this time, s")
+    times_s: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="times of `values_pa`, s, ascending"
+    )
+
+    @model_validator(mode="after")
+    def _one_history(self):
+        given = [self.value_pa is not None, self.rate_pa_per_s is not None]
+        table = self.values_pa is not None or self.times_s is not None
+        if sum(given) + table != 1:
+            raise ValueError("give exactly one of `value_pa`, `rate_pa_per_s`, or `times_s` with `values_pa`")
+        if table:
+            _refuse_uneven(self.times_s, self.values_pa, "values_pa")
+        if self.start_s and not given[1]:
+            raise ValueError("`start_s` belongs to `rate_pa_per_s`")
+        return self
+
+
+Stress = Annotated[tuple[Finite, Finite, Finite], Strict(False)]
+
+
+class RemoteTable(Rising):
+    value_pa: Stress | None = Field(None, description="constant stress [xx, yy, xy], Pa, tension positive")
+    rate_pa_per_s: Stress | None = Field(None, description="stress that grows from zero, [xx, yy, xy], Pa/s")
+    values_pa: Annotated[tuple[Stress, ...], Strict(False)] | None = Field(
+        None, description="stresses [[xx, yy, xy], …] at `times_s`, Pa"
+    )
+
+
+class FluidTable(Rising):
+    fills: Annotated[tuple[Literal["cracks", "holes"], ...], Strict(False), Field(min_length=1)] = Field(
+        ("cracks",), description='"cracks", those that grow with them, "holes", or both'
+    )
+    value_pa: Finite | None = Field(None, description="constant pressure, Pa")
+    rate_pa_per_s: Finite | None = Field(None, description="pressure that grows from zero, Pa/s")
+    values_pa: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
+        None, description="pressures at `times_s`, Pa"
+    )
+
+
 class LoadsTable(Table):
     gravity_m_s2: Pair = Field((0.0, 0.0), description="acceleration of gravity [x, y], m/s²")
     gravity_ramp_s: NotNegative = Field(0.0, description="gravity grows linearly to its value over this time, s")
@@ -330,6 +373,15 @@ class LoadsTable(Table):
     )
     in_situ: InSituTable | None = Field(
         None, description="stress of the rock before the run; displacements count from its equilibrium"
+    )
+
+    remote: Annotated[tuple[RemoteTable, ...], Strict(False)] = Field(
+        (),
+        description='stresses far away in rock without an end (zones.NAME.body = "plane" or "half-plane"); they add up',
+    )
+    fluids: Annotated[tuple[FluidTable, ...], Strict(False)] = Field(
+        (),
+        description="pressures of fluids in the cracks and holes of such rock; they add up and, where there are any, lead",
     )
 
     @property

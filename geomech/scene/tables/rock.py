@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, field_validator
+from pydantic import Field, Strict, field_validator, model_validator
 
 from .entries import Names, NotNegative, Positive, Table
 
@@ -42,6 +42,22 @@ class ZoneTable(Table):
         None,
         description='"x" or "y": its blocks move along that axis only and neither turn nor shear, as a press\'s platen',
     )
+    body: Literal["block", "plane", "half-plane"] = Field(
+        "block",
+        description='"plane" or "half-plane": rock without an end, of which the zone is the piece that is seen; its holes are '
+        "holes, its outline nothing but the edges called `surface` (cracks alone, loaded by loads.remote and loads.fluids)",
+    )
+    surface: str | None = Field(None, description='name of the edges on the straight free surface of a "half-plane"')
+
+    @model_validator(mode="after")
+    def _one_surface(self):
+        if self.body == "half-plane" and self.surface is None:
+            raise ValueError('a "half-plane" needs `surface`, the name of the edges on its free surface')
+        if self.body != "half-plane" and self.surface is not None:
+            raise ValueError('`surface` belongs to body = "half-plane"')
+        if self.body != "block" and (self.fixed or self.guided is not None):
+            raise ValueError(f'rock without an end (body = "{self.body}") is neither `fixed` nor `guided`')
+        return self
 
 
 class JointTable(Table):
