@@ -22,6 +22,7 @@ FAMILIES = {
 #: Beginnings of variants' names that vary one setting → what it is called; the setting stands behind the first "_".
 LADDERS = {
     "increment": "increment, mm",
+    "approach": "increments to what is left (0: they do not shorten)",
     "order": "order of the elements",
     "step": "time step, s (0: to the events themselves)",
 }
@@ -139,7 +140,7 @@ def whole_runs(runs: Mapping[str, Watch]) -> list[Part]:
 def _came_to(run: Watch, base: Watch | None) -> list:
     """Loads, slope of the line (degrees from the horizontal), largest way from ``base``'s path, how it ended."""
     cells: list = [f"{run.load(kind) / MPA:.2f}" if np.isfinite(run.load(kind)) else None for kind in _KINDS]
-    angle = coalescence_angle_deg(run.last.cracks)
+    angle = coalescence_angle_deg(run.cracks)
     away = apart(run, base) if base is not None and base is not run else np.nan
     return [
         *cells,
@@ -155,7 +156,7 @@ _KINDS = ("initiation", "coalescence")
 def apart(run: Watch, other: Watch) -> float:
     """Largest distance, m, of a grown node of ``run`` from the cracks of ``other``, of those that lie beside them: what
     is beyond a tip is longer, not elsewhere. nan where there are none."""
-    cracks, against = run.last.cracks, other.last.cracks
+    cracks, against = run.cracks, other.cracks
     nodes = cracks.nodes[np.unique(cracks.segments[cracks.birth_cycle > 0])]
     if not len(nodes):
         return np.nan
@@ -183,7 +184,7 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
     rows: list[list] = []
     for phi, of_value in rungs.items():
         # From coarse to fine.
-        values = sorted(of_value, reverse=which != "order")
+        values = sorted(of_value, reverse=which in ("increment", "step"))
         finest = of_value[values[-1]]
         for value in values:
             run = of_value[value]
@@ -206,7 +207,7 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
     headers += ["paths apart, mm", "joined, MPa", "off, %", "computed in, s"]
     note = (
         "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is "
-        "so long; increments run to coalescence, the others to 200 MPa. Paths apart: largest distance of a grown point "
+        "so long; increments, and how they shorten, run to coalescence, the others to 200 MPa. Paths apart: largest distance of a grown point "
         "from the finest one's cracks."
     )
     return Part(f"Convergence: {told.split(',')[0].split(' (')[0]}", headers, rows, [note])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
+from whole_network import whole_network
 
 from geomech.model import Cracks, Cycle, Problem
 from geomech.reference import two_cracks as published
@@ -19,12 +20,13 @@ MPA = 1e6
 @dataclass
 class Watch:
     """Observer that keeps what the comparison needs: the angle between the cracks, the first cycle of growth, the last
-    cycle, all events, and the curve of strain and load (Pa). φ, degrees, is read off the geometry, so a variant may be
-    called what you like."""
+    cycle, the ``cracks`` then (those too that the rock has been cut along), all events, and the curve of strain and
+    load (Pa). φ, degrees, is read off the geometry, so a variant may be called what you like."""
 
     phi: int = 0
     first_growth: Cycle | None = None
     last: Cycle | None = None
+    cracks: Cracks | None = None
     events: tuple = ()
     end: str = ""
     strains: dict[str, float] = field(default_factory=dict)  # of the first event of every kind
@@ -36,7 +38,7 @@ class Watch:
     _grown: float = 0.0
 
     def on_start(self, problem: Problem, folder) -> None:
-        cracks = problem.cracks
+        self.cracks = cracks = problem.cracks
         along = np.diff(cracks.nodes[cracks.segments], axis=1)[:, 0]
         angle = np.degrees(np.arctan2(along[:, 1], along[:, 0]))
         self.phi = round(float(angle[cracks.crack == 1][0] - angle[cracks.crack == 0][0])) % 180
@@ -44,7 +46,7 @@ class Watch:
     def on_cycle(self, cycle: Cycle) -> None:
         if self.first_growth is None and cycle.tips.size and cycle.tips["grown"].any():
             self.first_growth = cycle
-        self.last = cycle
+        self.last, self.cracks = cycle, whole_network(cycle, self.cracks)
         self.events += cycle.events
         upper = cycle.tips[(cycle.tips["crack"] == 0) & (cycle.tips["end"] == 1)]
         if len(upper) and upper["grown"][0] > 0:
@@ -97,7 +99,7 @@ def coalescence_angle_deg(cracks: Cracks) -> float:
 def coalescence_line_deg(run: Watch) -> float:
     """`coalescence_angle_deg` of a run as Table 3 has it: φ = 90 was published with the axes exchanged, from the
     vertical."""
-    angle = coalescence_angle_deg(run.last.cracks)
+    angle = coalescence_angle_deg(run.cracks)
     if run.phi == 90 and np.isfinite(angle):
         angle = (90 - angle) if angle > 0 else (-90 - angle)
     return angle
@@ -142,7 +144,7 @@ def _loads(runs: dict[int, Watch]) -> Part:
             )
         strength = run.load("coalescence") / published.UNIAXIAL_STRENGTH
         strains = [1e3 * run.strains[kind] if kind in run.strains else None for kind in ("initiation", "coalescence")]
-        ended = f"{run.end} at {run.last.load / MPA:.1f} MPa, cracks {1e3 * run.last.cracks.lengths.sum():.1f} mm long"
+        ended = f"{run.end} at {run.last.load / MPA:.1f} MPa, cracks {1e3 * run.cracks.lengths.sum():.1f} mm long"
         rows.append([*row, f"{strength:.2f}" if np.isfinite(strength) else None, *strains, ended])
     after = []
     for kind, table in (
@@ -155,9 +157,11 @@ def _loads(runs: dict[int, Watch]) -> Part:
     headers += ["strain then, 10⁻³", "at coalescence, 10⁻³", "how the run ended"]
     after.append(
         "Coalescence: the inner wings run towards each other and tips join what is nearer than 1 mm. With finer "
-        "increments the load tends to 218, 351, about 340 and 227 MPa (φ = 0, 30, 60, 90); at φ = 0 and 30 growth is "
-        "unstable there, and any join length from 1 to 2 mm gives the same. Increments of 1 mm miss the peaks between "
-        "them, by 3 to 10 %: see convergence."
+        "increments the load of open slots tends to 218.7, 354.5, 341 and 227.9 MPa (φ = 0, 30, 60, 90), less than 1 % "
+        "from what increments of 1 mm find that shorten near the other crack, to a sixteenth of what is left; those "
+        "that do not miss the peaks between them, by 4 to 10 %: see convergence. At φ = 0 and 30 growth is unstable "
+        "there, and any join length from 1 to 2 mm gives the same. At φ = 0 both inner tips arrive at once, and cut a "
+        "splinter off between them."
     )
     after.append("σ_F is taken as the stress of coalescence. The paper prints no numbers with Figures 16 and 17.")
     return Part("Loads and strains (Figures 15, 16, 17)", headers, rows, after=after)
@@ -192,10 +196,12 @@ def _lines(runs: dict[int, Watch]) -> Part:
         row = [phi, "not joined" if np.isnan(angle) else f"{round(angle, 2) + 0.0:.2f}"]
         known = phi in published.PHI_DEG
         row += [f"{published.TIP_TO_TIP_ANGLE_DEG[phi]:.1f}" if known else None]
-        rows.append([*row, *(f"{table[phi]:.2f}" if known else None for table in sources.values())])
+        row += [f"{table[phi]:.2f}" if known else None for table in sources.values()]
+        off = angle - published.COALESCENCE_ANGLE_DEG["experiment"][phi] if known else np.nan
+        rows.append([*row, f"{off:+.2f}" if np.isfinite(off) else None])
     return Part(
         "Line of coalescence (Table 3)",
-        ["φ", "computed", "tip to tip", *sources],
+        ["φ", "computed", "tip to tip", *sources, "off the experiment"],
         rows,
         ["Slopes in degrees from the horizontal, φ = 90 from the vertical, as it was published."],
     )

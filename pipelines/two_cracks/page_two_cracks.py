@@ -103,7 +103,7 @@ def _pair(run: Watch) -> str:
 
 
 def _paths(runs: Mapping[str, Watch], path: Path) -> Path:
-    return crack_paths({f"φ = {phi}°": {"": run.last.cracks} for phi, run in by_angle(runs).items()}, path)
+    return crack_paths({f"φ = {phi}°": {"": run.cracks} for phi, run in by_angle(runs).items()}, path)
 
 
 def _figures(by_phi: Mapping[int, Watch], drawings: Path) -> list[tuple[Path, str]]:
@@ -172,7 +172,7 @@ def _compared_paths(runs: Mapping[str, Watch]) -> dict[str, dict]:
         members = own(runs) if not which else of_family(runs, which)
         for run in members.values():
             if run.last is not None:
-                panels.setdefault(f"φ = {run.phi}°", {})[told] = run.last.cracks
+                panels.setdefault(f"φ = {run.phi}°", {})[told] = run.cracks
     return panels
 
 
@@ -183,5 +183,5 @@ def _rungs(runs: Mapping[str, Watch]) -> dict[str, dict]:
         which = family(name)
         if which in LADDERS and run.last is not None:
             rung = f"{LADDERS[which].split(' (')[0]} {name.split('_')[1].replace('p', '.')}"
-            panels.setdefault(f"{LADDERS[which].split(',')[0]}, φ = {run.phi}°", {})[rung] = run.last.cracks
+            panels.setdefault(f"{LADDERS[which].split(',')[0]}, φ = {run.phi}°", {})[rung] = run.cracks
     return panels

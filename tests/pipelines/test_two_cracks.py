@@ -64,12 +64,11 @@ def expected_initiation(phi: int) -> float:
 
 
 def coalesced(run: SimpleNamespace) -> bool:
-    """Whether the run ended because crack 1 and crack 2 met."""
-    events = run.watch.last.events
-    if not events:
-        return False
-    last = events[-1]
-    return last.kind == "coalescence" and {"crack1", "crack2"} <= set(last.detail.split())
+    """Whether the run ended because crack 1 and crack 2 met, and nothing but what that cut off."""
+    joins = [event for event in run.watch.last.events if event.kind != "split"]
+    return bool(joins) and all(
+        event.kind == "coalescence" and {"crack1", "crack2"} <= set(event.detail.split()) for event in joins
+    )
 
 
 @pytest.mark.parametrize("phi", [0, 90])
@@ -89,15 +88,25 @@ def test_initiation_at_the_load_that_the_factors_give(specimens, phi):
     assert load == pytest.approx(expected_initiation(phi), rel=2e-4)
 
 
+#: Loads of coalescence, MPa, by increments of 0.25 mm that shorten to 0.1 mm near the other crack.
+LIMITS = {0: 218.68, 30: 354.54, 60: 341.0, 90: 227.85}
+
+
+@pytest.mark.parametrize("phi", [0, 90])
+def test_coalescence_at_the_load_that_finer_increments_tend_to(specimens, phi):
+    """By increments of 1 mm that shorten as cracks near one another; plain ones are 3.6 and 5 % low."""
+    assert specimens[f"phi_{phi}"].watch.load("coalescence") / 1e6 == pytest.approx(LIMITS[phi], rel=0.01)
+
+
 def test_coalescence_line_of_phi_90_is_vertical(specimens):
     """The specimen is its own mirror image: tip stands above tip. The experiment has 1.02 degrees, the published
     computation 0.25 from the vertical."""
-    assert abs(abs(coalescence_angle_deg(specimens["phi_90"].watch.last.cracks)) - 90) < 1.0
+    assert abs(abs(coalescence_angle_deg(specimens["phi_90"].watch.cracks)) - 90) < 1.0
 
 
 def test_coalescence_line_of_phi_0(specimens):
     """The experiment's -66.01 degrees to 5, as its own line was read off a picture."""
-    found = coalescence_angle_deg(specimens["phi_0"].watch.last.cracks)
+    found = coalescence_angle_deg(specimens["phi_0"].watch.cracks)
     assert found == pytest.approx(published.COALESCENCE_ANGLE_DEG["experiment"][0], abs=5.0)
 
 
@@ -107,10 +116,22 @@ def test_coalescence_line_of_phi_0(specimens):
 def test_growth_is_symmetric(specimens, phi, image):
     """φ = 0 under half a turn, φ = 90 under a mirror across. Every grown node has its image within a tenth of an
     increment: which of two images joins the other first is not symmetric."""
-    nodes = specimens[f"phi_{phi}"].watch.last.cracks.nodes
+    nodes = specimens[f"phi_{phi}"].watch.cracks.nodes
     apart = np.hypot(*(nodes[:, None] @ np.array(image, dtype=float) - nodes[None]).transpose(2, 0, 1)).min(axis=1)
     assert (apart < 1e-4).all()
     assert len(nodes) > 25  # 4 are those of the flaws
+
+
+@pytest.mark.parametrize("phi", [0, 90])
+def test_no_crack_is_lost_where_the_rock_is_cut(specimens, phi):
+    """Two slots of 10 mm, and the metres that tips.csv says tips have grown. With φ = 0 wings close a ring, whose
+    segments are faces of blocks then; each part of a wing keeps the cycle it grew in."""
+    run = specimens[f"phi_{phi}"]
+    cracks, tips = run.watch.cracks, run.files.tips
+    assert cracks.lengths.sum() == pytest.approx(0.02 + tips["grown_m"].sum(), rel=1e-9)
+    assert cracks.lengths[cracks.birth_cycle == 0].sum() == pytest.approx(0.02, rel=1e-9)
+    assert (run.watch.last.cracks.n_segments < cracks.n_segments) == (phi == 0)
+    assert set(cracks.birth_cycle[cracks.birth_cycle > 0]) == set(tips["cycle"][tips["grown_m"] > 0].astype(int))
 
 
 def test_files_are_read_by_pyvista_and_meshio(specimens):
@@ -169,9 +190,7 @@ def test_every_variant_is_the_study_or_known_to_vary_it():
 def test_paths_lie_apart_by_what_one_is_moved(specimens):
     watch = specimens["phi_0"].watch
     assert apart(watch, watch) == pytest.approx(0.0, abs=1e-15)
-    moved = Watch(
-        last=replace(watch.last, cracks=replace(watch.last.cracks, nodes=watch.last.cracks.nodes + [1e-4, 0.0]))
-    )
+    moved = Watch(cracks=replace(watch.cracks, nodes=watch.cracks.nodes + [1e-4, 0.0]))
     assert 5e-5 < apart(moved, watch) <= 1e-4 * (1 + 1e-9)
 
 
@@ -185,7 +204,12 @@ def test_the_load_of_coalescence_has_a_limit(phi, limit, coarse, fine):
     def joined(increment: float, length: float) -> float:
         scene = load_scene(
             FOLDER,
-            [f"geometry.parameters.phi_deg={phi}", f"growth.increment_m={increment}", f"growth.join_length_m={length}"],
+            [
+                f"geometry.parameters.phi_deg={phi}",
+                "growth.approach_steps=0",
+                f"growth.increment_m={increment}",
+                f"growth.join_length_m={length}",
+            ],
         )
         events = [event for cycle in cycles(scene) for event in cycle.events]
         return next(event.load for event in events if event.kind == "coalescence") / 1e6
@@ -197,17 +221,6 @@ def test_the_load_of_coalescence_has_a_limit(phi, limit, coarse, fine):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("phi", "limit"), [(0, 218.68), (30, 354.54), (60, 341.0), (90, 227.85)])
-def test_shorter_steps_near_the_other_crack_give_that_load_at_once(phi, limit):
-    """Increments of 1 mm that shorten as cracks near one another: within 1 % of the limit (MPa, of 0.25 mm that shorten
-    to 0.1 mm), where plain ones are 3.6 to 10 % low."""
-    wishes = [f"geometry.parameters.phi_deg={phi}", "growth.approach_steps=16"]
-    events = [event for cycle in cycles(load_scene(FOLDER, wishes)) for event in cycle.events]
-    found = next(event.load for event in events if event.kind == "coalescence") / 1e6
-    assert found == pytest.approx(limit, rel=0.01)
-
-
-@pytest.mark.slow
 def test_all_four_as_published(tmp_path):
     """The study as it stands. Of what is published, in kind: specimens with φ = 30 and 60 need more to coalesce than
     those with 0 and 90 (KB 2023, Figure 16). In numbers: the lines of coalescence of 0 and 90."""
@@ -215,9 +228,10 @@ def test_all_four_as_published(tmp_path):
     assert coalesced(runs["phi_0"])
     assert coalesced(runs["phi_90"])
     loads = {phi: runs[f"phi_{phi}"].watch.load("coalescence") for phi in published.PHI_DEG}
-    assert np.nanmin([loads[30], loads[60], np.inf]) > max(loads[0], loads[90])
+    assert min(loads[30], loads[60]) > max(loads[0], loads[90])
+    assert {phi: load / 1e6 for phi, load in loads.items()} == pytest.approx(LIMITS, rel=0.01)
     for phi in (0, 90):
         assert runs[f"phi_{phi}"].watch.load("initiation") == pytest.approx(expected_initiation(phi), rel=2e-4)
-    assert abs(abs(coalescence_angle_deg(runs["phi_90"].watch.last.cracks)) - 90) < 1.0
-    found = coalescence_angle_deg(runs["phi_0"].watch.last.cracks)
+    assert abs(abs(coalescence_angle_deg(runs["phi_90"].watch.cracks)) - 90) < 1.0
+    found = coalescence_angle_deg(runs["phi_0"].watch.cracks)
     assert found == pytest.approx(published.COALESCENCE_ANGLE_DEG["experiment"][0], abs=5.0)
