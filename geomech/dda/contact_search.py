@@ -3,8 +3,8 @@
 A vertex meets the interior of an edge when its corner points away from the edge. Where two corners meet, the lines
 through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
 entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
-within the other's edge; where each lies within the other's, the two corners are the ends of a short common face, and
-both stand for the line. Corners meet only if neither is nearer to a neighbour of the other: on outlines with edges
+within the other's edge, or where they lean to each other by the one whose own face leans away; where each lies within
+the other's, the two corners are the ends of a short common face, and both stand for the line. Corners meet only if neither is nearer to a neighbour of the other: on outlines with edges
 shorter than the window, as cracks leave them, all are in reach of all, and the lines of far ones are crossed by blocks
 that do not touch. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
 smaller penetration carries the contact; each is stored as the other's *partner*.
@@ -24,6 +24,8 @@ _ANGLE = 0.05
 _TURN = 0.25
 # Two entrance lines nearer in direction than this are the same line.
 _PARALLEL = 0.0025
+# Of two corners on one line the one that the other's face does not lean past, by more than this (sine), stands for it.
+_LEAN = 0.01
 # Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
 _ENDS = 1e-4
 # Corners are nearer to one than to another when their distances squared differ by more than this part.
@@ -41,17 +43,18 @@ def _dot_to(vertices, origin, target, nx, ny):
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _against(vertices, next_vertex, previous_vertex, vertex, edge):
-    """Vertex against edge: (may touch, outward normal x, y, gap, distance along, length)."""
+    """Vertex against edge: (by how much its neighbours point away from the edge, as a sine, outward normal x, y, gap,
+    distance along, length)."""
     a, b = edge, next_vertex[edge]
     dx, dy = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1]
     length = np.sqrt(dx * dx + dy * dy)
     tx, ty = dx / length, dy / length
     px, py = vertices[vertex, 0] - vertices[a, 0], vertices[vertex, 1] - vertices[a, 1]
-    feasible = (
-        _dot_to(vertices, vertex, next_vertex[vertex], ty, -tx) >= -_ANGLE
-        and _dot_to(vertices, vertex, previous_vertex[vertex], ty, -tx) >= -_ANGLE
+    away = min(
+        _dot_to(vertices, vertex, next_vertex[vertex], ty, -tx),
+        _dot_to(vertices, vertex, previous_vertex[vertex], ty, -tx),
     )
-    return feasible, ty, -tx, px * ty - py * tx, px * tx + py * ty, length
+    return away, ty, -tx, px * ty - py * tx, px * tx + py * ty, length
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -89,8 +92,8 @@ def _meet(vertices, next_vertex, previous_vertex, v, w):
 def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
     """Whether an edge with this ``gap`` is what ``vertex`` meets at a corner, rather than the corner's ``other``
     edge."""
-    feasible, _, _, beside, _, _ = _against(vertices, next_vertex, previous_vertex, vertex, other)
-    return not feasible or gap >= beside
+    away, _, _, beside, _, _ = _against(vertices, next_vertex, previous_vertex, vertex, other)
+    return away < -_ANGLE or gap >= beside
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -167,8 +170,8 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
     pick_edge = np.empty(4, np.int64)
     rows = np.empty(4, np.int64)
     pick = np.empty(
-        (4, 6)
-    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside
+        (4, 7)
+    )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside, sine away from it
     twin = np.empty(4, np.int64)  # the other end of the same face
     for pair in range(pairs.shape[0]):
         a, b = pairs[pair, 0], pairs[pair, 1]
@@ -197,10 +200,8 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                         vertex, edge, sign = w, (v if c == 0 else previous_vertex[v]), -1.0
                     else:
                         vertex, edge, sign = v, (w if c == 2 else previous_vertex[w]), 1.0
-                    feasible, nx, ny, gap, along, length = _against(
-                        vertices, next_vertex, previous_vertex, vertex, edge
-                    )
-                    if not feasible:
+                    away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, vertex, edge)
+                    if away < -_ANGLE:
                         continue
                     nx, ny = sign * nx, sign * ny
                     outside = max(0.0, -along, along - length)
@@ -218,7 +219,9 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                     elif same >= 0:
                         near = 1e-9 * max(length, pick[same, 4])
                         better = outside < pick[same, 3] - near
-                        if abs(outside - pick[same, 3]) <= near:
+                        if abs(away - pick[same, 6]) > _LEAN:
+                            better = away > pick[same, 6]
+                        elif abs(outside - pick[same, 3]) <= near:
                             better = (
                                 _place(old_keys, vertex * n_vertices + edge) >= 0
                                 and _place(old_keys, pick_vertex[same] * n_vertices + pick_edge[same]) < 0
@@ -232,7 +235,7 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                         twin[k] = -1
                     pick_vertex[k], pick_edge[k] = vertex, edge
                     pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
-                    pick[k, 5] = inside
+                    pick[k, 5], pick[k, 6] = inside, away
                 widest = -np.inf
                 for k in range(n_lines):
                     widest = max(widest, pick[k, 2])
@@ -267,10 +270,10 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                         or max(vertices[edge, 1], vertices[end, 1]) < y - window
                     ):
                         continue
-                    feasible, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
+                    away, nx, ny, gap, along, length = _against(vertices, next_vertex, previous_vertex, v, edge)
                     if abs(gap) > window or along < -window or along > length + window:
                         continue
-                    if not feasible:
+                    if away < -_ANGLE:
                         if gap <= 0.0 or along < 0.0 or along > length:
                             continue
                         if not _may_turn_to(vertices, next_vertex, previous_vertex, v, nx, ny, gap, window):

@@ -284,6 +284,10 @@ class ContactFinder:
             law = self._law_of[a, b]
         return law
 
+    def pairs(self, vertices: np.ndarray, window: float) -> np.ndarray:
+        """(k, 2) all blocks that may be nearer to each other than ``window`` m on ``vertices``, and some that are not."""
+        return self._near.of(vertices, window)
+
     def gaps(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""
         start = vertices[edge]

@@ -132,7 +132,8 @@ class LaggedFriction:
             gap, trial = self._forces(self._contact_motion)
             # (A bond that pulls has no friction.)
             new = np.where(self._closed(gap), np.maximum(0.0, -springs.normal * gap), 0.0)
-            change = float(np.abs(new - force).max() / max(float(new.max(initial=0.0)), 1e-300))
+            moved = float(np.abs(new - force).max())
+            change = moved / max(float(new.max(initial=0.0)), 1e-30 * moved, 1e-300)
             force = force + _WAY * (new - force)
             slides = np.abs(trial) > strength
             state = np.where(self._closed(gap), np.where(slides, SLIP, STICK), OPEN)

@@ -57,6 +57,34 @@ def _depth_crossing(vertices, next_vertex, e, f):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
+    """How deep the blocks ``a`` and ``b`` overlap, m; 0 if they do not. ``start`` (n_blocks + 1,) their first vertices,
+    ``box`` (n_blocks, 4) least x, y and greatest x, y, ``centroid`` (n_blocks, 2)."""
+    if box[a, 0] >= box[b, 2] or box[b, 0] >= box[a, 2] or box[a, 1] >= box[b, 3] or box[b, 1] >= box[a, 3]:
+        return 0.0
+    depth = 0.0
+    for turn in range(2):
+        i, j = (a, b) if turn == 0 else (b, a)
+        # Blocks drawn twice have all corners on each other's outline.
+        if _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[i], start[i + 1]) > 0.0:
+            depth = max(
+                depth, _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[j], start[j + 1])
+            )
+        # Corners, and middles of edges: those of blocks shifted along a common side alone lie inside.
+        for v in range(start[i], start[i + 1]):
+            for share in (0.0, 0.5):
+                x = vertices[v, 0] + share * (vertices[next_vertex[v], 0] - vertices[v, 0])
+                y = vertices[v, 1] + share * (vertices[next_vertex[v], 1] - vertices[v, 1])
+                if box[j, 0] < x < box[j, 2] and box[j, 1] < y < box[j, 3]:
+                    depth = max(depth, _depth_inside(x, y, vertices, next_vertex, start[j], start[j + 1]))
+    if depth == 0.0:
+        for e in range(start[a], start[a + 1]):
+            for f in range(start[b], start[b + 1]):
+                depth = max(depth, _depth_crossing(vertices, next_vertex, e, f))
+    return depth
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def _worst_pair(vertices, next_vertex, start, box, order, centroid, size):
     """(block, other, depth) of the overlap that is deepest relative to the smaller block's size; (−1, −1, 0) for
     none."""
@@ -67,28 +95,7 @@ def _worst_pair(vertices, next_vertex, start, box, order, centroid, size):
             a, b = min(order[p], order[q]), max(order[p], order[q])
             if box[order[q], 0] >= box[order[p], 2]:
                 break
-            if box[a, 1] >= box[b, 3] or box[b, 1] >= box[a, 3]:
-                continue
-            depth = 0.0
-            for turn in range(2):
-                i, j = (a, b) if turn == 0 else (b, a)
-                # Blocks drawn twice have all corners on each other's outline.
-                if _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[i], start[i + 1]) > 0.0:
-                    depth = max(
-                        depth,
-                        _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[j], start[j + 1]),
-                    )
-                # Corners, and middles of edges: those of blocks shifted along a common side alone lie inside.
-                for v in range(start[i], start[i + 1]):
-                    for share in (0.0, 0.5):
-                        x = vertices[v, 0] + share * (vertices[next_vertex[v], 0] - vertices[v, 0])
-                        y = vertices[v, 1] + share * (vertices[next_vertex[v], 1] - vertices[v, 1])
-                        if box[j, 0] < x < box[j, 2] and box[j, 1] < y < box[j, 3]:
-                            depth = max(depth, _depth_inside(x, y, vertices, next_vertex, start[j], start[j + 1]))
-            if depth == 0.0:
-                for e in range(start[a], start[a + 1]):
-                    for f in range(start[b], start[b + 1]):
-                        depth = max(depth, _depth_crossing(vertices, next_vertex, e, f))
+            depth = depth_of_pair(vertices, next_vertex, start, box, centroid, a, b)
             smaller = min(size[a], size[b])
             if depth > worst_share * smaller:
                 worst_a, worst_b, worst, worst_share = a, b, depth, depth / smaller

@@ -23,6 +23,7 @@ from .step import CrackResponse, NotConverged, StepResult
 from .step_length import StepLength
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, told_rows
+from .turned_in import turned_in
 
 log = logging.getLogger(__name__)
 
@@ -204,6 +205,13 @@ class BlockSystem:
                     found = self.finder.find(state, vertices, _WINDOW * limit, holds, broken=broken)
                     continue
                 if largest <= 1.0001 * limit:
+                    unseen = self._turned_in(attempt, result, _WINDOW * limit)
+                    if unseen and cuts < self.settings.max_step_cuts:
+                        cuts, dt = cuts + 1, 0.5 * dt
+                        log.debug("step at t = %g s cut to %.4g s: %s", state.time, dt, unseen)
+                        continue
+                    if unseen:
+                        log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, unseen)
                     self._refuse_crushed(result.state)
                     return result
                 reason = f"a vertex moves {largest:.3g} m, the limit is {limit:.3g} m"
@@ -247,6 +255,17 @@ class BlockSystem:
                 "no block is fixed, so that under gravity all of them fall and statics finds no equilibrium: fix a "
                 "block, or let velocity be carried (dynamic_factor = 1)"
             )
+
+    def _turned_in(self, attempt: Attempt, result: StepResult, window: float) -> str:
+        """What has gone in where the contacts sought within ``window`` (m) saw nothing come; empty for nothing."""
+        blocks = turned_in(
+            result.state.vertices, attempt.vertices, self.next, self.vertex_start, attempt.increment[:, 2],
+            self.finder.pairs(attempt.vertices, window), result.contacts, np.sqrt(attempt.moments[:, 0]),
+        )  # fmt: skip
+        if blocks is None:
+            return ""
+        a, b, depth = blocks
+        return f"{self.finder.names[a]!r} and {self.finder.names[b]!r} turn into each other by {depth:.3g} m"
 
     def _refuse_crushed(self, state: State) -> None:
         area = block_moments(state.vertices, self.next, self.vertex_start)[:, 0]
