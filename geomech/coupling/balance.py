@@ -32,7 +32,7 @@ STILL = 1e-3
 #: corrected by the next step.
 COMPLIANCE_PASSES = 20
 
-#: After so many of them blocks whose forces and strain still chase each other are taken to hang (`hanging`).
+#: At rest, after so many of them blocks whose forces and strain still chase each other take their mean stress alone.
 PATIENCE = 10
 
 #: Larger lags than this are no state: a shorter step is tried, in which inertia leaves strain less to do, so many times
@@ -60,7 +60,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     where blocks and cracks agree at no step.
     """
     begun, static = now.response, now.system.scheme.static
-    # At rest nothing is taken to hang for its softness (`hanging`), but where there is no answer without it.
+    # At rest no block takes its mean stress for its softness (`by_mean_stress`), but where there is no answer without it.
     for soft_ones_hang in (False, True) if static else (True,) * (1 + SHORTER):
         now.response = begun
         found, differences = _passes(now, dt, load_time, soft_ones_hang)
@@ -68,7 +68,7 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
         if not len(lost):
             return found
         dt = dt if static else 0.5 * found.result.dt
-    blocks = [now.blocks.names[b] for b in np.array(list(now.solutions), int)[lost]]
+    blocks = [now.blocks.names[b] for b in np.array(list(now.bodies), int)[lost]]
     raise dda.NotConverged(
         f"t = {found.result.state.time:g} s: {', '.join(blocks[:3])} and the cracks in it find no common strain in "
         f"{COMPLIANCE_PASSES} passes (they differ by {differences.max():.2g} of it): try a shorter time step, or finer "
@@ -94,10 +94,16 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
         iterations += result.statistics["open_close_iterations"]
         now.acted = result.statistics
         if not now.bodies:
+            now.solutions, now.loads = {}, {}
             return Balance(result, {}, np.empty(0, TIP)), np.zeros(0)
-        if soft_ones_hang:
-            now.hanging.find(now.bodies, now.system.compliance, result.contacts)
-        _solve_bodies(now, result)
+        if not static:
+            now.by_mean_stress.take_all(now.bodies)
+        elif soft_ones_hang:
+            now.by_mean_stress.find(now.bodies, now.system.compliance, result.contacts)
+        # What answers to its mean stress needs no forces before there is an answer.
+        solved = not all(block in now.by_mean_stress for block in now.bodies)
+        if solved:
+            _solve_bodies(now, result)
         response, differences = _take_response(now, result.state, settling, tolerance)
         mismatch = float(differences.max())
         if mismatch < tolerance:
@@ -105,12 +111,14 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
                 break
             # What cut a static step short may have been a strain that the first passes assumed.
             dt, tried_whole = asked, True
-        chasing = np.array(list(now.solutions), int)[differences > NO_ANSWER]
+        chasing = np.array(list(now.bodies), int)[differences > NO_ANSWER]
         if attempt + 1 == PATIENCE and len(chasing):
             for block in chasing.tolist():
-                now.hanging.add(block)
+                now.by_mean_stress.add(block)
             # What has cut the step short may have been the chase.
             dt, settling = asked, Settling()
+    if not solved:
+        _solve_bodies(now, result)
     imbalance = max(load.imbalance for load in now.loads.values())
     statistics = {
         "open_close_iterations": iterations,
@@ -141,7 +149,7 @@ def _take_response(
 ) -> tuple[dda.CrackResponse, np.ndarray]:
     """What the next pass should assume, and how far off the last assumption was in each cracked block (relative
     strain). Sets what the next step should begin with."""
-    blocks = np.array(list(now.solutions), int)
+    blocks = np.array(list(now.bodies), int)
     with now.timed("compliance"):
         answers = _answers(now, state)
         own = side_by_side(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
@@ -151,8 +159,8 @@ def _take_response(
         stress, assumed = np.empty((2, len(blocks), 3))
         for k, (b, answer) in enumerate(answers.items()):
             known, strain = now.compliances[b][2], answer.crack_strain
-            if b in now.hanging:
-                share = now.hanging.share(b, now.bodies[b], now.system.compliance[b])
+            if b in now.by_mean_stress:
+                share = now.by_mean_stress.share(b, now.bodies[b], now.system.compliance[b])
                 known, strain = share * known, share * strain
             began, ends = float(now.state.rotation[b]), float(state.rotation[b])
             stress[k] = stress_rotation(began - ends) @ state.stress[b]
@@ -179,12 +187,12 @@ def _answers(now: CrackedBlocks, state: State) -> dict:
     """block → the solution whose crack strain the block is to take."""
 
     def answer(block: int):
-        if block not in now.hanging:
+        if block not in now.by_mean_stress:
             return now.solutions[block]
         body, began = now.bodies[block], now.history.get(block)
-        return now.hanging.answer(block, body, state.stress[block], float(state.rotation[block]), began)
+        return now.by_mean_stress.answer(block, body, state.stress[block], float(state.rotation[block]), began)
 
-    return {block: answer(block) for block in now.solutions}
+    return {block: answer(block) for block in now.bodies}
 
 
 def _compliance(now: CrackedBlocks, block: int, solution) -> tuple:

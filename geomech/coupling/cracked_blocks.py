@@ -12,8 +12,8 @@ from ..ddm.work import Work
 from ..model import Blocks, Cracks, Motion, Problem, State
 from ..model.polygon import winding_number
 from .bodies import elastic_bodies, inherited, solve_bodies
+from .by_mean_stress import ByMeanStress
 from .crack_energy import CrackEnergy
-from .hanging import Hanging
 from .inherited_loads import on_children, on_moved
 from .phases import Phases
 from .tractions import BoundaryLoad
@@ -28,7 +28,7 @@ class CrackedBlocks:
     ``state`` is that at the start of the step; ``problem`` has the loads as they are on the present blocks. ``number``
     and ``load_step`` count cycles and load steps. ``bodies`` (block → elastic body), ``nodes_of`` (block → its nodes in
     the whole network), ``solutions``, ``loads`` and ``compliances`` are of the last pass; ``response`` is what the
-    blocks are to assume of their cracks, ``hanging`` which of them feel only their mean stress, ``acted`` the
+    blocks are to assume of their cracks, ``by_mean_stress`` which of them feel only their mean stress, ``acted`` the
     statistics of the last step, with what it takes to move blocks.
     """
 
@@ -47,7 +47,7 @@ class CrackedBlocks:
         self.solutions: dict[int, object] = {}
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
-        self.hanging = Hanging()
+        self.by_mean_stress = ByMeanStress()
         #: What the last steps of the tips have told of their paths.
         self.chords: Memory = {}
         # What crack faces with friction remember of the load step before: its passes all begin there.
@@ -101,11 +101,11 @@ class CrackedBlocks:
         return {block: self._felt(block, solution) for block, solution in self.solutions.items()}
 
     def _felt(self, block: int, solution):
-        if block not in self.hanging or block not in self.hanging.solutions:
+        if block not in self.by_mean_stress or block not in self.by_mean_stress.solutions:
             return 1.0, solution
-        answer = self.hanging.solutions[block]
+        answer = self.by_mean_stress.solutions[block]
         # (Bodies may have grown since.)
-        return self.hanging.share(block, answer.body, self.system.compliance[block]), answer
+        return self.by_mean_stress.share(block, answer.body, self.system.compliance[block]), answer
 
     # -- changes of the blocks -----------------------------------------------------------------------------------------
 
@@ -128,14 +128,14 @@ class CrackedBlocks:
             {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
             for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
         )
-        self.hanging = self.hanging.inherited(parent, whole) if len(whole) else Hanging()
+        self.by_mean_stress = self.by_mean_stress.inherited(parent, whole) if len(whole) else ByMeanStress()
         self._take_bodies()
 
     def take_step(self, state: State, budget: dda.EnergyBudget) -> None:
         """Go on from ``state``, where the last pass has left the blocks, with what the faces of its cracks remember."""
         self.state, self.budget = state, budget
         self.history = {b: s.memory for b, s in self.solutions.items() if s.memory is not None}
-        self.hanging.take_step()
+        self.by_mean_stress.take_step()
 
     def take_split(self, split) -> None:
         """Blocks, state and cracks of the `Split`; gauges and monitors go to the child that holds their point."""

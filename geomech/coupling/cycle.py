@@ -19,7 +19,7 @@ import numpy as np
 from .. import dda
 from ..dda.blas_threads import alike, asked_for, blas_threads
 from ..dda.excavation import until_next_event
-from ..model import TIP, Cycle, Event, Problem
+from ..model import TIP, Cycle, Event, Problem, State
 from .balance import Balance, balanced
 from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
@@ -229,10 +229,10 @@ class Coupling:
             if abs(gone_by - result.dt) > 1e-9 * result.dt:
                 # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
                 statistics["dt"] = gone_by
-            if now.bodies and not endless:
-                now.crack_energy.passed(tips, now.blocks, now.problem.materials, now.hanging)
+            if (now.bodies or now.crack_energy.under_way) and not endless:
+                now.crack_energy.passed(tips, now.blocks, now.problem.materials, now.felt(), now.by_mean_stress)
                 if ends or parts:
-                    now.crack_energy.after(now.state, result.state, now.blocks, now.felt(), now.hanging)
+                    self._count_at_cracks(result.state, budget)
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual)
             if self.tips is not None and len(tips):
@@ -278,9 +278,17 @@ class Coupling:
             if until - result.state.time <= 1e-9 * result.dt:
                 return replace(found, result=replace(result, state=replace(result.state, time=until)))
             self.range.check(now.motion(result.state), now.blocks, result.state.time)
-            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, now.hanging)
-            now.crack_energy.after(now.state, result.state, now.blocks, now.felt(), now.hanging)
-            now.take_step(result.state, now.budget.after(result.energy, result.state.time))
+            budget = now.budget.after(result.energy, result.state.time)
+            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, now.felt(), now.by_mean_stress)
+            self._count_at_cracks(result.state, budget)
+            now.take_step(result.state, budget)
+
+    def _count_at_cracks(self, state: State, budget: dda.EnergyBudget) -> None:
+        """A step has been taken to ``state``, after which the blocks have this ``budget``."""
+        now = self.now
+        # (What was dug out without a block that parts is its own.)
+        set_free = now.budget.split - budget.split if now.budget.is_cut else 0.0
+        now.crack_energy.after(now.state, state, now.blocks, now.felt(), now.by_mean_stress, set_free)
 
     def _excavated(self) -> tuple[Event, ...]:
         """Take out the blocks whose time has come; an event for each."""

@@ -12,6 +12,7 @@ from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
 from .endless import take_endless
 from .mean_stress import rotated_mean_stress
+from .paid_stress import paid_stress
 from .record import event
 from .split_forces import contacts_after, holds_together
 from .splitting import divided, split_blocks
@@ -123,6 +124,9 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
     if growth.joins:
         with now.timed("growth"):
             split = split_blocks(now.blocks, now.state, growth.cracks, _mean_stress(now.state, solutions))
+            if split is not None and now.problem.dda.dynamic_factor != 0.0:
+                stored = {block: share * of.crack_energy for block, (share, of) in now.felt().items()}
+                split = paid_stress(split, now.blocks, now.state, now.system.compliance, stored)
     if split is None:
         now.take_cracks(growth.cracks)
         return tuple(events)

@@ -1,18 +1,22 @@
-"""Blocks that hang together by thin ligaments: their cracks answer to the mean stress alone.
+"""Blocks whose cracks answer to the mean stress alone: all of them in motion, in statics those that hang by thin
+ligaments.
 
 The block solver's blocks strain evenly. The strain that the forces on a block open its cracks by is that of their mean
 stress σ and what bending and uneven pressure add; what they add has no counterpart: forces that bend cracks open do no
-work on an even strain. While cracks are short that is a small part. In a block that is nearly cut through it is nearly
-all of it, forces and strain chase each other with a gain of up to hundreds, and there are states that no passes find,
-or that take energy from nowhere. So the cracks of these blocks bring the strain ε_c = κ ∂W/∂σ, with W(σ) the
-complementary energy, per area, that they add to the body under a uniform stress, faces closing or not. W is convex:
-blocks and cracks agree in a few passes, and no energy is gained. What drives the tips is solved under the actual forces
-as ever.
+work on an even strain, as by reciprocity they would on that of the cracked block. In motion that takes energy from
+nowhere, or leaves it there: round a cycle σ gives ∮ A σ : dε_c, with ε_c not a function of σ (a cantilever cracked
+through half of its depth, under its weight, gained and lost more than all of the weight's work). In a block that is
+nearly cut through forces and strain chase each other besides, with a gain of up to hundreds, and there are states that
+no passes find. So these cracks bring the strain ε_c = κ ∂W/∂σ, with W(σ) the complementary energy, per area, that they
+add to the body under a uniform stress, faces closing or not. W is convex: blocks and cracks agree in a few passes, in
+one while no face opens or closes, and no energy is gained. What drives the tips is solved under the actual forces as
+ever, once there is an answer. (What is lost is the mean strain of cracks that are bent open; that bent blocks also turn
+one half against the other, blocks of one strain never had.)
 
 In statics no motion can take energy from anywhere, and passes that agree are an equilibrium of the forces that act:
-there a block hangs only where its passes do not agree, and all soft ones only in a step in which that is not enough. (A
-specimen sheared between the halves of a box has no shear on its sides, which its mean stress would put there: as it
-came to hang it bore 4 % less at once, and its cracks then ran through.)
+there a block takes its mean stress only where its passes do not agree, and all soft ones only in a step in which that
+is not enough. (A specimen sheared between the halves of a box has no shear on its sides, which its mean stress would
+put there: as it came to hang it bore 4 % less at once, and its cracks then ran through.)
 """
 
 from __future__ import annotations
@@ -27,7 +31,7 @@ from .compliance import stress_rotation
 if TYPE_CHECKING:
     from ..ddm import Body, FaceMemory, Solution
 
-#: A block hangs from where its cracks, were they all open, make it so many times softer than its rock in some
+#: At rest a block hangs from where its cracks, were they all open, make it so many times softer than its rock in some
 #: direction. (An edge crack through half of a square adds 4.)
 SOFT = 4.0
 
@@ -38,8 +42,8 @@ SOFTEST = 30.0
 
 
 @dataclass(eq=False)
-class Hanging:
-    """The blocks that hang, and the solutions of their bodies under the mean stress of the last pass (block →)."""
+class ByMeanStress:
+    """The blocks that do, and the solutions of their bodies under the mean stress of the last pass (block →)."""
 
     solutions: dict[int, Solution] = field(default_factory=dict)
     #: What crack faces with friction remember of these solutions at the end of the last step.
@@ -52,8 +56,12 @@ class Hanging:
         return block in self._blocks
 
     def add(self, block: int) -> None:
-        """``block`` hangs, however soft it is, as long as it is whole."""
+        """``block`` does from now on, however soft it is, as long as it is whole."""
         self._blocks.add(block)
+
+    def take_all(self, bodies: dict[int, Body]) -> None:
+        """Every one of the ``bodies`` (block →) answers to its mean stress."""
+        self._blocks.update(bodies)
 
     def find(self, bodies: dict[int, Body], elastic: np.ndarray, contacts: np.ndarray) -> None:
         """Add those of the ``bodies`` (block →) that are soft beside their ``elastic`` compliance (n_blocks, 3, 3) and
@@ -84,14 +92,14 @@ class Hanging:
         """Go on from the end of a step."""
         self._memory = {b: known.memory for b, known in self.solutions.items() if known.memory is not None}
 
-    def inherited(self, parent: np.ndarray, whole: np.ndarray) -> Hanging:
+    def inherited(self, parent: np.ndarray, whole: np.ndarray) -> ByMeanStress:
         """That of new blocks: of those that are their ``parent`` (n_blocks,), ``whole`` (k,) numbers, what is known
         stays."""
         solutions, memory, softness = (
             {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
             for known in (self.solutions, self._memory, self._softness)
         )
-        return Hanging(solutions, memory, softness, {b for b in whole.tolist() if parent[b] in self._blocks})
+        return ByMeanStress(solutions, memory, softness, {b for b in whole.tolist() if parent[b] in self._blocks})
 
     def _soft(self, block: int, body: Body, elastic: np.ndarray) -> float:
         """How many times the ``elastic`` compliance (3, 3) open cracks add, in the direction in which they add most."""
