@@ -92,10 +92,10 @@ class Body:
         self.counts = {"elements": 0, "elements_new": 0, "boundary_assemblies": 0, "boundary_factorisations": 0}
         self.work = Work() if work is None else work
         given = [*loops, *holes]
-        same = previous is not None and _same_loops(previous._given_loops, given)
+        same = previous is not None and _same_loops(previous.given_loops, given)
         if not same and self.supports:
             previous = None
-        self._given_loops = [np.array(loop, dtype=float) for loop in given]
+        self.given_loops = [np.array(loop, dtype=float) for loop in given]
         self.loops = previous.loops if same else check_outline(loops, holes)
         self.outlined = previous.outlined if same else outlined(self.loops)
         edges = previous.mesh.edges if same else outline_edges(self.loops)[0]
@@ -191,7 +191,7 @@ class Body:
         own = self.cracks
         same = (
             material == self.material
-            and _same_loops(self._given_loops, loops)
+            and _same_loops(self.given_loops, loops)
             and all(
                 np.array_equal(getattr(own, name), getattr(cracks, name))
                 for name in ("nodes", "segments", "aperture", "surface", "law")

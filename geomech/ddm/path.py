@@ -16,8 +16,9 @@ the next with the other sign, κ/(2 + κ) of it, and stiff paths zigzag for long
 (1 − s) κ/(1 + s κ): s = 1 − 1/κ from κ = 2 on leaves 1/κ, and in the limit no shear at the end of a step (backward
 Euler). κ falls with √Δa, so that fine steps have half the turn, and second order.
 
-From step to step neither κ nor the turn from chord to chord changes much. So the first trial turns as the last chord
-did, and the κ found then says how far to correct it: mostly one look ahead is enough (`Remembered`).
+From step to step neither κ nor the share by which chords turn less and less changes much. So the first trial turns as
+the last two chords say, and the κ found then says how far to correct it: mostly one or two looks ahead are enough
+(`Remembered`), and often what was tried is the step.
 """
 
 from __future__ import annotations
@@ -48,12 +49,16 @@ LOOKS = 5
 SLOPES = (-39.0, 0.0)
 #: The largest κ that a first look is believed.
 GUESSED = 8.0
-#: By this part the slope may have changed since the last step: a correction by it is taken unseen where what it may
-#: leave is within the tolerance.
+#: By this part the slope may have changed since the last step, or since the last look: a correction by it is taken
+#: unseen where what it may leave is within the tolerance.
 CHANGED = 0.3
+#: A trial that would be corrected by less than this is the step: what is left of K_II turns the next one.
+AS_TRIED = np.radians(0.03)
+#: A tip's chord is expected to turn by no more than so many times what the last one did.
+FARTHER = 1.5
 #: A chord that turned on from its last trial by more than this tells the slope there.
 TELLING = np.radians(0.5)
-#: A tip's first trial is the turn of its last chord where the criterion's angle is no farther from it than this.
+#: A tip's first trial goes on from its last chords where the criterion's angle is no farther from that than this.
 NEAR = np.radians(10.0)
 #: The chord lies between the first trial and the first correction, since the condition falls by at least as much as the
 #: chord turns; by this part of their difference it may lie outside (tension along the crack, round-off).
@@ -62,12 +67,21 @@ OUTSIDE = 0.2
 
 class Remembered(NamedTuple):
     """Of a tip's last step: ``kappa`` (nan: not known), the ``angle`` of its chord, the angle last ``tried`` before and
-    the one that the criterion asked for at the end of that trial, ``ahead``."""
+    the one that the criterion asked for at the end of that trial, ``ahead``; ``before``, the angle of the chord before
+    (nan: there was none)."""
 
     kappa: float
     angle: float
     tried: float
     ahead: float
+    before: float = np.nan
+
+    @property
+    def onward(self) -> float:
+        """The angle of the next chord if it goes on as the last two: stiff paths turn back by a share a step."""
+        if not 0 < abs(self.before) <= KINK:
+            return self.angle
+        return self.angle * min(max(self.angle / self.before, -1.0), FARTHER)
 
     def kappa_at(self, start: float) -> float:
         """κ now that the criterion asks for ``start`` at the end of the chord."""
@@ -98,8 +112,8 @@ class Chords:
             last, start = memory.get(tuple(point)), float(self.start[row])
             if last is not None and abs(start) <= KINK:
                 self.kappa[row] = last.kappa_at(start)
-                if abs(last.angle) <= KINK and abs(last.angle - start) <= NEAR:
-                    self.first[row] = last.angle
+                if abs(last.angle) <= KINK and abs(last.onward - start) <= NEAR:
+                    self.first[row] = last.onward
         self.share = np.where(np.abs(self.start) > KINK, KINK_SHARE, SMOOTH_SHARE)
         self.looks = 0
         self.onward = np.zeros(len(tips), bool)
@@ -132,22 +146,25 @@ class Chords:
                 np.nanmin(ends, axis=0, initial=np.inf),
                 np.nanmax(ends, axis=0, initial=-np.inf),
             )
+        left = np.abs(rest) * share * CHANGED * np.maximum(1 + kappa, 1.0) / (1 + share * kappa)
         tips["angle"][seen] = np.clip(angle + rest / (1 + share * kappa), self.lowest, self.highest)[seen]
         if first:
             # A first look that turns on a little, the way the trial did, needs no second one: the path is smooth.
             self.onward = (rest * self.start >= 0) & ~known
             self.whole = angle + self.share * turns
             smooth = self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF)
-            left = np.abs(rest) * share * CHANGED * np.maximum(1 + kappa, 1.0) / (1 + share * kappa)
             unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)
-        elif self.looks == 2:
-            # Nor is a large turn stiff for its size alone: then the first correction was right, the whole of it.
-            gentle = self.onward & (kappa < GENTLE)
-            tips["angle"][gentle], unsettled = self.whole[gentle], off & ~gentle
         else:
-            unsettled = off
+            unsettled = off & (left > TOLERANCE)
+            if self.looks == 2:
+                # Nor is a large turn stiff for its size alone: then the first correction was right, the whole of it.
+                gentle = self.onward & (kappa < GENTLE)
+                tips["angle"][gentle], unsettled = self.whole[gentle], unsettled & ~gentle
         self.last_angle, self.last_turns = angle, turns
         self.kappa = np.where((self.looks > 1) | known, kappa, np.nan)
+        if (np.abs(tips["angle"] - angle)[seen] <= AS_TRIED).all():
+            tips["angle"] = angle
+            return True
         return self.looks == LOOKS or not unsettled.any()
 
     def remember(self, memory: Memory, tips: np.ndarray, growth: Growth, cycle: int) -> None:
@@ -156,8 +173,9 @@ class Chords:
         told = zip(self.kappa.tolist(), tips["angle"].tolist(), self.last_angle.tolist(), self.last_turns.tolist())
         for point, end, step in zip(tips["point"].tolist(), ends, told):
             if end >= 0:
-                memory.pop(tuple(point), None)
-                memory[tuple(growth.cracks.nodes[end].tolist())] = Remembered(*step)
+                last = memory.pop(tuple(point), None)
+                before = np.nan if last is None else last.angle
+                memory[tuple(growth.cracks.nodes[end].tolist())] = Remembered(*step, before)
 
     def _first_guess(self, turns: np.ndarray) -> np.ndarray:
         """κ by the turn ahead of a trial along the tangent: on a smooth path, from half a turn before the tip, it is 2

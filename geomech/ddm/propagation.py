@@ -134,6 +134,10 @@ class _Run:
             cracks, joined = growth.cracks, joined or bool(growth.joins)
 
     def _body(self, cracks: Cracks, previous: Body | None) -> Body:
+        # A step that was tried as it is taken.
+        same = None if previous is None else previous.found_again(previous.given_loops, cracks, self.material)
+        if same is not None:
+            return same
         return Body(self.loops, cracks, self.material, self.settings, previous=previous, **self.options)
 
     # -- load ----------------------------------------------------------------------------------------------------

@@ -74,6 +74,26 @@ def test_an_arc_goes_on_as_it_went():
     assert looks == 1
 
 
+@pytest.mark.parametrize(
+    ("before", "last", "next"), [(8.0, 4.0, 2.0), (2.0, 2.0, 2.0), (4.0, -2.0, 1.0), (1.0, 9.0, 13.5)]
+)
+def test_the_first_trial_goes_on_as_chords_have_turned(before, last, next):
+    """A stiff path turns back by a share a step; what grows is not believed at once. A trial that no look would correct
+    is the step, as it was tried."""
+    memory = Remembered(5.0, *np.radians([last, last, 0.0, before]))
+    tried = []
+
+    def ask(theta):
+        tried.append(theta)
+        return 1.0 - 6.0 * (theta - next)
+
+    share = 1 - 1 / 5.0
+    start = next - 1.0 * share / (1 - share)  # so that the condition holds at the trial
+    angle, looks = chosen(ask, start, memory)
+    assert tried == [pytest.approx(next)] and looks == 1
+    assert angle == tried[0]
+
+
 @pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
 @pytest.mark.parametrize("curve", [0.0, 3.0])
 def test_a_remembered_slope_spares_looks(stiffness, curve):
