@@ -12,6 +12,7 @@ from geomech.output.reading import Run
 
 from .field import COMPONENTS, interior_grid, values
 from .overlaps import overlap
+from .walls import Walls
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -157,7 +158,9 @@ def filled_cells(blocks: pv.UnstructuredGrid, rock: frozenset[int]) -> np.ndarra
 def _crack_limits(run: Run, cycle: int, colour: str) -> tuple[float, float]:
     cracks = run.grid("cracks", cycle)
     if colour == "birth":
-        grown = cracks["birth_cycle"][cracks["birth_cycle"] > 0]
+        walls = Walls.of(run)
+        grown = np.concatenate([cracks["birth_cycle"], walls.birth[walls.cut < cycle]])
+        grown = grown[grown > 0]
         return (float(grown.min()), float(grown.max())) if len(grown) else (0.0, 0.0)
     opening = np.abs(cracks["opening"][np.isfinite(cracks["opening"])]) * 1e6
     return (0.0, float(np.percentile(opening, 98))) if len(opening) else (0.0, 0.0)

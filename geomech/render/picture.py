@@ -15,6 +15,7 @@ from . import offscreen
 from .field import COMPONENTS, face_displacements, interior_grid, values
 from .legend import SOFT_INK, Legend, crack_colours, rounded
 from .look import CRACK_COLOURS, Look, filled_cells
+from .walls import Walls, reference
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -41,7 +42,7 @@ class Painter:
         offscreen.ready()
         import pyvista as pv
 
-        self.run, self.look = run, fixed
+        self.run, self.look, self.walls = run, fixed, Walls.of(run)
         x0, x1, y0, y1 = fixed.bounds
         w, h = x1 - x0, y1 - y0
         # Pixels: margins, the strip of the title, the strip of the legend; the drawing takes the rest.
@@ -96,7 +97,8 @@ class Painter:
         self.plotter.render()
 
     def _warped(self, grid: pv.UnstructuredGrid, lift: float) -> pv.UnstructuredGrid:
-        """``grid`` deformed, ``lift`` pixels above the page."""
+        """``grid`` deformed, ``lift`` pixels above the page; where its points were is kept."""
+        grid["reference"] = reference(grid)
         grid.points = self._moved(np.asarray(grid.points), np.asarray(grid["displacement"]), lift)
         return grid
 
@@ -118,11 +120,11 @@ class Painter:
         if interior is not None:
             self._filled(self._warped(interior, _FIELD))
         # A solved block is outlined as it deforms, crack faces included; the others by their own straight edges.
-        self._outlined(blocks.extract_cells(~here))
+        self._outlined(blocks.extract_cells(~here), cycle)
         if interior is not None:
-            self._outlined(interior)
+            self._outlined(interior, cycle)
 
-    def _outlined(self, grid: pv.UnstructuredGrid) -> None:
+    def _outlined(self, grid: pv.UnstructuredGrid, cycle: int) -> None:
         if not grid.n_cells:
             return
         edges = grid.extract_surface(algorithm="dataset_surface").extract_feature_edges(
@@ -130,6 +132,14 @@ class Painter:
         )
         edges.points += (0.0, 0.0, _OUTLINES * self.metres_per_pixel)
         self.plotter.add_mesh(edges, color=ROCK_OUTLINE, line_width=1.4 * self.unit, lighting=False)
+        if self.look.cracks != "birth" or not len(self.walls.cut):
+            return
+        lines = np.asarray(edges["reference"])[edges.lines.reshape(-1, 3)[:, 1:]]
+        edges.cell_data["birth_cycle"] = birth = self.walls.births(lines, cycle)
+        if (birth >= 0).any():
+            walls = edges.extract_cells(birth >= 0)
+            walls.points += (0.0, 0.0, _HALO * self.metres_per_pixel)
+            self._crack_lines(walls, np.asarray(walls["birth_cycle"]) == 0)
 
     def _filled(self, grid: pv.UnstructuredGrid) -> None:
         grid["fill"] = values(grid, self.look.component)
@@ -160,14 +170,6 @@ class Painter:
         by_birth = self.look.cracks == "birth"
         # What the scene drew has no birth to show: black. Openings are shown on all of a crack.
         old = np.asarray(lines["birth_cycle"]) == 0 if by_birth else np.zeros(lines.n_cells, bool)
-        low, high = self.look.crack_limits
-        fill = {
-            "scalars": "birth_cycle" if by_birth else "opening",
-            "cmap": crack_colours(),
-            "clim": (low, high if high > low else low + 1),
-            "nan_color": OLD_CRACK,
-            "show_scalar_bar": False,
-        }
         at = np.asarray(grid.points)
         for face in (upper, lower):
             halo = lines.copy()
@@ -182,9 +184,23 @@ class Painter:
             )
         lines.points = self._moved(at, 0.5 * (upper + lower), _CRACKS)
         gaps = self._gaps(lines, self._moved(at, upper, _CRACKS), self._moved(at, lower, _CRACKS))
+        self._crack_lines(lines, old, gaps)
+
+    def _crack_lines(self, lines: pv.UnstructuredGrid, old: np.ndarray, gaps: pv.PolyData | None = None) -> None:
+        """``lines`` in their colours, with the ``gaps`` between their faces; black where they are ``old``."""
+        low, high = self.look.crack_limits
+        by_birth = self.look.cracks == "birth"
+        fill = {
+            "scalars": "birth_cycle" if by_birth else "opening",
+            "cmap": crack_colours(),
+            "clim": (low, high if high > low else low + 1),
+            "nan_color": OLD_CRACK,
+            "show_scalar_bar": False,
+        }
         for part, width, shown in ((~old, 4.0, fill), (old, 4.6, {"color": OLD_CRACK})):
             if part.any():
-                self.plotter.add_mesh(gaps.extract_cells(part), lighting=False, **shown)
+                if gaps is not None:
+                    self.plotter.add_mesh(gaps.extract_cells(part), lighting=False, **shown)
                 self.plotter.add_mesh(
                     lines.extract_cells(part), line_width=width * self.unit, render_lines_as_tubes=True,
                     lighting=False, **shown,

@@ -207,7 +207,7 @@ def _ladder(which: str, told: str, members: Mapping[str, Watch]) -> Part:
     headers += ["paths apart, mm", "joined, MPa", "off, %", "computed in, s"]
     note = (
         "Off: from the finest of the same φ. Loads it takes for the wing at crack 1's upper end to grow on when it is "
-        "so long; increments, and how they shorten, run to coalescence, the others to 200 MPa. Paths apart: largest distance of a grown point "
-        "from the finest one's cracks."
+        "so long; increments, and how they shorten, run to coalescence, the others to 200 MPa. Paths apart: largest "
+        "distance of a grown point from the finest one's cracks."
     )
     return Part(f"Convergence: {told.split(',')[0].split(' (')[0]}", headers, rows, [note])

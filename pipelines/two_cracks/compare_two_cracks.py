@@ -197,7 +197,8 @@ def _lines(runs: dict[int, Watch]) -> Part:
         known = phi in published.PHI_DEG
         row += [f"{published.TIP_TO_TIP_ANGLE_DEG[phi]:.1f}" if known else None]
         row += [f"{table[phi]:.2f}" if known else None for table in sources.values()]
-        off = angle - published.COALESCENCE_ANGLE_DEG["experiment"][phi] if known else np.nan
+        # Between lines: at most a right angle.
+        off = (angle - published.COALESCENCE_ANGLE_DEG["experiment"][phi] + 90) % 180 - 90 if known else np.nan
         rows.append([*row, f"{off:+.2f}" if np.isfinite(off) else None])
     return Part(
         "Line of coalescence (Table 3)",

@@ -16,6 +16,7 @@ from geomech import cycles
 from geomech.cli import DONE, main
 from geomech.output import Run
 from geomech.reference import two_cracks as published
+from geomech.render.walls import Walls
 from geomech.scene import load_scene
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "two_cracks"
@@ -132,6 +133,21 @@ def test_no_crack_is_lost_where_the_rock_is_cut(specimens, phi):
     assert cracks.lengths[cracks.birth_cycle == 0].sum() == pytest.approx(0.02, rel=1e-9)
     assert (run.watch.last.cracks.n_segments < cracks.n_segments) == (phi == 0)
     assert set(cracks.birth_cycle[cracks.birth_cycle > 0]) == set(tips["cycle"][tips["grown_m"] > 0].astype(int))
+
+
+@pytest.mark.parametrize("phi", [0, 90])
+def test_pictures_find_the_faces_that_cracks_left_in_the_files(specimens, phi):
+    """From outlines of blocks before and after the cut; the study goes by names of edges. Two blocks share each face;
+    before the cut there is none."""
+    run = specimens[f"phi_{phi}"]
+    walls, network, last = Walls.of(run.files), run.watch.cracks, run.watch.last
+    known = {tuple(map(tuple, sorted(line))) for line in last.cracks.nodes[last.cracks.segments].tolist()}
+    lines = network.nodes[network.segments]
+    left = np.array([tuple(map(tuple, sorted(line))) not in known for line in lines.tolist()])
+    assert left.any() == (phi == 0)
+    assert np.hypot(*np.diff(walls.ends, axis=1)[:, 0].T).sum() == pytest.approx(2 * network.lengths[left].sum())
+    assert (walls.births(lines, last.number) == np.where(left, network.birth_cycle, -1)).all()
+    assert (walls.births(lines, int(walls.cut.min(initial=0))) == -1).all()
 
 
 def test_files_are_read_by_pyvista_and_meshio(specimens):
