@@ -82,12 +82,18 @@ def propagate(
     stress) while another rises, and where K does not rise steadily with the factor, some crossing of one is found, not
     always the first. The run ends with the event "arrest" when nothing grows (or the factor would pass ``max_factor``),
     "split" when cracks have cut off a part that nothing holds, or after ``max_steps``. ``body``: further arguments of
-    `Body`. Raises ValueError on an unknown control or criterion, and what `Body` and its ``solve`` raise.
+    `Body`. Raises ValueError on an unknown control or criterion and on a material without toughness, and what `Body`
+    and its ``solve`` raise.
     """
     if control not in ("load", "toughness"):
         raise ValueError(f'control must be "load" or "toughness", got {control!r}')
     growth = GrowthSettings() if growth is None else growth
     check_criterion(growth)
+    if not math.isfinite(material.k_ic):
+        raise ValueError(
+            f"material {material.name!r} has no fracture toughness, so that no crack in it could ever grow: give it "
+            "k_ic, Pa √m"
+        )
     run = _Run(list(loops), material, load, growth, settings, body, control == "toughness", max_factor)
     return run.steps(cracks, max_steps)
 

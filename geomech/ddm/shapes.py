@@ -21,11 +21,9 @@ from functools import lru_cache
 
 import numpy as np
 
-ORDINARY, TIP_START, TIP_END, TIP_BOTH = 0, 1, 2, 3
+from ..model.problem import HIGHEST_ORDER as MAX_ORDER
 
-#: Highest polynomial order. K of a straight crack of four elements is right to 1e-12 there; from then on the round-off of
-#: monomials on [−1, 1] grows 2.4 times an order, more than the order gains (order 16: 1e-11, 20: 1e-10).
-MAX_ORDER = 12
+ORDINARY, TIP_START, TIP_END, TIP_BOTH = 0, 1, 2, 3
 
 #: Terms of the moment tables: the far series of `kernels` at its inner radius, behind twice the highest order.
 N_MOMENTS = 140

@@ -187,8 +187,8 @@ class Solution:
 
     @cached_property
     def residual(self) -> float:
-        """Largest traction left over at the collocation nodes, relative to the largest applied there. Mostly what
-        loads, discretised, lack in equilibrium; logs a warning above 1e-3."""
+        """Largest traction left over at the collocation nodes, relative to the largest that acts there (`_acting`).
+        Mostly what loads, discretised, lack in equilibrium; logs a warning above 1e-3."""
         body = self.body
         # A_ΓC w and A_CC w by way of W and S, which is what the body keeps.
         follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
@@ -196,12 +196,26 @@ class Solution:
         on_faces = (
             body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self._face_load - self._traction
         )
-        scale = max((float(np.abs(x).max()) for x in (self._boundary_load, self._face_load) if x.size), default=0.0)
+        scale = self._acting
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
         residual = left / scale if scale else left
         if residual > WORTH_A_WARNING:
             _log.warning("the body's equations are left with a residual of %.1e", residual)
         return residual
+
+    @property
+    def _acting(self) -> float:
+        """Pa: the largest traction of loads at collocation nodes of boundary and cracks, of fluid and contact on crack
+        faces, or the stress 2μ u/L that an imposed displacement u means over the body's extent L."""
+        body, imposed = self.body, self._imposed
+        on_boundary, on_faces = self._boundary_load, self._face_load
+        if imposed.size:
+            # What supports impose is among the loads, as the jump it is at their ends: the finer the elements there,
+            # the larger.
+            on_boundary = on_boundary - body._outside.known @ imposed
+            on_faces = on_faces - body._c_known @ imposed
+        sizes = (on_boundary, on_faces, self._traction, imposed / body._extent)
+        return max((float(np.abs(x).max()) for x in sizes if x.size), default=0.0)
 
     @cached_property
     def condition(self) -> float:

@@ -18,6 +18,8 @@ _SMALL = 1e-9
 #: Faces that enclose less rock than this at a kink of a crack, or at its mouth, are refused: there K begins to be off
 #: by more than grading mends.
 SHARPEST_FOLD, SHARPEST_MOUTH = np.radians(10.0), np.radians(3.0)
+#: How points that coincide come to be one node.
+JOIN = "make one node of points that coincide: Cracks.from_polylines(…, join=True)"
 #: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two
 #: thousand.
 _PAIRS_AT_ONCE = 4_000_000
@@ -160,7 +162,10 @@ def _check_pairs(cracks: Cracks, segments: np.ndarray, new: np.ndarray, span: fl
         return
     one, other = segments[i], segments[j]
     for k in np.flatnonzero(_crossing(one, other))[:1]:
-        raise ValueError(f"{name(i[k])} and {name(j[k])} cross near {_near(one[k])} without a shared node")
+        raise ValueError(
+            f"{name(i[k])} and {name(j[k])} cross near {_near(one[k])} without a shared node: draw a point of both where "
+            f"they cross, and {JOIN}"
+        )
     for k in np.flatnonzero(_overlapping(one, other, span))[:1]:
         raise ValueError(f"{name(i[k])} and {name(j[k])} coincide near {_near(one[k])}")
     shared = (cracks.segments[i][:, :, None] == cracks.segments[j][:, None, :]).any(axis=(1, 2))
@@ -169,10 +174,19 @@ def _check_pairs(cracks: Cracks, segments: np.ndarray, new: np.ndarray, span: fl
         for end in (0, 1):
             touching = _to_pairs(segments[first, end], segments[second]) <= _SMALL * span
             for k in np.flatnonzero(touching)[:1]:
-                x, y = segments[first[k], end]
-                raise ValueError(
-                    f"{name(first[k])} and {name(second[k])} touch at ({x:g}, {y:g}) without a shared node"
-                )
+                raise ValueError(_touching(cracks, segments, first[k], end, second[k], span, name))
+
+
+def _touching(cracks: Cracks, segments: np.ndarray, s: int, end: int, other: int, span: float, name) -> str:
+    """What is said where an end of segment ``s`` stands on the ``other``."""
+    x, y = at = segments[s, end]
+    at_end = np.hypot(*(segments[other] - at).T) <= _SMALL * span
+    if cracks.crack[s] == cracks.crack[other]:
+        comes_back = "ends where it began" if at_end.any() else "comes back to itself"
+        told = f"{name(s)}: {comes_back}, at ({x:g}, {y:g}), without a shared node"
+    else:
+        told = f"{name(s)} and {name(other)} touch at ({x:g}, {y:g}) without a shared node"
+    return f"{told}: {JOIN if at_end.any() else f'give {name(other)} a point there too, and {JOIN}'}"
 
 
 def _check_mouths(cracks: Cracks, new: np.ndarray, edges: np.ndarray, span: float, name) -> None:

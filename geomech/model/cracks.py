@@ -8,6 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
+#: Points nearer to one another than this part of the network's extent are one node, where nodes are joined.
+SAME_POINT = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Cracks:
@@ -52,9 +55,14 @@ class Cracks:
         names: Sequence[str] | None = None,
         surface: Sequence[tuple[bool, bool]] | None = None,
         law: Sequence[int] | int = 0,
+        join: bool = False,
     ) -> Cracks:
-        """One crack a polyline (n, 2). Nodes are not shared between cracks: crossing cracks are noded by whoever reads
-        the scene. ``surface`` says, crack by crack, which end is a mouth. Raises ValueError naming the crack."""
+        """One crack a polyline (n, 2). ``surface`` says, crack by crack, which end is a mouth.
+
+        ``join``: points that coincide, of one crack or of several, are one node, so that cracks meet, cross and branch
+        there, and a line that ends where it began is a ring. Without it no node is shared; and where lines cross
+        between their points none is made (scenes are noded by whoever reads them). Raises ValueError naming the
+        crack."""
         n = len(polylines)
         names = tuple(names) if names is not None else tuple(f"crack {k}" for k in range(n))
         blocks = np.broadcast_to(np.asarray(block, dtype=int), (n,))
@@ -81,6 +89,11 @@ class Cracks:
             mouth.append(ends)
             first += len(line)
         crack = np.concatenate(crack) if n else np.empty(0, int)
+        if join and n:
+            nodes, segments, mouth = _joined(np.concatenate(nodes), np.concatenate(segments), np.concatenate(mouth))
+            for s in np.flatnonzero(segments[:, 0] == segments[:, 1])[:1]:
+                raise ValueError(f"{names[crack[s]]}: a crack segment has no length beside the network's extent")
+            nodes, segments, mouth = [nodes], [segments], [mouth]
         return cls(
             nodes=np.concatenate(nodes) if n else np.empty((0, 2)),
             segments=np.concatenate(segments) if n else np.empty((0, 2), int),
@@ -135,3 +148,24 @@ class Cracks:
             names=self.names,
             law=self.law[segments],
         )
+
+
+def _joined(nodes: np.ndarray, segments: np.ndarray, mouth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The network with nodes that coincide made one, the first of them; a mouth if one of them is."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    extent = float(np.ptp(nodes, axis=0).max())
+    one, other = cKDTree(nodes).query_pairs(SAME_POINT * extent, output_type="ndarray").T
+    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(len(nodes),) * 2)
+    group = connected_components(links, directed=False)[1]
+    # Numbered by their first nodes, which stay in order.
+    _, first, number = np.unique(group, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    of_node = place[number]
+    mouths = np.zeros(len(first), bool)
+    np.logical_or.at(mouths, of_node, mouth)
+    return nodes[first[order]], of_node[segments], mouths

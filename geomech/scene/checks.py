@@ -325,6 +325,13 @@ def _strength(c: Check) -> None:
             "cracks are to be born, but no material has a strength that could be reached",
             "add tensile_strength_pa or cohesion_pa to a material",
         )
+    for name, m in t.materials.items() if t.growth.enabled and t.growth.initiation else ():
+        if m in strong and m.k_ic_pa_sqrt_m is None:
+            c.refuse(
+                ("materials", name, "k_ic_pa_sqrt_m"),
+                f"material {name!r} has no fracture toughness, and cracks that are born in it may grow",
+                f"add k_ic_pa_sqrt_m to [materials.{name}], Pa √m (1e6 to 2.5e6 for most rocks)",
+            )
 
 
 def _rigid(c: Check) -> None:

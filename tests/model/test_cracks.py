@@ -70,3 +70,23 @@ def test_cracks_in_no_block_and_joint_laws_by_name():
     problem = Problem("t", blocks, Cracks.from_polylines([]), rock, (), joint_of=pairs)
     assert problem.joint_index("y", "x") == 2 and problem.joint_index("x", "z") == 1
     assert problem.joint_index("p", "q") == 0
+
+
+def test_points_that_coincide_are_joined_where_that_is_asked_for():
+    """Three arms from one point, a ring, and a mouth that two cracks share, all with round-off in their points."""
+    turn = np.radians([90, 210, 330])
+    arms = [np.array([[1e-17, -1e-17], [np.cos(q), np.sin(q)]]) for q in turn]
+    star = Cracks.from_polylines(arms, join=True)
+    assert star.segments.tolist() == [[0, 1], [0, 2], [0, 3]] and star.tips.tolist() == [1, 2, 3]
+    assert star.valence.tolist() == [3, 1, 1, 1] and star.crack.tolist() == [0, 1, 2]
+    apart = Cracks.from_polylines(arms)
+    assert len(apart.nodes) == 6 and len(apart.tips) == 6
+    corners = np.column_stack([np.cos(turn), np.sin(turn)])
+    ring = Cracks.from_polylines([[*corners, corners[0] * (1 + 1e-15)], [[5.0, 0], [6, 0]]], join=True)
+    assert ring.segments.tolist() == [[0, 1], [1, 2], [2, 0], [3, 4]] and ring.tips.tolist() == [3, 4]
+    mouth = Cracks.from_polylines(
+        [[[1, 0], [0, 0]], [[0, 0], [1, 1]]], surface=[(False, True), (False, False)], join=True
+    )
+    assert mouth.surface.tolist() == [False, True, False] and mouth.tips.tolist() == [0, 2]
+    with pytest.raises(ValueError, match="short: .*no length beside the network's extent"):
+        Cracks.from_polylines([[[0, 0], [1e-12, 0]], [[1, 0], [2, 0]]], names=["short", "long"], join=True)

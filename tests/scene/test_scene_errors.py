@@ -12,6 +12,13 @@ def line_of(text, fragment):
     return next(n for n, line in enumerate(text.splitlines(), 1) if fragment in line)
 
 
+TUFF = """\
+[materials.tuff]
+youngs_modulus_pa = 1e9
+poissons_ratio = 0.2
+density_kg_m3 = 1800
+tensile_strength_pa = 1e6
+"""
 SPOILT = [
     # old, new, place, message, way out
     (
@@ -42,6 +49,13 @@ SPOILT = [
     ("density_kg_m3 = 2500", "density_kg_m3 = true", "materials.rock.density_kg_m3", "true stands", "density"),
     ("k_ic_pa_sqrt_m = 1e6", "", "materials.rock", "no fracture toughness", "growth.enabled = false"),
     ("[run]", '[growth]\ninitiation = "surface"\n[run]', "growth.initiation", "no material has", "tensile_strength_pa"),
+    (
+        "[run]",
+        '[zones.rock]\nmaterial = "rock"\n[growth]\ninitiation = "surface"\n' + TUFF + "[run]",
+        "materials.tuff",
+        "'tuff' has no fracture toughness, and cracks that are born in it",
+        "k_ic_pa_sqrt_m",
+    ),
     (
         "[run]",
         '[[loads.viscous_boundaries]]\nedge = "load:tip"\n[dda]\ndynamic_factor = 1\n[run]',
