@@ -12,6 +12,11 @@ springs, blocks' own included): it never grows. A contact counts at the start of
 not at all if its weighted force would pull; met or left within a step it loses energy besides, after the idea of Kane,
 Repetto, Ortiz & Marsden (1999), that what comes and goes must act implicitly.
 
+What γ > ½ damps, springs, stress and loads that change with time, is followed to the first order in dt, as Newmark's
+family is bound to be. Where blocks turn, forces act in the middle of the step (`middle`): γ = 2β follows that motion to
+the second order, whatever γ; any other choice leaves (γ − 2β) dt of the acceleration's change in the velocity, v̇ = a +
+(γ − 2β) dt ȧ. Second order and damping together: the α-scheme.
+
 The α-scheme of Wood, Bossak & Zienkiewicz (1981), (1−α) a₁ + α a₀ = M⁻¹ f₁ with all forces f₁ at the end of the step,
 damps what the step does not resolve and leaves the rest alone: with the constants of Chung & Hulbert (1993), α =
 (ϱ−1)/(ϱ+1), γ = ½−α, β = ¼(1−α)², it is of second order and every |λ| falls to the spectral radius ϱ as ω dt → ∞. It is
@@ -36,7 +41,7 @@ GROUND_RATIO = 1e-11
 @dataclass(frozen=True)
 class TimeScheme:
     """Newmark's (1959) β and γ, as ``weight`` θ = 2β of the forces at the end of a step and ``memory`` κ = (2β−γ)/(2β)
-    of the acceleration at its start; ``end`` is 2β too, also in the α-scheme, where θ = 1 and ``recall`` is c.
+    of the acceleration at its start; ``end`` is 2β too, also in the ``alpha`` scheme, where θ = 1 and ``recall`` is c.
     ``static``: nothing is carried from step to step, and all forces stand at its end. ``mass_damping`` 1/s and
     ``stiffness_damping`` s are Rayleigh's, ``block_damping`` the fraction of critical damping of each block's own
     vibration (and of its contacts'). Raises ValueError for what is not unconditionally stable."""
@@ -45,6 +50,7 @@ class TimeScheme:
     memory: float = 0.0
     end: float = 1.0
     recall: float = 0.0
+    alpha: bool = False
     static: bool = False
     block_damping: float = 0.0
     mass_damping: float = 0.0
@@ -54,7 +60,7 @@ class TimeScheme:
     def place(self) -> float:
         """At which part of the step its forces have their places and directions: the α-scheme's are those of its
         end."""
-        return 0.5 if self.recall == 0.0 else 1.0
+        return 1.0 if self.alpha else 0.5
 
     @classmethod
     def of(cls, settings: DdaSettings) -> TimeScheme:
@@ -81,6 +87,7 @@ class TimeScheme:
             weight=2 * beta if radius is None else 1.0,
             end=2 * beta,
             recall=0.0 if radius is None else radius / (1 + radius),
+            alpha=radius is not None,
             memory=(2 * beta - gamma) / (2 * beta),
             block_damping=settings.damping,
             mass_damping=settings.rayleigh_mass,
@@ -106,7 +113,7 @@ class TimeScheme:
     def ahead(self, before: np.ndarray | None, dt: float) -> float:
         """s by which forces that are taken as a mean over a time ``dt`` must be later than the step: the α-scheme's are
         those of the step's end, about which the mean is then taken; arguments as for `begun`."""
-        return 0.0 if self.recall == 0.0 or before is None else 0.5 * dt
+        return 0.5 * dt if self.alpha and before is not None else 0.0
 
     def corrected(
         self, velocity: np.ndarray, before: np.ndarray | None, mean: np.ndarray, turn: np.ndarray, dt: float
@@ -114,7 +121,7 @@ class TimeScheme:
         """Velocity with what the acceleration ``before`` the step (None: that of the step) has to say, and the
         acceleration after it; None where the scheme keeps none. All (n_blocks, 6); ``mean`` ā on the axes before the
         step, ``turn`` (n_blocks,) rad the rotation over it, which ``velocity`` has made already."""
-        if self.memory == 0.0 and self.recall == 0.0:
+        if self.memory == 0.0 and not self.alpha:
             return velocity, None
         before = mean if before is None else before
         change = turned(before - mean, turn)

@@ -26,11 +26,12 @@ class DdaSettings:
     adds multipliers to these springs until closed contacts gape and sticking ones give by less than
     ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``dynamic_factor`` multiplies the
     velocity carried from step to step: 0 is static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1)
-    is Shi's, (¼, ½) the trapezoidal rule, which has no dissipation; in between it has some; 2β ≥ γ ≥ ½.
-    ``spectral_radius`` ϱ of 0 to 1 puts the α-scheme of Wood, Bossak & Zienkiewicz in its place, of second order, which
-    damps by ϱ a step what the step does not resolve. ``damping`` is the fraction of critical damping of a block's own
-    lowest vibration, and of its contacts' (dynamic steps only): below about 0.3 a block that should stick may flutter
-    on its friction and creep, waves that cross many blocks want less; ``rayleigh_mass`` 1/s and ``rayleigh_stiffness``
+    is Shi's, (¼, ½) the trapezoidal rule, which has no dissipation; in between it has some; 2β ≥ γ ≥ ½. With γ > ½ it
+    is of first order (of second for what only falls and turns, if γ = 2β). ``spectral_radius`` ϱ of 0 to 1 puts the
+    α-scheme of Wood, Bossak & Zienkiewicz in its place, of second order, which damps by ϱ a step what the step does not
+    resolve. ``damping`` is the fraction of critical damping of a block's own lowest vibration, and of its contacts'
+    (dynamic steps only): below about 0.3 a block that should stick may flutter on its friction and creep, waves that
+    cross many blocks want less; ``rayleigh_mass`` 1/s and ``rayleigh_stiffness``
     s damp blocks by α M + β K besides (`rayleigh_coefficients` finds them). ``max_displacement_ratio`` bounds the
     largest displacement in a step, in units of half the height of the domain. ``equilibrium`` says when a run seeks
     static equilibrium (`dda.equilibrium`): "" never, "start" before it begins, "loads" at every load of a static run

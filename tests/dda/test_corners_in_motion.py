@@ -71,6 +71,48 @@ def test_a_block_turns_on_its_corner_as_a_pendulum(settings):
     assert missed[1][0] < 0.29 * missed[0][0] < 4e-5 and (np.array(missed)[:, 1] < 1e-4).all()
 
 
+def pivoting(dt: float, end: float, **settings) -> np.ndarray:
+    """Angle and speed at ``end`` (s) of a pentagon that turns on its corner, 3 rad/s at the start."""
+    system = above(regular(5, 0.5, -12.0, 0.0), 60.0, **settings)
+    state = State.at_rest(system.blocks)
+    state.velocity[1, :3] = [1.5, 0.0, -3.0]
+    while state.time < end * (1 - 1e-9):
+        state = system.step(state, WEIGHT, min(dt, end - state.time)).state
+    return -np.array([state.rotation[1], state.velocity[1, 2]])
+
+
+def pivot(end: float, delay: float = 0.0) -> np.ndarray:
+    """The same of the pendulum I θ'' = m g r sin θ. With accelerations a + ``delay`` ȧ the moment of the force F of the
+    corner does not change as that of F + ``delay`` Ḟ does, but by ``delay`` ṙ × F more: r θ' m (g cos θ − r θ'²)."""
+    r, polygon = 0.5, regular(5, 0.5, -12.0, 0.0)
+    area, _, _, xx, yy, _ = block_moments(polygon, np.roll(np.arange(5), -1), np.array([0, 5]))[0]
+    share = r * r / ((xx + yy) / area + r * r)
+
+    def rates(t, y):
+        turn, speed = y
+        return [speed, share * (9.81 / r * np.sin(turn) + delay * speed * (9.81 / r * np.cos(turn) - speed * speed))]
+
+    return solve_ivp(rates, (0, end), [0, 3.0], rtol=1e-10, atol=1e-12).y[:, -1]
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.4142, 0.8])
+def test_the_alpha_scheme_follows_a_block_that_turns_to_second_order(radius):
+    missed = np.array([pivoting(dt, 0.1, spectral_radius=radius) / pivot(0.1) - 1 for dt in (1e-2, 5e-3, 2.5e-3)])
+    print(f"ϱ = {radius}: angle and speed off by {missed.tolist()}")
+    assert np.log2(missed[:-1] / missed[1:]) == pytest.approx(2.0, abs=0.2) and np.abs(missed[-1]).max() < 7e-5
+
+
+@pytest.mark.parametrize("newmark", [(1.0, 1.5), (0.75, 1.0), (0.5, 0.75)])
+def test_newmarks_scheme_off_gamma_2_beta_is_late_by_that_of_a_step(newmark):
+    """v̇ = a + (γ − 2β) dt ȧ, from steps of two lengths by Richardson's extrapolation."""
+    beta, gamma = newmark
+    exact, dt = pivot(0.1), 5e-3
+    found = [(pivoting(step, 0.1, newmark=newmark) - exact) / step for step in (dt, 0.5 * dt)]
+    foreseen = (pivot(0.1, (gamma - 2 * beta) * 1e-4) - exact) / 1e-4
+    print(f"{newmark}: angle and speed off by {found[0]}, {found[1]} of dt, foreseen {foreseen}")
+    assert 2 * found[1] - found[0] == pytest.approx(foreseen, rel=0.03)
+
+
 @pytest.mark.parametrize("settings", [{}, {"contact": "augmented"}], ids=["springs", "multipliers"])
 def test_a_block_that_falls_over_in_statics_stays_on_its_corner_and_gains_no_energy(settings):
     """Nothing holds it: it turns by some 0.02 rad a step about a corner, which would lift off the floor by 1e-4 of the

@@ -27,7 +27,7 @@ class DdaTable(Table):
     newmark: Pair = Field(
         (0.5, 1.0),
         description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation; "
-        "2β ≥ γ ≥ 0.5",
+        "2β ≥ γ ≥ 0.5; γ > 0.5 damps and is of first order, `spectral_radius` damps and is of second",
     )
     spectral_radius: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
