@@ -195,7 +195,7 @@ class Bordered:
         """(n, n) S."""
         n, k = self.n_firm, len(self.loose.corner)
         out = np.empty((n + k, n + k), order="F")
-        out[:n, :n], out[n:, :n], out[:n, n:], out[n:, n:] = self.firm.s[:n, :n], *self.loose[:3]
+        out[:n, :n], out[n:, :n], out[:n, n:], out[n:, n:] = self.firm.matrix(n), *self.loose[:3]
         return out.T[np.ix_(self.places, self.places)].T
 
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
@@ -203,7 +203,7 @@ class Bordered:
         n, x = self.n_firm, np.zeros((self.n_firm + len(self.loose.corner), *w.shape[1:]))
         x[self.places] = w
         first, last = x[:n], x[n:]
-        above = self.firm.s[:n, :n] @ first + self.loose.right @ last
+        above = self.firm.matrix(n) @ first + self.loose.right @ last
         return np.concatenate([above, self.loose.down @ first + self.loose.corner @ last])[self.places]
 
     def factored(self) -> BorderedFactor:

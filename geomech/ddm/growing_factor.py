@@ -1,4 +1,4 @@
-"""A matrix that grows at its end, and its LU factors, in arrays with room: what is there is never touched again.
+"""A matrix that grows at its end, piece by piece, and its LU factors, in arrays with room: what is there stays.
 
 Of the matrix [[A, B], [C, D]] with A = Pᵀ L U,
 
@@ -52,7 +52,8 @@ class GrowingFactor:
     def __init__(self, matrix: np.ndarray, names: list[Hashable], factor: Factor | None = None):
         self.n, self.names, self._factor = len(matrix), names, factor
         self._room(len(matrix))
-        self.s[: self.n, : self.n] = matrix
+        #: The first matrix, and the borders that came behind it.
+        self._first, self._borders = matrix, []
         #: Ends of what came together, what was known of it, and of what is eliminated the worst reciprocal condition
         #: and loss of accuracy so far.
         self._ends, self._known = [self.n], [None]
@@ -60,14 +61,14 @@ class GrowingFactor:
 
     def _room(self, n: int) -> None:
         room = int(ROOM * n) + MORE_ROOM
-        self.s, self.lu = np.empty((room, room), order="F"), np.empty((room, room), order="F")
+        self.lu = np.empty((room, room), order="F")
         self.scale, self.order = np.empty(room), np.empty(room, int)
 
     def __getstate__(self) -> dict:
         """Without the room, which may hold anything."""
         n = self.n
         arrays = {name: getattr(self, name)[(slice(n),) * getattr(self, name).ndim].copy() for name in _ARRAYS}
-        return vars(self) | arrays | {"room": len(self.s)}
+        return vars(self) | arrays | {"room": len(self.lu)}
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -80,14 +81,13 @@ class GrowingFactor:
     def append(self, border: Border, names: list[Hashable]) -> None:
         """Put ``border`` behind all that is there."""
         n, end = self.n, self.n + len(border.corner)
-        if end > len(self.s):
-            before = self.s, self.lu, self.scale, self.order
+        if end > len(self.lu):
+            before = self.lu, self.scale, self.order
             self._room(end)
-            for old, new in zip(before, (self.s, self.lu, self.scale, self.order)):
+            for old, new in zip(before, (self.lu, self.scale, self.order)):
                 new[(slice(n),) * old.ndim] = old[(slice(n),) * old.ndim]
-        here = slice(n, end)
-        self.s[here, :n], self.s[:n, here], self.s[here, here] = border.down, border.right, border.corner
-        self.scale[here] = border.scale
+        self._borders.append(border._replace(known=None))
+        self.scale[n:end] = border.scale
         self.n, self.names = end, self.names + names
         self._ends.append(end)
         self._known.append(border.known)
@@ -100,9 +100,23 @@ class GrowingFactor:
     def part(self, n: int) -> GrowingFactor:
         """A copy of the first ``n`` unknowns, that may grow in another way."""
         at = self._ends.index(n) + 1
-        out = GrowingFactor(self.s[:n, :n], self.names[: len(self.names) * n // self.n], self._factor)
+        out = GrowingFactor(self._first, self.names[: len(self.names) * n // self.n], self._factor)
+        out.n, out._borders = n, self._borders[: at - 1]
+        if n > len(out.lu):
+            out._room(n)
         out._ends, out._known, out._trust = self._ends[:at], self._known[:at], self._trust[:at]
         out.lu[:n, :n], out.scale[:n], out.order[:n] = self.lu[:n, :n], self.scale[:n], self.order[:n]
+        return out
+
+    def matrix(self, n: int) -> np.ndarray:
+        """(n, n), column-major, the first ``n`` unknowns' matrix."""
+        out, first = np.empty((n, n), order="F"), len(self._first)
+        out[:first, :first] = self._first
+        for border in self._borders[: self._ends.index(n)]:
+            end = first + len(border.corner)
+            out[first:end, :first], out[:first, first:end] = border.down, border.right
+            out[first:end, first:end] = border.corner
+            first = end
         return out
 
     # -- elimination ---------------------------------------------------------------------------------------------
@@ -120,13 +134,12 @@ class GrowingFactor:
             first, end = self._ends[k - 1] if k else 0, self._ends[k]
             here = slice(first, end)
             if not k:
-                factor = self._factor or Factor(np.array(self.s[here, here], order="F"), what)
+                factor = self._factor or Factor(np.array(self._first, order="F"), what)
                 self.lu[here, here], self.order[here] = factor.lu, factor.rows
                 self.scale[here], self._factor = factor.scale, None
                 self._trust.append((factor.rcond, 1.0))
             else:
-                down, right, corner = self.s[here, :first], self.s[:first, here], self.s[here, here]
-                lower, upper, t = self.beside(first, Border(down, right, corner, self.scale[here], self._known[k]))
+                lower, upper, t = self.beside(first, self._borders[k - 1]._replace(known=self._known[k]))
                 self._eliminated(first, lower, upper, t, Factor(t, what))
         return self._trust[upto]
 
@@ -229,7 +242,7 @@ class GrowingFactor:
 
 
 #: What has room.
-_ARRAYS = ("s", "lu", "scale", "order")
+_ARRAYS = ("lu", "scale", "order")
 
 
 def loss(lower: np.ndarray, upper: np.ndarray, t: np.ndarray) -> float:

@@ -148,16 +148,16 @@ def test_cracks_that_grow_together_round_a_piece_are_seen():
 
 
 def test_trials_and_bends_of_a_run_keep_factors():
-    """Fifteen steps under compression, each tried and bent a few times: few of the bodies are factored as wholes, and
+    """Eighteen steps under compression, each tried and bent a few times: few of the bodies are factored as wholes, and
     factors that have grown with so many others agree with fresh ones."""
     press = ddm.BodyLoad(sides={0: (0.0, 1e6), 2: (0.0, -1e6)})
     rock, work = replace(ROCK, k_ic=1e6), Work()
     growth = GrowthSettings(increment=0.05, min_increment=0.05)
-    options = {"control": "toughness", "max_steps": 15, "work": work}
+    options = {"control": "toughness", "max_steps": 18, "work": work}
     *_, last = ddm.propagate([PLATE], network(0), rock, press, growth, SETTINGS, **options)
     alone = Body([PLATE], last.cracks, rock, SETTINGS).solve(press.scaled(last.load_factor))
     k, k_alone = (np.stack([s.tips["k_i"], s.tips["k_ii"]]) for s in (last.solution, alone))
     assert np.abs(k - k_alone).max() < 1e-10 * np.abs(k_alone).max()
-    assert last.number == 14 and work.bodies >= 30
+    assert last.number == 17 and work.bodies >= 30
     # Measured: 2 of 31.
     assert work.crack_factorisations < 0.2 * work.bodies
