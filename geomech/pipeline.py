@@ -153,17 +153,37 @@ class CoupledRun:
         self.checkpoints.write(coupling.now.number, coupling.now.state.time, content)
 
 
-def factor_of_safety(scene, load_time: float | None = None, **wishes):
+class CracksInBlocks(ValueError):
+    """A factor of safety was asked for of blocks that rock bridges between cracks may hold together."""
+
+
+def cracked_and_free(problem: Problem) -> list[str]:
+    """The names of the cracks that lie in blocks that are not fixed."""
+    cracks = problem.cracks
+    free = ~problem.blocks.fixed[cracks.block]
+    return [cracks.names[k] for k in sorted(set(cracks.crack[free].tolist()))]
+
+
+def factor_of_safety(scene, load_time: float | None = None, *, without_cracks: bool = False, **wishes):
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
     (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: reduce, tolerance, watch …
 
-    Blocks are whole: cracks inside them are left out. Raises SceneError on bad input, `geomech.dda.NothingToReduce`
-    where there is no strength to reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints
-    hold.
+    Blocks are whole. ``without_cracks``: cracks inside blocks that can move are left out, so that what rock bridges
+    hold counts as if they never broke: the answer is then a bound from above. Raises `CracksInBlocks` where there are
+    such cracks and it is not said, SceneError on bad input, `geomech.dda.NothingToReduce` where there is no strength to
+    reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
     """
     from . import dda
 
     problem = _loaded(scene).problem()
+    cracks = cracked_and_free(problem)
+    if cracks and not without_cracks:
+        more = f" and {len(cracks) - 3} more" if len(cracks) > 3 else ""
+        raise CracksInBlocks(
+            f"no factor of safety: {', '.join(cracks[:3])}{more} lead into blocks that can move, and what rock bridges "
+            "hold there would count as if it could not break. `geomech run` breaks them: let the loads grow, or the "
+            "strength of [joints] and the toughness of [materials] be divided by the factor that is to be proven"
+        )
     return dda.factor_of_safety(
         problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index,
         load_time=problem.run.end_time if load_time is None else load_time, **wishes,

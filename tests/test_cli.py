@@ -412,6 +412,36 @@ def test_safety_prints_trials_and_mechanism(tmp_path, capsys):
     assert main(["safety", str(scene), "--set", "joints.default.friction_angle_deg=0.0"]) == BAD_INPUT
 
 
+def with_crack(points: str) -> str:
+    """The slope with a crack through its rock."""
+    cracked = SLOPE.replace("[materials.rock]", f'cracks = [{{ name = "flaw", points = {points} }}]\n[materials.rock]')
+    return cracked.replace("density_kg_m3 = 2600", "density_kg_m3 = 2600\nk_ic_pa_sqrt_m = 2e6")
+
+
+def test_safety_gives_no_factor_of_blocks_that_rock_bridges_may_hold(tmp_path, capsys):
+    scene, answer = tmp_path / "slope.toml", tmp_path / "safety.json"
+    scene.write_text(with_crack("[[5.0, 2.8], [5.0, 3.2]]"))
+    asked = ["safety", str(scene), "--quiet", "--out", str(answer)]
+    assert main(asked) == BAD_INPUT
+    out, err = capsys.readouterr()
+    assert "factor" not in out and "no factor of safety: flaw" in err and "--without-cracks" in err
+    assert not answer.exists()
+    assert main([*asked, "--without-cracks"]) == DONE
+    out, _ = capsys.readouterr()
+    factor = math.tan(math.radians(35)) / 0.5
+    assert f"factor of the blocks without their cracks {factor:.4f}" in out and "factor of safety 1" not in out
+    told = json.loads(answer.read_text())["scene"]
+    assert told["factor_of_safety"] is None and told["factor_without_cracks"] == pytest.approx(factor, rel=1e-6)
+    assert told["cracks_left_out"] == ["flaw"] and told["caution"] in out
+
+
+def test_a_crack_in_fixed_rock_takes_nothing_from_a_factor_of_safety(tmp_path, capsys):
+    scene = tmp_path / "slope.toml"
+    scene.write_text(with_crack("[[8.0, 1.0], [8.5, 2.0]]"))
+    assert main(["safety", str(scene), "--quiet"]) == DONE
+    assert f"factor of safety {math.tan(math.radians(35)) / 0.5:.4f}" in capsys.readouterr().out
+
+
 def test_a_fault_of_ours_is_no_bad_input_of_safety(tmp_path, capsys, monkeypatch):
     from geomech import dda
 

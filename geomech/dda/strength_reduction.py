@@ -74,8 +74,8 @@ class FactorOfSafety:
     mechanism: tuple[str, ...]
     state: State
 
-    def table(self) -> str:
-        """The trials by F, and the mechanism, as text."""
+    def table(self, title: str = "factor of safety") -> str:
+        """The trials by F, the factor under its ``title``, and the mechanism, as text."""
         lines = ["       F  equilibrium  steps  unbalanced  drift m/s²"]
         for t in sorted(self.trials, key=lambda t: t.factor):
             answer = "yes" if t.stable else "no"
@@ -83,7 +83,7 @@ class FactorOfSafety:
                 f"{t.factor:8.4f}  {answer:<11}  {t.steps:5d}  {t.unbalanced:10.2e}  {t.drift:10.2e}  {t.reason}"
             )
         found = f"{self.factor:.4f}" if math.isfinite(self.upper) else f"above {self.lower:g}"
-        lines.append(f"factor of safety {found}" + (", moving at failure:" if self.mechanism else ""))
+        lines.append(f"{title} {found}" + (", moving at failure:" if self.mechanism else ""))
         return "\n".join([*lines, *(f"  {line}" for line in self.mechanism)])
 
     def as_dict(self, blocks: Blocks) -> dict[str, object]:
