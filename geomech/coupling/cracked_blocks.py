@@ -41,7 +41,8 @@ class CrackedBlocks:
         self.monitors = dict(problem.monitors)
         self.number = 0
         self.load_step = 0
-        self.timed = Phases()
+        self.timed, self.each = Phases(), Phases()
+        self.block_work = dda.Work()
         self.works: list[Work] = []
         self.bodies: dict[int, object] = {}
         self.solutions: dict[int, object] = {}
@@ -114,8 +115,9 @@ class CrackedBlocks:
         what is known of their cracks is kept."""
         problem = self.problem
         self.system = dda.BlockSystem(
-            self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda
-        )
+            self.blocks, problem.materials, problem.joints, joint_index=problem.joint_index, settings=problem.dda,
+            work=self.block_work,
+        )  # fmt: skip
         n = self.blocks.n_blocks
         self.nodes_of = {}
         response = dda.CrackResponse(np.zeros((n, 3, 3)), np.zeros((n, 3)))

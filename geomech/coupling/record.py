@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..ddm.work import Work
-from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, State
+from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, Skip, State
 
 if TYPE_CHECKING:
     from .cracked_blocks import CrackedBlocks
@@ -26,6 +26,7 @@ def record(
     endless = now.problem.endless
     if endless is not None:
         state = replace(state, stress=np.broadcast_to(endless.stress_at(state.time), state.stress.shape).copy())
+    work = vars(Work.total(now.works)) if now.works else {}
     cycle = Cycle(
         number=now.number,
         load_step=now.load_step,
@@ -42,10 +43,31 @@ def record(
         monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in now.monitors.items()},
         statistics=statistics,
         seconds=dict(now.timed.seconds),
-        work=vars(Work.total(now.works)) if now.works else {},
+        work=work,
+        skips=skips(now, work),
     )
     vars(cycle)["motion"] = motion  # known here: the property need not find it again
     return cycle
+
+
+def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
+    """What has not been done until now, since nothing had changed, for those of which there was some. Where each piece
+    of work is timed, the first, in which kernels are loaded, is left out of its mean."""
+    blocks, seconds = now.block_work, now.timed.seconds
+    found = {
+        "pair searches": Skip(blocks.pair_searches_kept, blocks.pair_searches - 1, blocks.pair_search_s),
+        "contact searches": Skip(blocks.lone_searches),
+        "factorisations": Skip(blocks.factorisations_kept, blocks.factorisations - 1, blocks.factorisation_s),
+    }
+    if work:
+        found |= {
+            "bodies": Skip(work["bodies_kept"], work["bodies"], seconds.get("ddm assembly", 0.0)),
+            "solutions": Skip(work["solutions_kept"], work["solutions"], seconds.get("ddm solve", 0.0)),
+            "compliances": Skip(
+                work["compliances_kept"], work["compliances"] - 1, now.each.seconds.get("compliances", 0.0)
+            ),
+        }
+    return {name: skip for name, skip in found.items() if skip.kept}
 
 
 def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Event:

@@ -21,6 +21,7 @@ from .strength_reduction import FactorOfSafety, NothingToReduce, factor_of_safet
 from .system import BlockSystem, run
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts
+from .work import Work
 
 __all__ = [
     "EDGE_FORCE",
@@ -41,6 +42,7 @@ __all__ = [
     "StepResult",
     "TimeScheme",
     "ToldContacts",
+    "Work",
     "block_moments",
     "contact_resultants",
     "displacement_matrix",

@@ -16,6 +16,7 @@ from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
+from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
 _TOUCH = 1e-7
@@ -34,7 +35,7 @@ class ContactFinder:
     """Finds the contacts of ``blocks`` and gives each its law and springs.
 
     ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow;
-    ``rigid`` (n_blocks,) those that do not strain.
+    ``rigid`` (n_blocks,) those that do not strain; ``work`` counts searches.
     """
 
     def __init__(
@@ -45,7 +46,9 @@ class ContactFinder:
         settings: DdaSettings,
         modulus: np.ndarray,
         rigid: np.ndarray,
+        work: Work | None = None,
     ) -> None:
+        self._work = work
         self.names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
         self._edge_names = blocks.edge_names
         self._n_joints = len(joints)
@@ -72,7 +75,7 @@ class ContactFinder:
         """Find no more contacts of the blocks ``removed`` (n_blocks,)."""
         self._removed = removed
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
-        self._near = NearPairs(self._start, self._fixed)
+        self._near = NearPairs(self._start, self._fixed, self._work)
 
     def find(
         self,

@@ -6,8 +6,12 @@ more (Verlet 1967). Which pairs are looked at so depends on the past; which cont
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from numba import njit
+
+from .work import Work
 
 #: Pairs are sought within this many times the window of contacts: wide enough to last some steps of the largest motion
 #: allowed and many of the usual ones, and narrow beside a block.
@@ -74,26 +78,31 @@ def near_pairs(box: np.ndarray, fixed: np.ndarray, reach: float) -> np.ndarray:
 
 
 class NearPairs:
-    """Keeps the pairs of one system of blocks: ``vertex_start`` (n_blocks + 1,), ``fixed`` (n_blocks,)."""
+    """Keeps the pairs of one system of blocks: ``vertex_start`` (n_blocks + 1,), ``fixed`` (n_blocks,). ``work`` counts
+    how often they were sought, and were not."""
 
-    def __init__(self, vertex_start: np.ndarray, fixed: np.ndarray) -> None:
+    def __init__(self, vertex_start: np.ndarray, fixed: np.ndarray, work: Work | None = None) -> None:
         self._first, self._fixed = vertex_start[:-1], fixed
         self._vertices: np.ndarray | None = None
         self._pairs = np.empty((0, 2), np.int64)
         self._reach = 0.0
-        #: How often pairs were sought.
-        self.searches = 0
+        self.work = work or Work()
 
     def of(self, vertices: np.ndarray, window: float) -> np.ndarray:
         """All pairs that may be nearer than ``window`` m on ``vertices`` (n_vertices, 2), and some that are not; of one
         block none is looked for."""
         if len(self._first) < 2:
+            self.work.lone_searches += 1
             return np.zeros((0, 2), np.int64)
         if self._vertices is None or not window + 2.0 * np.abs(vertices - self._vertices).max() <= self._reach:
+            began = time.perf_counter()
             self._reach = _REACH * window
             self._vertices = vertices.copy()
             self._pairs = near_pairs(boxes(vertices, self._first), self._fixed, self._reach)
-            self.searches += 1
+            self.work.pair_search_s += (time.perf_counter() - began) if self.work.pair_searches else 0.0
+            self.work.pair_searches += 1
+        else:
+            self.work.pair_searches_kept += 1
         return self._pairs
 
 

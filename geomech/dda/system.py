@@ -24,6 +24,7 @@ from .step_length import StepLength
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, told_rows
 from .turned_in import turned_in
+from .work import Work
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +44,7 @@ class BlockSystem:
     ``joint_index(edge_name, other_name)`` gives the index in ``joints`` of the law between two edges; None from it
     means that such edges do not touch; without it the first law holds everywhere. Contact springs are
     ``settings.normal_penalty`` and ``shear_penalty`` (Pa), by default both 40 times the E' of the two blocks
-    (`penalties`).
+    (`penalties`). ``work`` counts what is done, of systems that share it together.
 
     What every `Attempt` at a step reads is made once: ``density`` (kg/m³), ``mass`` (kg/m), ``stiffness`` and
     ``compliance`` (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
@@ -62,7 +63,9 @@ class BlockSystem:
         joints: Sequence[JointLaw] = (),
         joint_index: Callable[[str, str], int | None] | None = None,
         settings: DdaSettings | None = None,
+        work: Work | None = None,
     ) -> None:
+        self.work = work or Work()
         if blocks.n_blocks and int(np.max(blocks.material)) >= len(materials):
             raise ValueError(f"a block names material {int(np.max(blocks.material))}, but there are {len(materials)}")
         self.blocks = blocks
@@ -81,7 +84,7 @@ class BlockSystem:
         rigid = np.array([m.rigid for m in self.materials])[of]
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
-        self.finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid)
+        self.finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid, self.work)
         self._take_out(None, None)
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
@@ -124,7 +127,7 @@ class BlockSystem:
     def in_statics(self) -> BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
         settings = replace(self.settings, dynamic_factor=0.0)
-        return BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings)
+        return BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings, self.work)
 
     def removed(self, loads: Loads, time: float) -> np.ndarray | None:
         """(n_blocks,) True for blocks that ``loads`` have taken out by ``time``; None before any is."""
@@ -305,6 +308,7 @@ class BlockSystem:
                 return pattern
         kept = None if pattern is None else pattern.solver
         pattern = assembly.sparse_pattern(self.free, block, other, moments[:, 1:3], kept)
+        pattern.solver.work = self.work
         self._sparse = pairs, pattern
         return pattern
 

@@ -16,6 +16,7 @@ class Work:
     crack_borderings               of these factors by what is new, instead
     back_substitutions             right-hand sides solved for with these
     solutions, contact_solves      loads solved for, and passes of the contact of crack faces in them
+    compliances                    of cracked bodies, worked out
     bodies_kept, solutions_kept, compliances_kept     what was asked for again with nothing changed, and so not done
     """
 
@@ -28,6 +29,7 @@ class Work:
     back_substitutions: int = 0
     solutions: int = 0
     contact_solves: int = 0
+    compliances: int = 0
     bodies_kept: int = 0
     solutions_kept: int = 0
     compliances_kept: int = 0

@@ -13,7 +13,7 @@ from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, Vi
 from .material import Material
 from .motion import Motion
 from .problem import CHANGES, STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
-from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, State
+from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Skip, State
 
 __all__ = [
     "BOLT",
@@ -55,6 +55,7 @@ __all__ = [
     "Problem",
     "Roughness",
     "RunSettings",
+    "Skip",
     "State",
     "ViscousBoundary",
     "WaterTable",

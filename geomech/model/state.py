@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -141,6 +141,20 @@ class CrackFaces:
     state: np.ndarray
 
 
+class Skip(NamedTuple):
+    """Work that was asked for ``kept`` times more than it was ``done``, since what it had given before still held;
+    ``seconds``: what it took where it was done (0: not known)."""
+
+    kept: int
+    done: int = 0
+    seconds: float = 0.0
+
+    @property
+    def saved(self) -> float | None:
+        """About so many seconds, by the mean of what was done; None where nothing was."""
+        return self.kept * self.seconds / self.done if self.done > 0 else None
+
+
 @dataclass(frozen=True, eq=False)
 class Cycle:
     """One coupling cycle, complete: what observers (writers, progress, pictures) see.
@@ -157,6 +171,7 @@ class Cycle:
     monitors    name → displacement (2,) of the monitor point, m
     statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
     work        what the crack solver has done so far: assemblies, factorisations, back-substitutions, contact solves
+    skips       what was not done so far since nothing had changed, by name
     seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
     """
 
@@ -176,6 +191,7 @@ class Cycle:
     statistics: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     work: dict[str, int] = field(default_factory=dict)
+    skips: dict[str, Skip] = field(default_factory=dict)
 
     @cached_property
     def motion(self) -> Motion:

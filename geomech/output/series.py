@@ -7,13 +7,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-from geomech.model import CHANGES, Cycle, Problem
+from geomech.model import CHANGES, Cycle, Problem, Skip
 
 from . import grids
 from .beside import Beside
 from .checkpoint import FilesChanged
 from .fields import SERIES
 from .interior import InteriorMeshes
+from .skipped import told
 from .triangulate import Triangles
 from .vtu import Collection, Grid, GridFiles, world_origin
 
@@ -27,6 +28,7 @@ QUIET = 10
 #: What a `Series` knows of the run so far, besides what it has listed.
 _REMEMBERED = (
     "_triangles", "_lines", "_meshes", "_keys", "_time", "_pending", "_last_interior", "_segments_then", "seconds",
+    "_cycles", "_cracked", "_interior_seconds", "_series_seconds",
 )  # fmt: skip
 
 #: Grids with more bytes of fields than these take longer to pack (some 20 ms a MB) than to hand over to another thread.
@@ -57,6 +59,8 @@ class Series:
         self._time = SeriesTime()
         self._pending: tuple[Cycle, float, bool] | None = None
         self._last_interior, self._segments_then = -1, 0
+        self._cycles = self._cracked = 0
+        self._interior_seconds = self._series_seconds = 0.0
         self._open(problem, Path(folder), {})
         # Files of a run before this one in the same folder are written over.
         self._old = self._unlisted()
@@ -99,6 +103,8 @@ class Series:
 
     def on_cycle(self, cycle: Cycle) -> None:
         began = time.perf_counter()
+        self._cycles += 1
+        self._cracked += bool(cycle.bodies)
         if self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks:
             self._write_last_interior()  # of the rock while it was whole
         # Every cycle takes its time, written or not, so that the times do not depend on what is left out.
@@ -129,6 +135,19 @@ class Series:
                 (self._vtk / name).unlink(missing_ok=True)
         self.seconds += time.perf_counter() - began
         summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
+        summary.setdefault("skipped", {}).update(
+            {name: told(name, skip) for name, skip in self._skips().items() if skip.kept > 0}
+        )
+
+    def _skips(self) -> dict[str, Skip]:
+        """What was not written, beside what was; the first interior fields, for which Gmsh is loaded, are not timed."""
+        inside, all_of = (
+            len(self._collections[name].entries) if name in self._collections else 0 for name in ("interior", "blocks")
+        )
+        return {
+            "interior fields": Skip(self._cracked - inside, inside - 1, self._interior_seconds),
+            "series": Skip(self._cycles - all_of, all_of, self._series_seconds),
+        }
 
     def _interior_wanted(self, cycle: Cycle) -> bool:
         if not self.interior_every or cycle.number == 0 or not (cycle.bodies or self._last_interior >= 0):
@@ -140,11 +159,12 @@ class Series:
         return cycle.number - self._last_interior >= self.interior_every * (1 if grew else QUIET)
 
     def _write(self, cycle: Cycle, at: float) -> None:
-        motion, shape = cycle.motion, self.configuration
+        began, motion, shape = time.perf_counter(), cycle.motion, self.configuration
         self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles, self._keys))
         self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape, self._lines))
         self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
         self._save("contacts", cycle, at, grids.contacts_grid(cycle, shape))
+        self._series_seconds += time.perf_counter() - began
 
     def _write_last_interior(self) -> None:
         """The interior of the last cycle that came, unless it is written or there is none."""
@@ -158,8 +178,10 @@ class Series:
         self._last_interior, self._segments_then = cycle.number, cycle.cracks.n_segments
 
     def _interior(self, cycle: Cycle, at: float) -> None:
+        began = time.perf_counter()
         grid = self._meshes.grid(cycle, self._materials, cycle.motion, self.configuration)
         self._put("interior", cycle, at, grid)
+        self._interior_seconds += (time.perf_counter() - began) if self._collections["interior"].entries[1:] else 0.0
 
     def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
         """Small grids at once; large ones beside the run, which need not wait until they are packed. A series that has

@@ -19,6 +19,7 @@ from geomech.model import Cycle, Event, Problem
 
 from .condition import energy_summary, key_block_summary, motion_summary
 from .crack_trust import crack_trust
+from .skipped import skipped
 
 #: What a `Summary` has counted.
 _COUNTED = ("_last", "_events", "_peak", "_load_steps", "_growth_passes", "_grown")
@@ -74,7 +75,8 @@ class Summary:
             seconds.update({phase: round(value, 4) for phase, value in last.seconds.items()})
         if last is not None and last.work:
             summary["crack_solver"] = last.work
-            summary["skipped"] = skipped(last.work, last.seconds)
+        if last is not None:
+            summary["skipped"] = skipped(self._problem, last) | summary.get("skipped", {})
         if last is not None and last.bodies and error is None:
             summary["crack_trust"] = crack_trust(last)
         first: dict[str, dict[str, Any]] = {}
@@ -117,23 +119,6 @@ class Summary:
         if event.detail:
             told["detail"] = event.detail
         return told
-
-
-def skipped(work: dict[str, int], seconds: dict[str, float]) -> dict[str, dict[str, float]]:
-    """What a run did not do since nothing had changed: how often, and about how long it would have taken, by the mean
-    of those that were done (s): elastic bodies of unchanged geometry, solutions under the very same load,
-    compliances."""
-    each = {
-        "bodies": ("bodies", "ddm assembly"),
-        "solutions": ("solutions", "ddm solve"),
-    }
-    told: dict[str, dict[str, float]] = {}
-    for name, (done, phase) in each.items():
-        count = work[f"{name}_kept"]
-        mean = seconds.get(phase, 0.0) / work[done] if work[done] else 0.0
-        told[name] = {"count": count, "saved_s": round(count * mean, 4)}
-    told["compliances"] = {"count": work["compliances_kept"]}
-    return told
 
 
 def normalisation(problem: Problem) -> tuple[float, float] | None:

@@ -296,6 +296,10 @@ def add_time(page: Page, summary: Mapping[str, Any]) -> None:
     work = summary.get("crack_solver")
     if work:
         page.table(["what the crack solver did", "times"], [[name.replace("_", " "), n] for name, n in work.items()])
+    skipped = summary.get("skipped")
+    if skipped:
+        rows = [[entry.get("what", name), entry["count"], entry.get("saved_s")] for name, entry in skipped.items()]
+        page.table(["what had not to be done", "times", "saved, s"], rows)
 
 
 def add_remaking(page: Page, run: Run) -> None:

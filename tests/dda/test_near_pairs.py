@@ -33,13 +33,13 @@ def test_pairs_are_sought_again_only_after_enough_motion():
     def pairs(x: float) -> int:
         return len(near.of(np.concatenate([square, square + [x, 0.0]]), window))
 
-    assert (pairs(1.24), near.searches) == (0, 1)
+    assert (pairs(1.24), near.work.pair_searches) == (0, 1)
     # 4 cm nearer, the boxes are still 20 cm apart, as far as pairs were sought.
-    assert (pairs(1.2), near.searches) == (0, 1)
-    assert (pairs(1.15), near.searches) == (1, 2)
-    assert (pairs(1.11), near.searches) == (1, 2)
+    assert (pairs(1.2), near.work.pair_searches) == (0, 1)
+    assert (pairs(1.15), near.work.pair_searches) == (1, 2)
+    assert (pairs(1.11), near.work.pair_searches) == (1, 2)
     window = 0.21
-    assert (pairs(1.11), near.searches) == (1, 3)
+    assert (pairs(1.11), near.work.pair_searches) == (1, 3)
 
 
 def test_results_are_the_same_with_pairs_kept_and_sought_every_time(monkeypatch):
@@ -56,6 +56,6 @@ def test_results_are_the_same_with_pairs_kept_and_sought_every_time(monkeypatch)
     kept, one = states()
     monkeypatch.setattr(module, "_REACH", 1.0)
     anew, other = states()
-    assert kept.finder._near.searches < 0.7 * anew.finder._near.searches
+    assert kept.work.pair_searches < 0.7 * anew.work.pair_searches
     assert np.array_equal(one.vertices, other.vertices)
     assert np.array_equal(one.contacts, other.contacts)

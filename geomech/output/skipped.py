@@ -1,0 +1,48 @@
+"""What a run had no need to do: each kind in words, how often, and about what it would have taken."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from geomech.model import Cycle, Problem, Skip
+
+#: Kinds of work in words, and what spared it.
+WORDS = {
+    "crack solver": "cycles without the crack solver, which was not even loaded: nothing is cracked, and nothing may be",
+    "contact searches": "searches for contacts of a block that is the only one",
+    "pair searches": "searches for near pairs of blocks, none of which had moved far enough since the last",
+    "factorisations": "factorisations of the blocks' matrix, from which it had hardly changed since the last",
+    "bodies": "assemblies of cracked blocks whose cracks had not grown",
+    "solutions": "solutions of cracked blocks under a load that had been solved for",
+    "compliances": "compliances of cracked blocks whose crack faces were in the states of before",
+    "interior fields": "cycles whose fields inside cracked blocks were not written",
+    "series": "cycles whose ParaView files were not written",
+    "modules": "parts that were not loaded",
+}
+
+#: What a run may do without, and how to tell whether it did: the module that stands for it.
+PARTS = {
+    "crack solver": "geomech.ddm.body", "Gmsh": "gmsh", "VTK": "vtkmodules", "matplotlib": "matplotlib",
+    "PyVista": "pyvista",
+}  # fmt: skip
+
+
+def told(name: str, skip: Skip) -> dict[str, Any]:
+    """An entry of the summary: ``what`` was not done, its ``count``, and ``saved_s``, about how long it would have
+    taken by the mean of those that were done, where some were."""
+    entry: dict[str, Any] = {"what": WORDS[name], "count": skip.kept}
+    if skip.saved is not None:
+        entry["saved_s"] = round(skip.saved, 4)
+    return entry
+
+
+def skipped(problem: Problem, last: Cycle) -> dict[str, dict[str, Any]]:
+    """name → entry of all that the solvers of a run to its ``last`` cycle did not do, and of modules not loaded."""
+    found = {name: told(name, skip) for name, skip in last.skips.items()}
+    if not last.work and not problem.cracks.n_cracks:
+        found["crack solver"] = told("crack solver", Skip(last.number + 1))
+    away = [part for part, module in PARTS.items() if module not in sys.modules]
+    if away:
+        found["modules"] = {**told("modules", Skip(len(away))), "which": away}
+    return {name: found[name] for name in WORDS if name in found}
