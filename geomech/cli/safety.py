@@ -6,7 +6,6 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..model import counted
 from .scenes import scene_arguments, scenes_asked
 from .telling import say, say_warnings
 from .verb import DONE, BadInput, Verbs, add_verb
@@ -79,6 +78,8 @@ def _safety(options: argparse.Namespace) -> int:
 
 
 def _caution(left_out: list[str]) -> str:
+    from ..model import counted
+
     return (
         f"not the factor of safety but a bound from above: {counted(len(left_out), 'crack')} left out, "
         "what rock bridges hold taken as unbreakable"
