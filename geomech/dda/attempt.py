@@ -393,7 +393,9 @@ class Attempt:
             new_stress[system.taken_out] = 0.0
         beyond = None
         if not scheme.static:
-            beyond = scheme.overstress(self.increment[:, 3:], self.tangent, system.stiffness, system.mass, dt)
+            beyond = scheme.overstress(
+                self.increment[:, 3:], self.tangent, self.stress0 - self.stress, system.stiffness, system.mass, dt
+            )
         if middle.turn is not None:
             acceleration = turned(acceleration, middle.turn)
             beyond = None if beyond is None else rotate_stress(beyond, middle.turn)

@@ -178,7 +178,7 @@ def step_energies(
             for m in range(3):
                 now[k] += tangent[b, k, m] * increment[b, 3 + m]
                 quadratic += increment[b, 3 + k] * tangent[b, k, m] * increment[b, 3 + m]
-            mean += stress0[b, k] * increment[b, 3 + k]
+            mean += ((1.0 - weight) * old_stress[b, k] + weight * stress0[b, k]) * increment[b, 3 + k]
         mean += weight * quadratic
         for k in range(3):
             opened = increment[b, 3 + k]

@@ -3,7 +3,7 @@
 All forces, contacts included, act over a step with the weight θ = 2β at its end and 1 − θ at its start, and the unknown
 d is the displacement over the step (Newmark 1959, with d = v dt + ā dt²/2 and ā = (1−θ) a₀ + θ a₁):
 
-    2M/dt² d = 2M v/dt + F(t₀ + θ dt) − A σ₀ − θ A C Δε − D d/dt + contacts
+    2M/dt² d = 2M v/dt + F(t₀ + θ dt) − A σ₀ − θ A (σ₁ − σ₀) − D d/dt + contacts
     v₁ = 2 d/dt − v₀ + κ dt (a₀ − ā),   κ = (θ − γ)/θ,   a₁ = (ā − (1−θ) a₀)/θ
 
 β = ½, γ = 1 is Shi's (1988) scheme, β = ¼, γ = ½ the trapezoidal rule. Where γ = 2β, between the two, no acceleration
@@ -95,13 +95,20 @@ class TimeScheme:
         )
 
     def overstress(
-        self, strain: np.ndarray, tangent: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, dt: float
+        self,
+        strain: np.ndarray,
+        tangent: np.ndarray,
+        change: np.ndarray,
+        stiffness: np.ndarray,
+        mass: np.ndarray,
+        dt: float,
     ) -> np.ndarray:
         """(n_blocks, 3) Pa by which the stress that the forces over a step balance is more than that of its end:
-        viscosity's, less what they weigh of its start. ``strain`` (n_blocks, 3) of the step, ``tangent`` and
-        ``stiffness`` (n_blocks, 3, 3), ``mass`` (n_blocks,)."""
+        viscosity's, less what they weigh of its start. ``strain`` (n_blocks, 3) of the step, ``change`` (n_blocks, 3)
+        of stress without any, ``tangent`` and ``stiffness`` (n_blocks, 3, 3), ``mass`` (n_blocks,)."""
         drag = self.stiffness_damping + 2.0 * self.block_damping * np.sqrt(mass / (12.0 * stiffness[:, 0, 0]))
-        return (self.weight - 1.0 + drag / dt)[:, None] * (tangent @ strain[..., None])[..., 0]
+        by_strain = (tangent @ strain[..., None])[..., 0]
+        return (drag / dt)[:, None] * by_strain - (1.0 - self.weight) * (change + by_strain)
 
     def begun(self, carried: np.ndarray, before: np.ndarray | None, dt: float) -> tuple[np.ndarray, float]:
         """Velocity (n_blocks, 6) that a step begins with, and by how much inertia counts more, 1/w; with no
@@ -177,7 +184,8 @@ def assemble_blocks(
     (n_blocks, 3)).
 
     Inertia and elasticity as in the head of this file, with velocity ``carried``, ``heavier`` 1/w, ``weight`` θ and σ₁
-    = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain); ∫ Tᵀρg; the strain rows' share ρω²∫xx, ∫yy, ∫xy of a spinning
+    = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), which without Δε is σ unless cracks have grown, or their faces
+    have opened or closed: they do so over the step, and count as the rest does with θ; ∫ Tᵀρg; the strain rows' share ρω²∫xx, ∫yy, ∫xy of a spinning
     block; the generalised forces ``load`` (n_blocks, 6) of whatever else acts; and damping: a viscous stress ∝ C Δε/dt
     that gives a block's own vibration (taken as that of a square, ω² = 12 C₁₁/(ρ h²)) the part ``block_damping`` of
     critical damping, and Rayleigh's two.
@@ -237,7 +245,7 @@ def assemble_blocks(
         for k in range(3):
             for m in range(3):
                 matrix[row, 3 + k, 3 + m] += elastic * tangent[b, k, m]
-            right[row, 3 + k] -= area * stress0[b, k] / h
+            right[row, 3 + k] -= area * ((1.0 - weight) * stress[b, k] + weight * stress0[b, k]) / h
         right[row, 0] += rho * area * gravity[0] + load[b, 0]
         right[row, 1] += rho * area * gravity[1] + load[b, 1]
         spin = rho * carried[b, 2] * carried[b, 2]

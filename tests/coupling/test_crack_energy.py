@@ -107,7 +107,8 @@ def test_a_running_crack_adds_up_in_dynamics(dt, scheme):
     """A crack across a plate that is pulled within some ten passages of waves runs at 0.4 c_R to three times its
     length: load work = elastic + kinetic + damping + scheme + stored at cracks + released at tips, whatever the step,
     its scheme and its damping: 6e-5 of the load's work are left over, of the increment and of the strain that the load
-    turns the plate by."""
+    turns the plate by. Newmark's trapezoidal rule neither loses nor gains (2e-6; it gained 1.5 % where the crack's growth
+    counted from the start of each step)."""
     given = loaded(4e8, 2e-2, dt, [[-0.1, 0.0], [0.1, 0.0]], dynamic=1.0, increment=0.02)
     told = last_told(replace(given, dda=replace(given.dda, **scheme)), 0.7)
     names = (
@@ -117,6 +118,7 @@ def test_a_running_crack_adds_up_in_dynamics(dt, scheme):
     assert abs(told["crack_residual"]) < 2e-4 * told["load_work"]
     assert sum(told[name] for name in names) == pytest.approx(told["load_work"], rel=2e-4)
     assert abs(told["budget_residual"]) < 2e-4
+    assert "newmark" not in scheme or abs(told["scheme_loss"]) < 2e-5 * told["load_work"]
 
 
 def test_what_parts_sets_free_what_was_stored_at_its_crack():
