@@ -161,8 +161,8 @@ def _take_response(
         for k, (b, answer) in enumerate(answers.items()):
             known, strain = now.compliances[b][2], answer.crack_strain
             if b in now.by_mean_stress:
-                share = now.by_mean_stress.share(b, now.bodies[b], now.system.compliance[b])
-                known, strain = share * known, share * strain
+                limit = now.by_mean_stress.limit(b, now.bodies[b], now.system.compliance[b])
+                known, strain = limit.T @ known @ limit, limit.T @ strain
             began, ends = float(now.state.rotation[b]), float(state.rotation[b])
             stress[k] = stress_rotation(began - ends) @ state.stress[b]
             assumed[k] = strain_rotation(began - ends) @ state.crack_strain[b]
@@ -191,7 +191,9 @@ def _answers(now: CrackedBlocks, state: State) -> dict:
         if block not in now.by_mean_stress:
             return now.solutions[block]
         body, began = now.bodies[block], now.history.get(block)
-        return now.by_mean_stress.answer(block, body, state.stress[block], float(state.rotation[block]), began)
+        return now.by_mean_stress.answer(
+            block, body, state.stress[block], float(state.rotation[block]), now.system.compliance[block], began
+        )
 
     return {block: answer(block) for block in now.bodies}
 

@@ -7,7 +7,7 @@ work on an even strain, as by reciprocity they would on that of the cracked bloc
 nowhere, or leaves it there: round a cycle σ gives ∮ A σ : dε_c, with ε_c not a function of σ (a cantilever cracked
 through half of its depth, under its weight, gained and lost more than all of the weight's work). In a block that is
 nearly cut through forces and strain chase each other besides, with a gain of up to hundreds, and there are states that
-no passes find. So these cracks bring the strain ε_c = κ ∂W/∂σ, with W(σ) the complementary energy, per area, that they
+no passes find. So these cracks bring the strain ε_c = ∂W/∂σ, with W(σ) the complementary energy, per area, that they
 add to the body under a uniform stress, faces closing or not. W is convex: blocks and cracks agree in a few passes, in
 one while no face opens or closes, and no energy is gained. What drives the tips is solved under the actual forces as
 ever, once there is an answer. (What is lost is the mean strain of cracks that are bent open; that bent blocks also turn
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 #: direction. (An edge crack through half of a square adds 4.)
 SOFT = 4.0
 
-#: … and is taken for no more than so many times softer. What hangs by less (an edge crack through three quarters of a
-#: square) is two blocks already: neighbours hold them in place, not the ligament, and the strain of the two as one
-#: would run into the neighbours.
+#: No block is taken for more than so many times softer in any direction (`ByMeanStress.limit`). What hangs by less (an
+#: edge crack through three quarters of a square) is two blocks already: neighbours hold them in place, not the
+#: ligament, and the strain of the two as one would run into the neighbours.
 SOFTEST = 30.0
 
 
@@ -48,8 +48,10 @@ class ByMeanStress:
     solutions: dict[int, Solution] = field(default_factory=dict)
     #: What crack faces with friction remember of these solutions at the end of the last step.
     _memory: dict[int, FaceMemory] = field(default_factory=dict)
-    #: Crack system, softness.
-    _softness: dict[int, tuple[object, float]] = field(default_factory=dict)
+    #: The mean stress of the last pass, in the block's own axes, Pa, and its `limit` then.
+    stress: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    #: Crack system, softness, limit.
+    _softness: dict[int, tuple[object, float, np.ndarray]] = field(default_factory=dict)
     _blocks: set[int] = field(default_factory=set)
 
     def __contains__(self, block: int) -> bool:
@@ -73,19 +75,32 @@ class ByMeanStress:
             if self._soft(block, bodies[block], elastic[block]) > SOFT:
                 self._blocks.add(block)
 
-    def share(self, block: int, body: Body, elastic: np.ndarray) -> float:
-        """κ, the part of its cracks' compliance that ``block`` is to feel."""
-        return min(1.0, SOFTEST / max(self._soft(block, body, elastic), SOFT))
+    def limit(self, block: int, body: Body, elastic: np.ndarray) -> np.ndarray:
+        """P (3, 3) of ``block``, whose cracks answer as W(P σ): the strain Pᵀ ε_c(P σ), which has a potential as before.
+        With s and v softness and direction of open cracks, S v = s C v and vᵀ C v = 1 (C is the ``elastic`` compliance
+        (3, 3)), P = Σ √min(1, `SOFTEST`/s) v vᵀ C: open cracks are as soft as they are, or `SOFTEST` times the rock, in
+        each direction by itself. (Were it one factor for all of them, cracks that grow would stiffen others.)"""
+        return self._known(block, body, elastic)[2]
 
-    def answer(self, block: int, body: Body, stress: np.ndarray, rotation: float, began: FaceMemory | None) -> Solution:
-        """The solution of ``body``, which has turned by ``rotation`` rad, under its mean ``stress`` (3,), Pa, current
-        axes. Faces begin with what they remember of such solutions, or with ``began`` where there is none. Raises
-        `ddm.NotConverged`."""
+    def answer(
+        self,
+        block: int,
+        body: Body,
+        stress: np.ndarray,
+        rotation: float,
+        elastic: np.ndarray,
+        began: FaceMemory | None = None,
+    ) -> Solution:
+        """The solution of ``body``, which has turned by ``rotation`` rad, under what its `limit` leaves of its mean
+        ``stress`` (3,), Pa, current axes. Faces begin with what they remember of such solutions, or with ``began``
+        where there is none. Raises `ddm.NotConverged`."""
         from .. import ddm
 
-        load = ddm.BodyLoad(remote_stress=stress_rotation(-rotation) @ stress)
+        own = stress_rotation(-rotation) @ stress
+        limit = self.limit(block, body, elastic)
+        load = ddm.BodyLoad(remote_stress=limit @ own)
         known = body.solve(load, warm=self.solutions.get(block), history=self._memory.get(block, began))
-        self.solutions[block] = known
+        self.solutions[block], self.stress[block] = known, (own, limit)
         return known
 
     def take_step(self) -> None:
@@ -95,16 +110,25 @@ class ByMeanStress:
     def inherited(self, parent: np.ndarray, whole: np.ndarray) -> ByMeanStress:
         """That of new blocks: of those that are their ``parent`` (n_blocks,), ``whole`` (k,) numbers, what is known
         stays."""
-        solutions, memory, softness = (
+        solutions, memory, stress, softness = (
             {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
-            for known in (self.solutions, self._memory, self._softness)
+            for known in (self.solutions, self._memory, self.stress, self._softness)
         )
-        return ByMeanStress(solutions, memory, softness, {b for b in whole.tolist() if parent[b] in self._blocks})
+        own = {b for b in whole.tolist() if parent[b] in self._blocks}
+        return ByMeanStress(solutions, memory, stress, softness, own)
 
     def _soft(self, block: int, body: Body, elastic: np.ndarray) -> float:
         """How many times the ``elastic`` compliance (3, 3) open cracks add, in the direction in which they add most."""
+        return self._known(block, body, elastic)[1]
+
+    def _known(self, block: int, body: Body, elastic: np.ndarray) -> tuple[object, float, np.ndarray]:
         known = self._softness.get(block)
         if known is None or known[0] is not body.crack_system:
-            most = np.linalg.eigvals(np.linalg.solve(elastic, body.compliance())).real.max()
-            known = self._softness[block] = body.crack_system, float(most)
-        return known[1]
+            # By C = L Lᵀ: L⁻¹ S L⁻ᵀ w = s w, v = L⁻ᵀ w.
+            back = np.linalg.inv(np.linalg.cholesky(elastic))
+            times, ways = np.linalg.eigh(back @ body.compliance() @ back.T)
+            ways = back.T @ ways
+            part = np.sqrt(SOFTEST / np.maximum(times, SOFTEST))
+            limit = (ways * part) @ ways.T @ elastic if part[0] < 1 or part[-1] < 1 else np.eye(3)
+            known = self._softness[block] = body.crack_system, float(times[-1]), limit
+        return known

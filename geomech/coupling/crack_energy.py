@@ -32,7 +32,7 @@ def _keys(tips: np.ndarray) -> list[_Key]:
     return list(zip(tips["crack"].tolist(), tips["end"].tolist()))
 
 
-def _felt_tips(tips: np.ndarray, felt: dict[int, tuple[float, Solution]], by_mean_stress: ByMeanStress) -> np.ndarray:
+def _felt_tips(tips: np.ndarray, felt: dict[int, Solution], by_mean_stress: ByMeanStress) -> np.ndarray:
     """``tips`` with the K that the mean stress brings in blocks that feel no more."""
     blocks = [block for block in np.unique(tips["block"]).tolist() if block in by_mean_stress]
     if not blocks:
@@ -41,7 +41,7 @@ def _felt_tips(tips: np.ndarray, felt: dict[int, tuple[float, Solution]], by_mea
     for block in blocks:
         own = tips["block"] == block
         for name in ("k_i", "k_ii"):
-            out[name][own] = felt[block][1].tips[name]
+            out[name][own] = felt[block].tips[name]
     return out
 
 
@@ -96,8 +96,8 @@ class CrackEnergy:
     #: block → whether it feels its mean stress only.
     _hangs: dict[int, bool] = field(default_factory=dict)
     _growing: dict[_Key, _Growing] = field(default_factory=dict)
-    #: block with tips that grow → the share it felt of its cracks, and what they stored, all of it.
-    _shared: dict[int, tuple[float, float]] = field(default_factory=dict)
+    #: block with tips that grow → its mean stress, Pa, what its limit leaves of it, and the strain of its cracks then.
+    _limited: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict)
     #: Tips with K as it is felt, as the present step began, in its first pass and in its last one.
     _began: np.ndarray | None = None
     _first: np.ndarray | None = None
@@ -108,27 +108,26 @@ class CrackEnergy:
         tips: np.ndarray,
         blocks: Blocks,
         materials: tuple[Material, ...],
-        felt: dict[int, tuple[float, Solution]],
+        felt: dict[int, Solution],
         by_mean_stress: ByMeanStress,
     ) -> None:
         """A pass of the present step has ended with ``tips``, of which some are about to grow, or none; ``felt`` is
-        block → (share, `ddm.Solution`), what blocks are strained by, those ``by_mean_stress`` by no more than their mean
+        block → the `ddm.Solution` that it is strained by, those ``by_mean_stress`` by no more than their mean
         stress."""
         tips = _felt_tips(tips, felt, by_mean_stress)
         self._first = tips if self._first is None else self._first
         self._last = tips
         if not len(tips):
             self._parted |= bool(self._growing)
-            self._growing, self._shared = {}, {}
+            self._growing, self._limited = {}, {}
             return
         if not (self._growing or (tips["grown"] > 0).any()):
             return
         rock = blocks.material[tips["block"]]
         modulus = np.array([m.plane_modulus for m in materials])[rock]
-        part = np.array([felt[block][0] for block in tips["block"].tolist()])
         hangs = np.array([block in by_mean_stress for block in tips["block"].tolist()])
         keys = _keys(tips)
-        release = part * (tips["k_i"] ** 2 + tips["k_ii"] ** 2) / modulus
+        release = (tips["k_i"] ** 2 + tips["k_ii"] ** 2) / modulus
         now = dict(zip(keys, release.tolist()))
         for key, of in self._growing.items():
             if key in now:
@@ -137,19 +136,23 @@ class CrackEnergy:
                 # A tip that has met something: G rises without bound as the last ligament goes, its integral by no
                 # rule.
                 self._parted = True
-        for block, (had, stored) in self._shared.items():
-            # What is taken for no softer than so much (`ByMeanStress.share`) spends less on growth by the product rule.
+        for block, (stress, limit, strain) in self._limited.items():
+            # What is taken for no softer than so much (`ByMeanStress.limit`) spends less on growth as its limit falls.
             if block in felt:
-                self._released += 0.5 * (stored + felt[block][1].crack_energy) * (felt[block][0] - had)
-        turned = np.where(hangs, part * _kink_release(tips), tips["k_eq"] ** 2) / modulus
+                now_stress, now_limit = by_mean_stress.stress[block]
+                less, known = now_limit - limit, felt[block]
+                self._released += (
+                    0.5 * known.body.area * float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
+                )
+        turned = np.where(hangs, _kink_release(tips), tips["k_eq"] ** 2) / modulus
         shares = self._shares()
         grows = np.flatnonzero(tips["grown"] > 0)
         self._growing = {
             keys[row]: _Growing(float(tips["grown"][row]), float(turned[row]), shares.get(keys[row], 1.0))
             for row in grows.tolist()
         }
-        self._shared = {
-            block: (felt[block][0], felt[block][1].crack_energy)
+        self._limited = {
+            block: (*by_mean_stress.stress[block], felt[block].crack_strain)
             for block in np.unique(tips["block"][grows]).tolist()
             if block in by_mean_stress
         }
@@ -174,7 +177,7 @@ class CrackEnergy:
     def parts(self) -> None:
         """Blocks part in the present step, and have other numbers from then on."""
         self._parted = True
-        self._hangs, self._shared = {}, {}
+        self._hangs, self._limited = {}, {}
 
     @property
     def under_way(self) -> bool:
@@ -186,18 +189,18 @@ class CrackEnergy:
         before: State,
         state: State,
         blocks: Blocks,
-        felt: dict[int, tuple[float, Solution]],
+        felt: dict[int, Solution],
         by_mean_stress: ByMeanStress,
         set_free: float = 0.0,
     ) -> None:
-        """The step from ``before`` to ``state`` has been taken; ``felt`` at its end is block → (share, `ddm.Solution`),
-        what blocks are strained by; ``by_mean_stress`` are those that feel no more than their mean stress. Blocks that have
+        """The step from ``before`` to ``state`` has been taken; ``felt`` at its end is block → the `ddm.Solution` that
+        it is strained by; ``by_mean_stress`` are those that feel no more than their mean stress. Blocks that have
         parted since the last step stored ``set_free`` J/m more before than their parts and new contacts did."""
         strain = state.crack_strain - before.crack_strain
         mean = 0.5 * (before.stress + state.stress)
         work = float(blocks.areas(before.vertices) @ np.sum(mean * strain, axis=1))
-        stored = sum(share * solution.crack_energy for share, solution in felt.values())
-        friction = sum(share * solution.frictional_work for share, solution in felt.values())
+        stored = sum(solution.crack_energy for solution in felt.values())
+        friction = sum(solution.frictional_work for solution in felt.values())
         hangs = {block: block in by_mean_stress for block in felt}
         # What a block stored that begins to hang, or is whole no more, was of another kind.
         self._parted |= any(hangs.get(block) != hung for block, hung in self._hangs.items())

@@ -98,15 +98,12 @@ class CrackedBlocks:
             )
 
     def felt(self) -> dict:
-        """block → (share, solution) that the strain of its cracks is from, in the last pass."""
-        return {block: self._felt(block, solution) for block, solution in self.solutions.items()}
-
-    def _felt(self, block: int, solution):
-        if block not in self.by_mean_stress or block not in self.by_mean_stress.solutions:
-            return 1.0, solution
-        answer = self.by_mean_stress.solutions[block]
-        # (Bodies may have grown since.)
-        return self.by_mean_stress.share(block, answer.body, self.system.compliance[block]), answer
+        """block → the solution that the strain of its cracks is from, in the last pass."""
+        own = self.by_mean_stress
+        return {
+            block: own.solutions[block] if block in own and block in own.solutions else solution
+            for block, solution in self.solutions.items()
+        }
 
     # -- changes of the blocks -----------------------------------------------------------------------------------------
 

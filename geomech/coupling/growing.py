@@ -12,7 +12,7 @@ from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
 from .endless import take_endless
 from .mean_stress import rotated_mean_stress
-from .paid_stress import paid_stress
+from .parts_in_motion import begin_in_motion
 from .record import event
 from .split_forces import contacts_after, holds_together
 from .splitting import divided, split_blocks
@@ -124,9 +124,6 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
     if growth.joins:
         with now.timed("growth"):
             split = split_blocks(now.blocks, now.state, growth.cracks, _mean_stress(now.state, solutions))
-            if split is not None and now.problem.dda.dynamic_factor != 0.0:
-                stored = {block: share * of.crack_energy for block, (share, of) in now.felt().items()}
-                split = paid_stress(split, now.blocks, now.state, now.system.compliance, stored)
     if split is None:
         now.take_cracks(growth.cracks)
         return tuple(events)
@@ -135,8 +132,11 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
         parts = np.flatnonzero(split.parent == b)
         centre = now.blocks.loops(b)[0].mean(axis=0)
         events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
-    loads, stands = now.loads, now.state is state
+    loads, stands, begun = now.loads, now.state is state, now.state
+    stored = {block: of.crack_energy for block, of in now.felt().items()}
     now.take_split(split)
+    if now.problem.dda.dynamic_factor != 0.0:
+        begin_in_motion(now, split, cut, begun, stored)
     if stands:
         with now.timed("growth"):
             contacts = contacts_after(now.system, split, cut, solutions, loads, now.problem.loads)

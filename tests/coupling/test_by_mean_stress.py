@@ -132,11 +132,21 @@ def test_softness_is_that_by_k_and_only_what_is_touched_hangs(ratio, hangs):
 
 
 def test_what_hangs_by_less_than_a_quarter_is_taken_for_no_softer():
-    """… and the answer in tension is its share of that compliance."""
+    """… in the direction in which it is, and the answer in tension is that of what is left of the stress."""
     ratio = 0.95
     body, elastic = ddm.Body([BAR], edge_crack(ratio, np.inf, 0), ROCK), ROCK.compliance()
-    hanging = ByMeanStress()
-    answer = hanging.answer(0, body, np.array([0.0, 1e6, 0.0]), 0.0, None)
-    whole = answer.crack_strain[1] * ROCK.plane_modulus / 1e6
-    assert whole == pytest.approx(softness_by_k(ratio), rel=0.02)
-    assert hanging.share(0, body, elastic) * whole == pytest.approx(SOFTEST, rel=0.1)
+    pull = np.array([0.0, 1e6, 0.0])
+    alone = body.solve(ddm.BodyLoad(remote_stress=pull))
+    assert alone.crack_strain[1] * ROCK.plane_modulus / 1e6 == pytest.approx(softness_by_k(ratio), rel=0.02)
+    known = ByMeanStress()
+    limit, answer = known.limit(0, body, elastic), known.answer(0, body, pull, 0.0, elastic)
+    whole, felt = body.compliance(), limit.T @ body.compliance() @ limit
+    np.testing.assert_allclose(limit.T @ answer.crack_strain, felt @ pull, rtol=1e-3, atol=1e-3 * felt.max() * 1e6)
+    had, has = (np.sort(np.linalg.eigvals(np.linalg.solve(elastic, of)).real) for of in (whole, felt))
+    np.testing.assert_allclose(has, np.minimum(had, SOFTEST), rtol=1e-9, atol=1e-9 * SOFTEST)
+    assert had[-1] > SOFTEST > 3 * had[-2]
+
+
+def test_a_block_that_is_stiff_enough_has_no_limit():
+    body = ddm.Body([BAR], edge_crack(0.75, np.inf, 0), ROCK)
+    np.testing.assert_array_equal(ByMeanStress().limit(0, body, ROCK.compliance()), np.eye(3))
