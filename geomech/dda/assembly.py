@@ -11,11 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 from .block_solver import BlockSolver
+from .shared_tasks import add_at_once, await_value, crew
 
 #: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
 DENSE_BLOCKS = 60
+#: From so many blocks on, rows are filled on all cores, of so many at a time.
+THREADED, SHARE = 4000, 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +37,14 @@ class Links:
 class Pattern:
     """Where each 6×6 block stands in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
 
-    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed. ``solver`` is None for a dense matrix.
+    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed; those of one begin at ``begins``
+    (n + 1,). ``solver`` is None for a dense matrix.
     ``links`` are those that other things than contacts make, None without.
     """
 
     n: int
     order: np.ndarray
+    begins: np.ndarray
     stride: np.ndarray
     diagonal: np.ndarray
     upper: np.ndarray
@@ -69,6 +75,7 @@ def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pa
     return Pattern(
         n=n,
         order=order,
+        begins=36 * n * np.arange(n + 1),
         stride=np.full(n, 6 * n),
         diagonal=36 * n * number + 6 * number,
         upper=36 * n * i + 6 * j,
@@ -98,6 +105,7 @@ def sparse_pattern(
     return Pattern(
         n=n,
         order=order,
+        begins=36 * kept.pointer,
         stride=np.full(n, 6),
         diagonal=36 * kept.entry(number * n + number),
         upper=36 * kept.entry(np.where(both, i * n + j, 0)),
@@ -140,104 +148,199 @@ def contact_vectors(block, other, geometry, order, moments):
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def begin(data, matrix, stride, diagonal):
-    """The flat ``data`` as lines of six, with the blocks' own part alone."""
-    data[:] = 0.0
-    lines = data.reshape((-1, 6))
-    for b in range(matrix.shape[0]):
-        for a in range(6):
-            line = (diagonal[b] + a * stride[b]) // 6
-            for m in range(6):
-                lines[line, m] = matrix[b, a, m]
-    return lines
+def sides_of(n, order, block, other):
+    """The sides of contacts that each of ``n`` blocks with unknowns has: (n + 1,) where they begin in (k,), 2 c for the
+    vertex of contact c and 2 c + 1 for its edge, ascending."""
+    start = np.zeros(n + 2, np.int64)
+    for c in range(len(block)):
+        i, j = order[block[c]], order[other[c]]
+        if i >= 0:
+            start[i + 2] += 1
+        if j >= 0:
+            start[j + 2] += 1
+    for b in range(n):
+        start[b + 2] += start[b + 1]
+    side = np.empty(start[n + 1], np.int64)
+    for c in range(len(block)):
+        i, j = order[block[c]], order[other[c]]
+        if i >= 0:
+            side[start[i + 1]] = 2 * c
+            start[i + 1] += 1
+        if j >= 0:
+            side[start[j + 1]] = 2 * c + 1
+            start[j + 1] += 1
+    return start[: n + 1], side
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True, inline="always")
-def _add_block(lines, first, step, push, drag, pull, across, mine, its):
-    """Add the 6 × 6 of ``push`` ⊗ ``pull`` + ``drag`` ⊗ ``across`` (12,) whose rows begin at ``mine`` and columns at
-    ``its`` to every ``step``-th of the ``lines`` of `begin`. (Written out and inlined: two thirds of the time of
-    loops.)"""
-    u0, u1, u2, u3, u4, u5 = pull[its], pull[its + 1], pull[its + 2], pull[its + 3], pull[its + 4], pull[its + 5]
-    t = across
-    t0, t1, t2, t3, t4, t5 = t[its], t[its + 1], t[its + 2], t[its + 3], t[its + 4], t[its + 5]
+def _add_block(data, first, stride, push, drag, pull, across):
+    """Add the 6 × 6 of ``push`` ⊗ ``pull`` + ``drag`` ⊗ ``across`` (6,) to the block that begins at ``first``. (Written
+    out and inlined: two thirds of the time of loops.)"""
+    u0, u1, u2, u3, u4, u5 = pull[0], pull[1], pull[2], pull[3], pull[4], pull[5]
+    t0, t1, t2, t3, t4, t5 = across[0], across[1], across[2], across[3], across[4], across[5]
     for a in range(6):
-        line, p, d = first + a * step, push[mine + a], drag[mine + a]
-        lines[line, 0] += p * u0 + d * t0
-        lines[line, 1] += p * u1 + d * t1
-        lines[line, 2] += p * u2 + d * t2
-        lines[line, 3] += p * u3 + d * t3
-        lines[line, 4] += p * u4 + d * t4
-        lines[line, 5] += p * u5 + d * t5
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True, inline="always")
-def add_contact(lines, i, j, diagonal, stride, upper, lower, push, drag, pull, across):
-    """Add what a contact of the blocks with unknowns ``i`` and ``j`` (−1: none) does to the ``lines`` of `begin`, as
-    `_add_block`; ``upper`` and ``lower`` are where the blocks that couple them begin."""
-    if i >= 0:
-        _add_block(lines, diagonal[i] // 6, stride[i] // 6, push, drag, pull, across, 0, 0)
-    if j >= 0:
-        _add_block(lines, diagonal[j] // 6, stride[j] // 6, push, drag, pull, across, 6, 6)
-    if i >= 0 and j >= 0:
-        _add_block(lines, upper // 6, stride[i] // 6, push, drag, pull, across, 0, 6)
-        _add_block(lines, lower // 6, stride[j] // 6, push, drag, pull, across, 6, 0)
+        here, p, d = data[first + a * stride : first + a * stride + 6], push[a], drag[a]
+        here[0] += p * u0 + d * t0
+        here[1] += p * u1 + d * t1
+        here[2] += p * u2 + d * t2
+        here[3] += p * u3 + d * t3
+        here[4] += p * u4 + d * t4
+        here[5] += p * u5 + d * t5
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def assemble_contacts(
-    data,
-    right,
-    matrix,
-    base_right,
-    stride,
-    diagonal,
-    upper,
-    lower,
-    block,
-    other,
-    order,
-    vectors,
-    state,
-    direction,
-    gap,
-    normal,
-    shear,
-    friction,
-    sliding,
-    lift,
-    shear0,
+def _fill_rows(
+    first, last, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
+    normal, shear, slope, lift,
+):  # fmt: skip
+    """Fill the rows of blocks from ``first`` to before ``last``, see `assemble`; ``start`` and ``side`` from
+    `sides_of`. What is done for a block is its own: rows are the same to the bit whoever fills them."""
+    push, drag, pull, across = np.empty(6), np.empty(6), np.empty(12), np.empty(12)
+    for b in range(first, last):
+        data[begins[b] : begins[b + 1]] = 0.0
+        own, step = diagonal[b], stride[b]
+        for a in range(6):
+            here = data[own + a * step : own + a * step + 6]
+            for m in range(6):
+                here[m] = matrix[b, a, m]
+        for q in range(start[b], start[b + 1]):
+            c, at = side[q] >> 1, 6 * (side[q] & 1)
+            kn, ks, friction, rise = normal[c], shear[c], slope[c], lift[c]
+            if kn == 0.0 and ks == 0.0:
+                continue
+            n, t = vectors[c, 0], vectors[c, 1]
+            for a in range(6):
+                push[a], drag[a] = kn * (n[at + a] + friction * t[at + a]), ks * t[at + a]
+            for a in range(12):
+                pull[a], across[a] = n[a] - rise * t[a], t[a]
+            _add_block(data, own, step, push, drag, pull[at : at + 6], across[at : at + 6])
+            if (order[other[c]] if at == 0 else order[block[c]]) >= 0:
+                their = upper[c] if at == 0 else lower[c]
+                _add_block(data, their, step, push, drag, pull[6 - at : 12 - at], across[6 - at : 12 - at])
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _fill(
+    data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift
 ):
+    start, side = sides_of(len(matrix), order, block, other)
+    _fill_rows(
+        0, len(matrix), start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
+        normal, shear, slope, lift,
+    )  # fmt: skip
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _fill_shared(
+    claimed, told, share, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
+    vectors, normal, shear, slope, lift,
+):  # fmt: skip
+    """Fill the rows of ``share`` blocks at a time, by turns with other threads; ``claimed`` and ``told`` (1,) as for
+    the elimination of fronts."""
+    n = len(matrix)
+    shares = (n + share - 1) // share
+    while True:
+        q = add_at_once(claimed, 0, 1)
+        if q >= shares:
+            break
+        _fill_rows(
+            q * share, min(n, (q + 1) * share), start, side, data, matrix, begins, stride, diagonal, upper, lower,
+            block, other, order, vectors, normal, shear, slope, lift,
+        )  # fmt: skip
+        add_at_once(told, 0, 1)
+    await_value(told, 0, shares)
+
+
+def assemble(
+    pattern: Pattern,
+    data: np.ndarray,
+    matrix: np.ndarray,
+    upper: np.ndarray,
+    lower: np.ndarray,
+    block: np.ndarray,
+    other: np.ndarray,
+    order: np.ndarray,
+    vectors: np.ndarray,
+    normal: np.ndarray,
+    shear: np.ndarray,
+    slope: np.ndarray,
+    lift: np.ndarray,
+) -> None:
+    """Fill ``data`` with the blocks' own part ``matrix`` (n, 6, 6) and contacts that answer a motion by dN =
+    −``normal`` (n − κ t)·Δu, κ the ``lift``, and dS = −``shear`` t·Δu + ``slope`` dN; ``upper`` and ``lower`` as in the
+    ``pattern``, for these contacts."""
+    at = pattern.begins, pattern.stride, pattern.diagonal, upper, lower, block, other, order
+    laws = vectors, normal, shear, slope, lift
+    if pattern.n < THREADED:
+        _fill(data, matrix, *at, *laws)
+        return
+    sides = sides_of(pattern.n, order, block, other)
+    claimed, told = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    crew().share(_fill_shared, claimed, told, SHARE, *sides, data, matrix, *at, *laws)
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _springs(
+    right, base_right, block, other, order, vectors, state, direction, gap, normal, shear, friction, sliding, lift,
+    shear0,
+):  # fmt: skip
+    """Fill ``right``, see `assemble_contacts`; (n,) the normal and shear stiffness of contacts in their states and how
+    much of the normal force slides, and whether the matrix is symmetric."""
+    for b in range(base_right.shape[0]):
+        for a in range(6):
+            right[6 * b + a] = base_right[b, a]
+    stiff, along, slope, symmetric = np.zeros(len(block)), np.zeros(len(block)), np.zeros(len(block)), True
+    for c in range(block.shape[0]):
+        if state[c] == OPEN:
+            continue
+        given = shear0[c]
+        stiff[c], along[c] = normal[c], shear[c] if state[c] == STICK else 0.0
+        if state[c] == SLIP:
+            slope[c] = direction[c] * friction[c]
+            given = direction[c] * sliding[c]
+            symmetric = symmetric and slope[c] == 0.0 and lift[c] == 0.0
+        pressed = normal[c] * gap[c]
+        i, j = order[block[c]], order[other[c]]
+        for a in range(12):
+            k = i if a < 6 else j
+            if k >= 0:
+                n, t = vectors[c, 0, a], vectors[c, 1, a]
+                right[6 * k + a % 6] += given * t - pressed * (n + slope[c] * t)
+    return stiff, along, slope, symmetric
+
+
+def assemble_contacts(
+    pattern: Pattern,
+    data: np.ndarray,
+    right: np.ndarray,
+    matrix: np.ndarray,
+    base_right: np.ndarray,
+    upper: np.ndarray,
+    lower: np.ndarray,
+    block: np.ndarray,
+    other: np.ndarray,
+    order: np.ndarray,
+    vectors: np.ndarray,
+    state: np.ndarray,
+    direction: np.ndarray,
+    gap: np.ndarray,
+    normal: np.ndarray,
+    shear: np.ndarray,
+    friction: np.ndarray,
+    sliding: np.ndarray,
+    lift: np.ndarray,
+    shear0: np.ndarray,
+) -> bool:
     """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric.
 
     Normal force N = −kₙ(g + n·Δu − κ t·Δu), with the lift κ by sliding. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c),
     with N the unknown one, which makes the matrix unsymmetric but friction exact in one solution.
     """
-    lines = begin(data, matrix, stride, diagonal)
-    for b in range(matrix.shape[0]):
-        for a in range(6):
-            right[6 * b + a] = base_right[b, a]
-    symmetric = True
-    push, drag, pull, across = np.empty(12), np.empty(12), np.empty(12), np.empty(12)
-    for c in range(block.shape[0]):
-        if state[c] == OPEN:
-            continue
-        slope, given = 0.0, shear0[c]
-        if state[c] == SLIP:
-            slope = direction[c] * friction[c]
-            given = direction[c] * sliding[c]
-            symmetric = symmetric and slope == 0.0 and lift[c] == 0.0
-        stiff_along = shear[c] if state[c] == STICK else 0.0
-        kn, rise, pressed = normal[c], lift[c], normal[c] * gap[c]
-        i, j = order[block[c]], order[other[c]]
-        for a in range(12):
-            n, t = vectors[c, 0, a], vectors[c, 1, a]
-            push[a], drag[a] = n + slope * t, stiff_along * t
-            pull[a], across[a] = n - rise * t, t
-            k = i if a < 6 else j
-            if k >= 0:
-                right[6 * k + a % 6] += given * t - pressed * push[a]
-            push[a] *= kn
-        add_contact(lines, i, j, diagonal, stride, upper[c], lower[c], push, drag, pull, across)
+    at = block, other, order, vectors
+    *laws, symmetric = _springs(
+        right, base_right, *at, state, direction, gap, normal, shear, friction, sliding, lift, shear0
+    )
+    assemble(pattern, data, matrix, upper, lower, *at, *laws, lift)
     return symmetric
 
 

@@ -27,6 +27,8 @@ _jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 RESIDUAL = 1e-12
 #: … or to the largest Σ|A||x| of a row, below which it is round-off.
 ROUND_OFF = 2e-15
+#: Residuals that are larger are hardly ever round-off.
+COARSE = 1e-6
 #: Refinements of a solution at most.
 REFINEMENTS = 3
 #: A 6×6 diagonal block has changed when one of its entries has by more than this part of the largest: what stiff
@@ -221,12 +223,14 @@ class BlockSolver:
             x += self.substitute(rest)
         return x
 
-    def _residual(self, data: np.ndarray, right: np.ndarray, x: np.ndarray, within: float) -> tuple[np.ndarray, float]:
-        """b − A x, and how large its largest entry may be."""
+    def _residual(
+        self, data: np.ndarray, right: np.ndarray, x: np.ndarray, within: float, first: bool = False
+    ) -> tuple[np.ndarray, float]:
+        """b − A x, and how large its largest entry may be; of the ``first`` x, coarse ones need not know round-off."""
         rest = right - multiply(data, self.pointer, self.columns, x)
         target = within * float(np.abs(right).max(initial=0.0))
         # Round-off is asked for only where it may decide.
-        if np.abs(rest).max(initial=0.0) > target:
+        if not (first and within > COARSE) and np.abs(rest).max(initial=0.0) > target:
             target = max(target, ROUND_OFF * largest_terms(data, self.pointer, self.columns, x))
         return rest, target
 
@@ -270,12 +274,12 @@ class BlockSolver:
         if start is None:
             x = self.substitute(right, factors)
         else:
-            rest, target = self._residual(data, right, start, within)
+            rest, target = self._residual(data, right, start, within, True)
             if np.abs(rest).max(initial=0.0) <= target:
                 return start
             x = start + self.substitute(rest, factors)
-        for _ in range(3):
-            rest, target = self._residual(data, right, x, within)
+        for cycle in range(3):
+            rest, target = self._residual(data, right, x, within, cycle == 0)
             largest = float(np.abs(rest).max(initial=0.0))
             if largest <= target:
                 return x
@@ -291,24 +295,24 @@ class BlockSolver:
         """The correction that brings ``rest`` down to ``target``, None if it would take more than ``TRIES``
         solutions."""
         size = float(np.linalg.norm(rest))
-        basis, directions = [rest / size], []
+        basis, directions = np.empty((TRIES + 1, len(rest))), []
+        basis[0] = rest / size
         hessenberg = np.zeros((TRIES + 1, TRIES))
         first = np.zeros(TRIES + 1)
         first[0] = size
         for k in range(TRIES):
-            directions.append(self.substitute(basis[-1], factors))
+            directions.append(self.substitute(basis[k], factors))
             v = self.multiply(data, directions[-1])
             for _ in range(2):  # twice is enough for orthogonality to round-off
-                for i, q in enumerate(basis):
-                    share = float(q @ v)
-                    hessenberg[i, k] += share
-                    v -= share * q
+                shares = basis[: k + 1] @ v
+                hessenberg[: k + 1, k] += shares
+                v -= shares @ basis[: k + 1]
             hessenberg[k + 1, k] = np.linalg.norm(v)
             part = hessenberg[: k + 2, : k + 1]
             y, *_ = np.linalg.lstsq(part, first[: k + 2], rcond=None)
             left = float(np.linalg.norm(first[: k + 2] - part @ y))
             # Restarted, the next round would bring down what this one leaves; it need not go below a millionth.
             if left <= max(target, 1e-6 * size) or hessenberg[k + 1, k] == 0.0:
-                return np.column_stack(directions) @ y
-            basis.append(v / hessenberg[k + 1, k])
+                return sum(share * direction for share, direction in zip(y, directions, strict=True))
+            basis[k + 1] = v / hessenberg[k + 1, k]
         return None

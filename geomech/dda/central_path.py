@@ -23,10 +23,8 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
-from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 from . import assembly, contact_states
-from .assembly import add_contact, begin
 from .contact_springs import Springs
 from .contacts import ContactSet
 
@@ -82,22 +80,6 @@ def add_forces(right, block, other, order, vectors, normal, shear):
             for a in range(6):
                 at = 6 * side + a
                 right[6 * i + a] += normal[c] * vectors[c, 0, at] + shear[c] * vectors[c, 1, at]
-
-
-@kept(fastmath=False, error_model="numpy", nogil=True)
-def assemble(data, matrix, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift):
-    """Fill ``data`` with the blocks' own part and contacts that answer a motion by dN = −``normal`` (n − κ t)·Δu and
-    dS = −``shear`` t·Δu + ``slope`` dN."""
-    lines = begin(data, matrix, stride, diagonal)
-    push, drag, pull, across = np.empty(12), np.empty(12), np.empty(12), np.empty(12)
-    for c in range(block.shape[0]):
-        kn, ks, friction, rise = normal[c], shear[c], slope[c], lift[c]
-        for a in range(12):
-            n, t = vectors[c, 0, a], vectors[c, 1, a]
-            push[a], drag[a] = kn * (n + friction * t), ks * t
-            pull[a], across[a] = n - rise * t, t
-        i, j = order[block[c]], order[other[c]]
-        add_contact(lines, i, j, diagonal, stride, upper[c], lower[c], push, drag, pull, across)
 
 
 def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
@@ -289,8 +271,8 @@ class CentralPath:
         soft = width + normal / kn
         stiff, stiff_along = normal / soft, rough / (1.0 / ks + ahead / below + back / above)
         slope = stiff_along * mu * (back / above - ahead / below)
-        assemble(
-            self._data, self._matrix, pattern.stride, pattern.diagonal, self._upper, self._lower, *self._all_at,
+        assembly.assemble(
+            pattern, self._data, self._matrix, self._upper, self._lower, *self._all_at,
             np.concatenate([stiff, kn_held]), np.concatenate([stiff_along, ks_held]),
             np.concatenate([slope, np.zeros(len(kn_held))]), self._all_lift,
         )  # fmt: skip

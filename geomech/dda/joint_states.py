@@ -64,9 +64,9 @@ def settled_together(
         return None
     data, side = np.empty(pattern.size), np.empty(6 * pattern.n)
     assembly.assemble_contacts(
-        data, side, matrix, right, pattern.stride, pattern.diagonal, pattern.upper, pattern.lower, found.block,
-        found.other, pattern.order, vectors, state, direction, gap, springs.normal, springs.shear, springs.friction,
-        springs.sliding, springs.lift, found.shear,
+        pattern, data, side, matrix, right, pattern.upper, pattern.lower, found.block, found.other, pattern.order,
+        vectors, state, direction, gap, springs.normal, springs.shear, springs.friction, springs.sliding, springs.lift,
+        found.shear,
     )  # fmt: skip
     solve = _solution_of(pattern, data)
     at = found.block[rows], found.other[rows], pattern.order, np.ascontiguousarray(vectors[rows])

@@ -162,10 +162,9 @@ class LaggedFriction:
             none = np.zeros(2 * len(gap))
             sliding = np.concatenate([none[: len(gap)], np.where(sticks, 0.0, strength)])
             assembly.assemble_contacts(
-                self._data, self._side, self._matrix, self._right, pattern.stride, pattern.diagonal, self._upper,
-                self._lower, *self._rows, order, self._both, state, direction, self._gaps, self._normal, self._shear,
-                none,
-                sliding, none, self._before,
+                pattern, self._data, self._side, self._matrix, self._right, self._upper, self._lower, *self._rows,
+                order, self._both, state, direction, self._gaps, self._normal, self._shear, none, sliding, none,
+                self._before,
             )  # fmt: skip
             step = assembly.solve(pattern, self._data, self._side, True) - self._motion
             self.solutions += 1

@@ -206,9 +206,9 @@ class _Equations:
                 self.springs, self.gap, found, state, direction, bonded, normal_force, plastic
             )
         symmetric = assembly.assemble_contacts(
-            self._data, self._side, self.matrix, self.right, pattern.stride, pattern.diagonal, pattern.upper,
-            pattern.lower, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
-            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
+            pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
+            found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
+            springs.friction, springs.sliding, springs.lift, found.shear,
         )  # fmt: skip
         try:
             unknowns = assembly.solve(pattern, self._data, self._side, symmetric)

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
-from .central_path import WITHIN, acting, add_forces, assemble, solution_of
+from .central_path import WITHIN, acting, add_forces, solution_of
 from .contact_set import ContactSet
 from .contact_springs import Springs
 from .contact_states import moved
@@ -116,10 +116,9 @@ class RoundedLaws:
             if float(np.abs(residual).max()) < _BALANCED * min(force, 1.0) * self._load:
                 return unknowns
             p = self._pattern
-            assemble(
-                self._data, self._matrix, p.stride, p.diagonal, self._upper, self._lower, *self._at, *forces[2:],
-                self._lift,
-            )  # fmt: skip
+            assembly.assemble(
+                p, self._data, self._matrix, self._upper, self._lower, *self._at, *forces[2:], self._lift
+            )
             solve = solution_of(p, self._data)
             self.solutions += 1
             step = solve(residual, WITHIN)

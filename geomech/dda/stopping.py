@@ -118,10 +118,9 @@ def stop(
         # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their
         # friction.
         assembly.assemble_contacts(
-            data, side, matrix, np.zeros((pattern.n, 6)), pattern.stride, pattern.diagonal, pattern.upper,
-            pattern.lower,
-            found.block, found.other, pattern.order, vectors, state, np.ones(n), nothing, springs.normal, springs.shear,
-            nothing, push, nothing, pull,
+            pattern, data, side, matrix, np.zeros((pattern.n, 6)), pattern.upper, pattern.lower, found.block,
+            found.other, pattern.order, vectors, state, np.ones(n), nothing, springs.normal, springs.shear, nothing,
+            push, nothing, pull,
         )  # fmt: skip
         change = assembly.solve(pattern, data, side, True).reshape(-1, 6)
         moved = _moved(found, rows, pattern.order, vectors, change)
