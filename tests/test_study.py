@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import geomech.pipeline
+from geomech.cli import FAILED, main
 from geomech.scene import SceneError
 from geomech.study import watched_runs
 
@@ -42,3 +43,13 @@ def test_an_error_in_the_last_is_found_before_the_first_is_run(ran, tmp_path):
     with pytest.raises(SceneError, match="no such variant|variant"):
         list(watched_runs(FOLDER, tmp_path, object, [None, "nowhere"]))
     assert not ran
+
+
+def test_a_study_that_misses_what_it_is_held_against_fails(tmp_path, capsys):
+    study = tmp_path / "study"
+    study.mkdir()
+    (study / "run.py").write_text(
+        "def main(folder, out, overrides=(), variants=(), quiet=False):\n    assert 2.0 < 1.0, 'the load is off'\n"
+    )
+    assert main(["run", str(study), "--quiet", "--out", str(tmp_path / "out")]) == FAILED
+    assert "the load is off" in capsys.readouterr().err

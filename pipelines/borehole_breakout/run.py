@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 from borehole import RADIUS, VARIANTS, last_network, steps, wall
-from compare_borehole import report
+from compare_borehole import check, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
@@ -22,6 +22,7 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     picture(runs, out / "borehole.png")
     if not quiet:
         print(text)
+    check(runs)
     return 0
 
 

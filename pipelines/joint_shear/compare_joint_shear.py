@@ -15,6 +15,16 @@ from geomech.report.part import Part
 
 MPA = 1e6
 
+#: Forces between the halves are those of springs in a step that moves them: what is left of friction is their give.
+RESIDUAL_TOLERANCE = 1e-5
+#: Events find the load of K_IIc to this; both ends are mirror images.
+TOUGHNESS_TOLERANCE, MIRROR_TOLERANCE = 2e-6, 1e-6
+#: The way in which pure shear tears, degrees.
+KINK_TOLERANCE_DEG = 0.01
+#: The strength of rocks is 6.88 K_Ic with a scatter of tens of per cent; two thirds of the peak or more is lost when the
+#: wings are away.
+LAJTAI_TOLERANCE, FALLEN = 0.2, 0.7
+
 
 @dataclass
 class Sheared:
@@ -106,6 +116,27 @@ class Sheared:
         """Largest force borne with cracks ``grown`` m or longer, between rows linearly, N/m."""
         length, force = np.array([row[2:0:-1] for row in self.rows if row[3]]).T
         return float(np.interp(grown, (length - self.length) / 2, force))
+
+
+def check(tests: Mapping[str, Sheared]) -> None:
+    """AssertionError where a test misses its closed form by more than is explained."""
+    for name, test in tests.items():
+        assert test.k is not None, f"{name}: the bridge has not begun to break"
+        assert test.k[0] == 0, f"{name}: faces in contact have K_I = 0"
+        assert test.unlike < MIRROR_TOLERANCE, f"{name}: the bridge's ends differ"
+        if test.tears:
+            assert abs(test.kink_deg - np.degrees(published.KINK)) < KINK_TOLERANCE_DEG, (
+                f"{name}: the wings do not leave as in pure shear"
+            )
+            assert abs(test.peak / test.tearing - 1) < LAJTAI_TOLERANCE, f"{name}: the peak is off Lajtai's strength"
+            assert test.pieces == 1, f"{name}: a bridge that tears has parted"
+            assert test.curve[-1, 1] < FALLEN * test.peak, f"{name}: the force does not fall as the wings leave"
+        else:
+            assert abs(test.k[1] / test.toughness - 1) < TOUGHNESS_TOLERANCE, f"{name}: it does not shear at K_IIc"
+            # The box holds the specimen's ends parallel, which half-planes do not.
+            assert test.expected < test.start == test.peak, f"{name}: the bridge does not go at one load, above theirs"
+            assert test.pieces == 2, f"{name}: the bridge has not parted"
+            assert abs(test.residual / test.friction - 1) < RESIDUAL_TOLERANCE, f"{name}: what is left is not friction"
 
 
 def report(tests: Mapping[str, Sheared]) -> str:

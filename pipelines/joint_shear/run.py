@@ -10,7 +10,7 @@ from geomech.render.studies import against
 from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_joint_shear import Sheared, report
+from compare_joint_shear import Sheared, check, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
@@ -21,4 +21,5 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     against(curves, Path(out) / "joint_shear.png", "way of the box, µm", "shear force, kN/m")
     if not quiet:
         print("\n" + text)
+    check(tests)
     return 0

@@ -11,6 +11,9 @@ from geomech.reference import masonry
 
 INK, STONE, BASE, THRUST, HINGE = "#2f3136", "#d8d2c4", "#a9a9a4", "#1f6f8b", "#c8553d"
 
+#: Bisection to 1e-5 and an elastic shortening of 1e-4 of the thickness; of many voussoirs, beside Milankovitch's ratio.
+THICKNESS_TOLERANCE, MILANKOVITCH_TOLERANCE = 3e-4, 2e-4
+
 LIMITS = """\
 What this does and does not say
   - Joints are radial, of equal angle, and too rough to slide (60°); stone does not crush. Gravity acts on the whole
@@ -19,6 +22,20 @@ What this does and does not say
     the two joints of the keystone.
   - Elastic shortening (E = 100 GPa) lowers the line of thrust by 1e-4 of the thickness: that much more t/R is
     needed."""
+
+
+def check(thinnest: dict[int, float], hinges: np.ndarray, n: int) -> None:
+    """AssertionError where an arch of ``thinnest`` is off limit analysis, or one of ``n`` voussoirs falls by other
+    ``hinges`` (degrees from the crown) than five: the crown, the joints next to Milankovitch's, the springings."""
+    for number, ratio in thinnest.items():
+        exact = masonry.thinnest_arch(number)
+        assert abs(ratio / exact - 1) < THICKNESS_TOLERANCE, f"{number} voussoirs: off limit analysis"
+    many = thinnest[max(thinnest)]
+    assert abs(many - masonry.MILANKOVITCH_RATIO) < MILANKOVITCH_TOLERANCE, "many voussoirs: off Milankovitch"
+    apart = 180.0 / n
+    haunch = apart * round(masonry.MILANKOVITCH_HINGE_DEG / apart)
+    five = [0.0, haunch, haunch, 90.0, 90.0]
+    assert np.allclose(np.sort(hinges), five) if len(hinges) == 5 else False, "the arch does not fall by five hinges"
 
 
 def report(thinnest: dict[int, float], hinges: np.ndarray) -> str:

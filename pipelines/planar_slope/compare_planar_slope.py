@@ -134,10 +134,9 @@ def check(name: str, seen: BridgedPlane) -> None:
 
 
 def report(runs: Mapping[str, BridgedPlane]) -> str:
-    """The comparison as text, checked by `check`."""
+    """The comparison as text."""
     rows = []
     for name, seen in runs.items():
-        check(name, seen)
         cut = "stands" if math.isnan(seen.failed) else f"{seen.failed:.4f}"
         rows.append((
             name, f"{seen.bridge:.2f}", f"{100 * seen.bridge / seen.length:.1f}", f"{seen.started:.4f}",

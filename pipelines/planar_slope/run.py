@@ -10,7 +10,7 @@ from pathlib import Path
 from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_planar_slope import BridgedPlane, draw, report
+from compare_planar_slope import BridgedPlane, check, draw, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
@@ -20,4 +20,6 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
     if not quiet:
         print(f"\n{text}")
+    for name, plane in seen.items():
+        check(name, plane)
     return 0

@@ -14,6 +14,14 @@ from geomech.reference.surface_crack import thin_layer
 RESOLVED = 0.05
 GRIFFITH = np.sqrt(np.pi)
 
+#: Of |K| beside dislocations: the block's size leaves 1e-5. Of the thin layer: the second order that extrapolation
+#: leaves, 0.25 and 0.15 %.
+INDEPENDENT_TOLERANCE, LAYER_TOLERANCE = 3e-5, 5e-3
+#: K_I beyond Griffith's, and K_II, at five half-lengths: both fall with the square of the depth.
+DEEP, DEEP_SHEAR = 0.03, 0.004
+#: Paths are mirror images to this part of what lies between their ends, whose increments are 0.15 m.
+MIRROR_TOLERANCE = 0.02
+
 LIMITS = """\
 What this does and does not say
   - The half-plane is a block 40 (1 + depth) crack half-lengths wide, free on all sides.
@@ -38,6 +46,26 @@ def shallow_limit(depths: np.ndarray, k: np.ndarray) -> np.ndarray:
     """(2,) ratio of K_I, K_II to the thin layer's, extrapolated to no depth from the first two ``depths``."""
     ratio = np.array([np.abs(k[m]) / thin_layer(1.0, depths[m], 1.0) for m in (0, 1)])
     return ratio[0] + (ratio[0] - ratio[1]) * depths[0] / (depths[1] - depths[0])
+
+
+def check(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> None:
+    """AssertionError where K or a path is missed by more than its tolerance."""
+    exact = independent(depths)
+    off = np.abs(k - exact).max(axis=1) / np.hypot(*exact.T)
+    assert np.isfinite(off).sum() == (depths >= RESOLVED).sum(), "K or its independent value is no number"
+    assert np.nanmax(off) < INDEPENDENT_TOLERANCE, "K is off that of dislocations in the half-plane"
+    assert np.abs(shallow_limit(depths, k) - 1).max() < LAYER_TOLERANCE, "a shallow crack does not lift a thin plate"
+    beyond = k[-2:, 0] / GRIFFITH - 1
+    assert 0 < beyond[1] < DEEP, "a deep crack sees the surface"
+    fall = beyond[0] / beyond[1] / (depths[-1] / depths[-2]) ** 2
+    assert abs(fall - 1) < 0.15, "the surface is not felt less by the square of the depth"
+    assert abs(k[-1, 1]) < DEEP_SHEAR * k[-1, 0], "a deep crack shears"
+    for depth, cracks in paths.items():
+        up = cracks.nodes[cracks.surface & (cracks.valence > 0)]
+        assert len(up) == 2 and not len(cracks.tips), f"from depth {depth:g} the crack does not come up on both sides"
+        assert np.abs(up[:, 1]).max() < 1e-9, f"from depth {depth:g} the crack does not end at the surface"
+        assert abs(up[:, 0].sum()) < MIRROR_TOLERANCE * np.ptp(up[:, 0]), f"from depth {depth:g} it is not symmetric"
+        assert np.ptp(up[:, 0]) > 2 * (1 + depth), f"from depth {depth:g} the crack does not lead outwards"
 
 
 def report(depths: np.ndarray, k: np.ndarray, paths: dict[float, Cracks]) -> str:

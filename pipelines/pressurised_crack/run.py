@@ -12,7 +12,7 @@ from geomech import ddm
 from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_pressurised_crack import draw, report
+from compare_pressurised_crack import check, draw, report
 
 DEPTHS = np.array([0.03, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0])  # in half-lengths of the crack
 ROCK = Material("rock", youngs_modulus=30e9, poissons_ratio=0.25, k_ic=1e6)
@@ -36,4 +36,5 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     draw(Path(out) / "pressurised_crack.png", DEPTHS, k, paths)
     if not quiet:
         print(text)
+    check(DEPTHS, k, paths)
     return 0

@@ -10,6 +10,9 @@ from geomech.reference.block_on_incline import MODES, failure_mode, toe_holds_ab
 
 COLOURS = dict(zip(MODES, ("#8aa4a0", "#d9a441", "#c8553d", "#8d6a9f")))
 
+#: The threshold of motion, 2e-4 g, and elastic give: 0.01° each.
+BOUNDARY_TOLERANCE_DEG = 0.02
+
 LIMITS = """\
 What this does and does not say
   - One column on a rough incline, let go from rest; what it does later, on the way down, is another matter.
@@ -22,6 +25,17 @@ def expected(kind: str, angle: float, incline: float) -> float:
     if kind == "slides":
         return toe_holds_above(angle, incline) if angle < incline else incline
     return angle if kind == "slides and topples" else incline
+
+
+def check(incline: float, grid: list[tuple[float, float, str]], found: dict[str, np.ndarray]) -> None:
+    """AssertionError where a column of the ``grid`` (δ, φ, mode) does what the map does not say, or a boundary lies
+    off."""
+    for slenderness, friction, mode in grid:
+        assert mode == failure_mode(slenderness, friction, incline), (
+            f"δ = {np.degrees(slenderness):.1f}°, φ = {np.degrees(friction):.1f}°: {mode}"
+        )
+    assert {mode for *_, mode in grid} == set(MODES), "not every mode was met"
+    assert np.degrees(worst(incline, found)) < BOUNDARY_TOLERANCE_DEG, "a boundary of the map is off"
 
 
 def report(incline: float, found: dict[str, np.ndarray]) -> str:

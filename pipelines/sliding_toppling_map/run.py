@@ -10,7 +10,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from columns import INCLINE, mode, slides_below, topples_above, topples_below
-from compare_sliding_toppling_map import draw, report
+from compare_sliding_toppling_map import check, draw, report
 
 SLENDERNESS = np.radians(np.arange(1.5, 60.0, 3.0))
 FRICTION = np.radians(np.arange(1.5, 60.0, 3.0))
@@ -34,4 +34,5 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     draw(Path(out) / "sliding_toppling_map.png", INCLINE, grid, found)
     if not quiet:
         print(text)
+    check(INCLINE, grid, found)
     return 0

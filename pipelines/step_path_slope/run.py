@@ -10,7 +10,7 @@ from pathlib import Path
 from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_step_path_slope import StepPath, draw, report
+from compare_step_path_slope import StepPath, check, draw, report
 
 
 def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
@@ -21,4 +21,6 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
     if not quiet:
         print(f"\n{text}")
+    for name, path in seen.items():
+        check(name, path)
     return 0

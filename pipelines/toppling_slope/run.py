@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from compare_toppling_slope import draw, report
+from compare_toppling_slope import check, draw, report
 from toppling import at_rest, factor_of_safety, forces, last, limit_friction, modes, run, slope
 
 FRICTION, SECONDS = 0.65, 3.0  # of the slope that comes down
@@ -27,7 +27,8 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     early = last(run(falling, rest, 0.5)).state
     fallen = last(run(falling, early, SECONDS)).state
     done = modes(falling, rest, early)
-    text = report(limit, table, FRICTION, done, (SAFE, factor_of_safety(SAFE)))
+    safety = SAFE, factor_of_safety(SAFE)
+    text = report(limit, table, FRICTION, done, safety)
     Path(out).mkdir(parents=True, exist_ok=True)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
     outlines = [
@@ -37,4 +38,5 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     draw(Path(out) / "toppling_slope.png", table, *outlines, done, title)
     if not quiet:
         print(text)
+    check(limit, table, done, safety)
     return 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from geomech.cli import DONE, main
@@ -33,31 +32,20 @@ def seen(tmp_path_factory):
     return {**seen, "out": out}
 
 
-def test_stress_intensity_factors_by_an_independent_method(seen):
-    """Dislocations in the half-plane: 3e-5 of |K| at all depths that they resolve; the block's size leaves 1e-5."""
-    exact = study.independent(seen["depths"])
-    off = np.abs(seen["k"] - exact).max(axis=1) / np.hypot(*exact.T)
-    assert np.isfinite(off).sum() == 7 and np.nanmax(off) < 3e-5
-
-
-def test_shallow_cracks_lift_a_thin_plate(seen):
-    """Hutchinson & Suo's factors: 0.25 % and 0.15 % are the second order that the extrapolation leaves."""
-    assert study.shallow_limit(seen["depths"], seen["k"]) == pytest.approx([1.0, 1.0], abs=5e-3)
-
-
-def test_deep_cracks_do_not_see_the_surface(seen):
-    """Three per cent at five half-lengths, falling with the square of the depth."""
-    deep = seen["k"][-2:, 0] / np.sqrt(np.pi) - 1
-    assert deep[1] < 0.03 and deep[0] / deep[1] == pytest.approx(2.5**2, rel=0.15)
-    assert np.abs(seen["k"][-1, 1]) < 0.004 * seen["k"][-1, 0]
-
-
-def test_cracks_come_up_on_both_sides(seen):
-    for depth, cracks in seen["paths"].items():
-        up = cracks.nodes[cracks.surface & (cracks.valence > 0)]
-        assert len(up) == 2 and np.allclose(up[:, 1], 0, atol=1e-9) and len(cracks.tips) == 0
-        # Mirror images, and outwards all the way.
-        assert up[:, 0].sum() == pytest.approx(0, abs=0.02 * np.ptp(up[:, 0])) and np.ptp(up[:, 0]) > 2 * (1 + depth)
+def test_its_check_holds_and_sees_what_is_off(seen):
+    """That of the study itself: dislocations in the half-plane at all depths that they resolve, Hutchinson & Suo's thin
+    plate, Griffith far down, and cracks that come up on both sides."""
+    depths, k, paths = seen["depths"], seen["k"], seen["paths"]
+    study.check(depths, k, paths)
+    assert (depths >= study.RESOLVED).sum() == 7
+    with pytest.raises(AssertionError, match="dislocations"):
+        study.check(depths, 1.0001 * k, paths)
+    shallow = k.copy()
+    shallow[0] *= 1.01  # of a depth that dislocations do not resolve
+    with pytest.raises(AssertionError, match="thin plate"):
+        study.check(depths, shallow, paths)
+    with pytest.raises(AssertionError, match="outwards"):
+        study.check(depths, k, {10.0 * depth: cracks for depth, cracks in paths.items()})
 
 
 def test_it_writes_its_files(seen):

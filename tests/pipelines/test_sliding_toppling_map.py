@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from geomech.cli import DONE, main
-from geomech.reference.block_on_incline import MODES, failure_mode
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "sliding_toppling_map"
 sys.path.insert(0, str(FOLDER))
@@ -34,15 +33,15 @@ def seen(tmp_path_factory):
     return {**seen, "out": out}
 
 
-def test_every_column_does_what_the_map_says(seen):
-    for slenderness, friction, mode in seen["grid"]:
-        assert mode == failure_mode(slenderness, friction, seen["incline"])
-    assert {mode for *_, mode in seen["grid"]} == set(MODES)
-
-
-def test_boundaries_by_bisection(seen):
-    # The threshold of motion, 2e-4 g, and elastic give: 0.01° each.
-    assert np.degrees(study.worst(seen["incline"], seen["found"])) < 0.02
+def test_its_check_holds_and_sees_what_is_off(seen):
+    """That of the study itself: every column does what the map says, boundaries by bisection."""
+    incline, grid, found = (seen[name] for name in ("incline", "grid", "found"))
+    study.check(incline, grid, found)
+    slenderness, friction, mode = grid[0]
+    with pytest.raises(AssertionError, match="δ = "):
+        study.check(incline, [(slenderness, friction, next(m for m in study.MODES if m != mode)), *grid[1:]], found)
+    with pytest.raises(AssertionError, match="boundary"):
+        study.check(incline, grid, {kind: table + np.radians([0, 0.05]) for kind, table in found.items()})
 
 
 def test_it_writes_its_files(seen):
