@@ -14,6 +14,7 @@ from .material import Material
 from .motion import Motion
 from .problem import CHANGES, STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Skip, State
+from .whole_network import whole_network
 
 __all__ = [
     "BOLT",
@@ -65,4 +66,5 @@ __all__ = [
     "grouted_bolt",
     "rayleigh_coefficients",
     "read_record",
+    "whole_network",
 ]

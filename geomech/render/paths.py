@@ -15,24 +15,39 @@ if TYPE_CHECKING:
 
 #: Rock shown around the cracks, in parts of what they span.
 _MARGIN = 0.25
+#: The same around outlines.
+_TIGHT = 0.06
 #: Axes of a panel, inches.
 _WIDEST, _TALLEST = 2.0, 4.6
 
 
-def crack_paths(panels: Mapping[str, Mapping[str, Cracks]], path: Path, columns: int = 4) -> Path:
+def crack_paths(
+    panels: Mapping[str, Mapping[str, Cracks]],
+    path: Path,
+    columns: int = 4,
+    outlines: Mapping[str, np.ndarray] | None = None,
+) -> Path:
     """``panels``: title → (what it is called → cracks at the end of a run). Cracks that were drawn are black, what grew
-    has its run's colour; all panels have one scale. Lengths in mm."""
+    has its run's colour; all panels have one scale. ``outlines``: title → (n, 2) m of the rock. Lengths in mm."""
     panels = {
         title: {name: cracks for name, cracks in runs.items() if cracks.n_segments} for title, runs in panels.items()
     }
-    panels = {title: runs for title, runs in panels.items() if runs}
+    panels, outlines = {title: runs for title, runs in panels.items() if runs}, outlines or {}
     columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)
     points = {
-        title: 1e3 * np.concatenate([cracks.nodes[np.unique(cracks.segments)] for cracks in runs.values()])
+        title: 1e3
+        * np.concatenate(
+            [
+                *(cracks.nodes[np.unique(cracks.segments)] for cracks in runs.values()),
+                outlines.get(title, np.empty((0, 2))),
+            ]
+        )
         for title, runs in panels.items()
     }
-    width, height = np.max([np.ptp(own, axis=0) for own in points.values()], axis=0) * (1 + _MARGIN)
+    width, height = np.max([np.ptp(own, axis=0) for own in points.values()], axis=0) * (
+        1 + (_TIGHT if outlines else _MARGIN)
+    )
     width = max(width, 0.45 * height)
     # Inches of a panel's axes, of numbers beside and below it, of the legend.
     wide = min(_WIDEST, _TALLEST * width / height)
@@ -42,6 +57,8 @@ def crack_paths(panels: Mapping[str, Mapping[str, Cracks]], path: Path, columns:
     names = list(dict.fromkeys(name for runs in panels.values() for name in runs))
     for panel, (title, runs) in zip(axes.flat, panels.items()):
         middle = (points[title].min(axis=0) + points[title].max(axis=0)) / 2
+        if title in outlines:
+            panel.fill(*(1e3 * outlines[title]).T, facecolor="#f1efe9", edgecolor="#3b3f46", lw=0.9)
         for name, cracks in runs.items():
             k = names.index(name)
             line, wider = ("-", "--", ":")[k // len(COLOURS) % 3], 0.45 * (len(runs) - list(runs).index(name) - 1)

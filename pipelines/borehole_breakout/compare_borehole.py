@@ -86,7 +86,10 @@ def report(runs: Mapping[str, list]) -> str:
         width, deep = chips(run)
         lines += [
             "Breakout, remote stresses rising in proportion",
-            f"  onset at {found:.4f} of them; 2c cos φ/(1 − sin φ) over 3σ_H − σ_h: {expected:.4f}",
+            (
+                f"  onset at {found:.4f} of them; 2c cos φ/(1 − sin φ) over 3σ_H − σ_h: {expected:.4f} "
+                f"({100 * (found / expected - 1):+.2f} %)"
+            ),
             (
                 f"  at {', '.join(f'{a:.1f}°' for a in azimuths(run))} from σ_H (Bell & Gough 1979: 90°, the wall that "
                 "faces σ_h)"
@@ -111,12 +114,16 @@ def report(runs: Mapping[str, list]) -> str:
         expected = breakdown_pressure(GREATER, LESSER, ROCK.tensile_strength) / 1e6
         lines += [
             "Mud pressure rising, remote stresses standing",
-            f"  breakdown at {found:.2f} MPa; 3σ_h − σ_H + T (Hubbert & Willis 1957): {expected:.2f} MPa",
+            (
+                f"  breakdown at {found:.2f} MPa; 3σ_h − σ_H + T (Hubbert & Willis 1957): {expected:.2f} MPa "
+                f"({100 * (found / expected - 1):+.2f} %)"
+            ),
             f"  at {', '.join(f'{a:.1f}°' for a in azimuths(run))} from σ_H (published: 0°)",
-            "  fracture length over radius   pressure, MPa   the same by dislocations",
+            "  fracture length over radius   pressure, MPa   the same by dislocations    off, %",
         ]
         for step in run[3::4]:
             length = float(step.cracks.lengths.sum()) / 2
             other = fracture_pressure(length)
-            lines.append(f"  {length / RADIUS:10.2f} {step.load_factor:23.3f} {other:20.3f}")
+            off = 100 * (step.load_factor / other - 1)
+            lines.append(f"  {length / RADIUS:10.2f} {step.load_factor:23.3f} {other:20.3f} {off:+14.3f}")
     return "\n".join(lines)

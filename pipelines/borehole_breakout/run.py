@@ -38,5 +38,5 @@ def picture(runs, file: Path) -> None:
         for start, end in cracks.nodes[cracks.segments] / RADIUS:
             axes.plot(*zip(start, end), color="firebrick", linewidth=2, solid_capstyle="round")
         axes.set(title=name.replace("_", " "), aspect="equal", xlim=x, ylim=y, facecolor="0.88")
-        axes.set(xlabel="along σ_H, radii", ylabel="along σ_h, radii")
+        axes.set(xlabel=r"along $\sigma_H$, radii", ylabel=r"along $\sigma_h$, radii")
     figure.savefig(file, dpi=120)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from geomech.ddm.criteria import maximum_tangential_stress
-from geomech.model import Cracks, Cycle
+from geomech.model import Cracks, Cycle, whole_network
 from geomech.reference import brazilian_disc as published
 from geomech.report.part import Part
 
@@ -24,7 +24,7 @@ class Pressed:
     forces       (n,) N/m, force in every cycle in which the crack grew; ``peak`` the largest
     ends         (m, 2) m, where the crack came to the surface
     blocks       pieces of the disc at the end
-    cracks       as they last were before the disc was split
+    cracks       at the end, those too along which the disc was split; ``outline`` (n, 2) m of the disc
     """
 
     forces: list[float] = field(default_factory=list)
@@ -43,6 +43,7 @@ class Pressed:
         along = cracks.nodes[cracks.segments[0, 1]] - cracks.nodes[cracks.segments[0, 0]]
         self.ratio = round(float(np.hypot(*along)) / 2 / self.radius, 6)
         self.angle_deg = float(np.degrees(np.arctan2(abs(along[0]), abs(along[1]))))
+        self.outline, self.cracks = disc, cracks
         self.flat = float(np.ptp(disc[disc[:, 1] == disc[:, 1].max(), 0]))
         self.k_ic = problem.materials[blocks.material[blocks.names.index("disc")]].k_ic
 
@@ -58,8 +59,7 @@ class Pressed:
                 self.kink_deg = float(np.degrees(np.abs(angle).mean()))
             self.forces.append(force)
         self.ends += [event.point for event in cycle.events if event.kind == "daylighting"]
-        if cycle.cracks.n_segments:
-            self.cracks = cycle.cracks
+        self.cracks = whole_network(cycle, self.cracks)
         self.blocks = sum(name.startswith("disc") for name in cycle.blocks.names)
 
     def on_end(self, summary, error=None) -> None:
@@ -110,21 +110,41 @@ def report(discs: Mapping[str, Pressed]) -> str:
     known = [[name, disc.angle_deg, disc] for name, disc in discs.items() if disc.factors is not None]
     factors = Part(
         "Factors N = K √(π R³)/(P √(a/R)) before growth",
-        ["run", "crack to load, °", "N_I", "series", "point loads", "N_II", "series ", "point loads "],
+        ["run", "crack to load, °", "N_I", "series", "point loads", "N_II", "series ", "point loads ", "off, %"],
         [
-            [name, f"{angle:.1f}", *(f"{x:.4f}" for i in (0, 1) for x in (d.factors[i], d.series[i], d.reference[i]))]
+            [
+                name,
+                f"{angle:.1f}",
+                *(f"{x:.4f}" for i in (0, 1) for x in (d.factors[i], d.series[i], d.reference[i])),
+                f"{100 * np.abs(d.factors - d.reference).max() / np.abs(d.reference).max():.2f}",
+            ]
             for name, angle, d in known
         ],
-        after=["Series: Atkinson, Smelser & Sanchez (1982); point loads: dislocations in the disc."],
+        after=[
+            (
+                "Series: Atkinson, Smelser & Sanchez (1982); point loads: dislocations in the disc. Off: the larger "
+                "difference of the two factors from those of point loads, over the larger factor."
+            )
+        ],
     )
     grown = [[name, disc] for name, disc in discs.items() if disc.forces]
     start = Part(
         "Initiation and peak",
-        ["run", "P at initiation, kN/m", "expected", "kink, °", "expected ", "peak P, kN/m", "over initiation"],
+        [
+            "run",
+            "P at initiation, kN/m",
+            "expected",
+            "off, %",
+            "kink, °",
+            "expected ",
+            "peak P, kN/m",
+            "over initiation",
+        ],
         [
             [
                 name,
                 *(f"{x / 1e3:.1f}" for x in (d.initiation, d.expected)),
+                f"{100 * (d.initiation / d.expected - 1):+.2f}",
                 *(f"{x:.1f}" for x in (d.kink_deg, d.expected_kink_deg)),
                 f"{d.peak / 1e3:.1f}",
                 f"{d.peak / d.initiation:.3f}",

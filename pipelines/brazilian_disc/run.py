@@ -20,9 +20,13 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     discs = {each.name: each.watcher for each in runs}
     text = report(discs)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
-    grown = {f"{disc.angle_deg:.1f}° from the load": {"": disc.cracks} for disc in discs.values() if disc.cracks}
+    grown = {f"{disc.angle_deg:.1f}° from the load": disc for disc in discs.values() if disc.cracks}
     if grown:
-        crack_paths(grown, Path(out) / "brazilian_disc.png")
+        crack_paths(
+            {title: {"": disc.cracks} for title, disc in grown.items()},
+            Path(out) / "brazilian_disc.png",
+            outlines={title: disc.outline for title, disc in grown.items()},
+        )
     if not quiet:
         print("\n" + text)
     return 0

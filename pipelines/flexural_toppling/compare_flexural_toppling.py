@@ -103,9 +103,12 @@ def _about(outline: np.ndarray, point: np.ndarray) -> tuple[tuple[float, float],
 
 def report(runs: Mapping[str, Watch]) -> str:
     """The comparison as text."""
-    lines = ["Column with a flaw: part of gravity at which it breaks", f"  {'':10s} a/t    here     bending theory"]
+    lines = [
+        "Column with a flaw: part of gravity at which it breaks",
+        f"  {'':10s} a/t    here     bending theory  off, %",
+    ]
     lines += [
-        f"  {name:10s} {run.flaws[0]:.2f}  {run.broke[0]:7.4f}  {run.limit:7.4f}"
+        f"  {name:10s} {run.flaws[0]:.2f}  {run.broke[0]:7.4f}  {run.limit:7.4f} {100 * (run.broke[0] / run.limit - 1):+15.2f}"
         for name, run in runs.items()
         if run.single and run.broke is not None
     ]
@@ -114,7 +117,10 @@ def report(runs: Mapping[str, Watch]) -> str:
             ends = ", ".join(f"{k / 1e6:.3f}" for k in run.broke[1])
             mean, theory = run.joint_factors
             lines.append(f"Joints between columns ({name}), at {run.broke[0]:.4f} of gravity: |K_II| {ends} MPa √m")
-            lines.append(f"  mean {mean / 1e6:.4f}; σ_b √(t/6), from the energy of bent columns, {theory / 1e6:.4f}")
+            lines.append(
+                f"  mean {mean / 1e6:.4f}; σ_b √(t/6), from the energy of bent columns, {theory / 1e6:.4f} "
+                f"({100 * (mean / theory - 1):+.1f} %)"
+            )
         if run.turns and run.end > 1.2 * run.ramp:
             here, rigid = np.degrees(run.turned())
             lines.append(

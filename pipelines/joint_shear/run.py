@@ -17,7 +17,10 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     tests = {each.name: each.watcher for each in watched_runs(folder, out, Sheared, variants, overrides, quiet)}
     text = report(tests)
     (Path(out) / "comparison.txt").write_text(text + "\n", encoding="utf-8")
-    curves = {name: test.curve.T * [[1e6], [1e-3]] for name, test in tests.items()}
+    curves = {
+        f"{name.replace('_', ' ')}: {1e3 * test.bridge:g} mm, {test.normal / 1e6:g} MPa": test.curve.T * [[1e6], [1e-3]]
+        for name, test in tests.items()
+    }
     against(curves, Path(out) / "joint_shear.png", "way of the box, µm", "shear force, kN/m")
     if not quiet:
         print("\n" + text)

@@ -40,11 +40,13 @@ def check(incline: float, grid: list[tuple[float, float, str]], found: dict[str,
 
 def report(incline: float, found: dict[str, np.ndarray]) -> str:
     """``found``: kind → (n, 2) rad, the angle at which a boundary was sought and where it lies."""
-    rows = ["boundary                at        found     should be   (degrees)"]
+    rows = ["boundary                at        found     should be       off   (degrees)"]
     for kind, table in found.items():
         for at, where in np.degrees(table):
             exact = np.degrees(expected(kind, np.radians(at), incline))
-            rows.append(f"{kind:<20} {'φ' if kind == 'topples' else 'δ'} = {at:4.1f} {where:10.4f} {exact:12.4f}")
+            rows.append(
+                f"{kind:<20} {'φ' if kind == 'topples' else 'δ'} = {at:4.1f} {where:10.4f} {exact:12.4f} {where - exact:+10.4f}"
+            )
     return "\n".join([*rows, "", f"largest difference {np.degrees(worst(incline, found)):.4f}°", "", LIMITS])
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from geomech import ddm
 from geomech.ddm.criteria import maximum_tangential_stress
-from geomech.model import Cycle, DdmSettings, Problem
+from geomech.model import Cracks, Cycle, DdmSettings, Problem, whole_network
 from geomech.reference import rock_bridges as published
 from geomech.report.part import Part
 
@@ -41,7 +41,7 @@ class StepPath:
     linked     (n_links,) at which joints met, in order of time;  ``places`` (n_links, 2) m, where
     failed     at which the path cut the slope (nan: it did not)
     kink       angle to which the first tip turned, rad
-    last       the last cycle before the cut;  ``multiples`` of all cycles by their number
+    cracks     at the end, those too along which the slope was cut;  ``multiples`` of all cycles by their number
     grown      new crack of every cycle;  ``cut_off`` the outline of the block
     """
 
@@ -50,12 +50,13 @@ class StepPath:
     linked: list[float] = field(default_factory=list)
     places: list[tuple[float, float]] = field(default_factory=list)
     kink: float = math.nan
-    last: Cycle | None = None
+    cracks: Cracks | None = None
     multiples: dict[int, float] = field(default_factory=dict)
     grown: list[float] = field(default_factory=list)
 
     def on_start(self, problem: Problem, folder: Path) -> None:
-        cracks, (b,) = problem.cracks, np.unique(problem.cracks.block)
+        self.cracks = cracks = problem.cracks
+        (b,) = np.unique(cracks.block)
         self.outline, self.gravity = problem.blocks.loops(int(b))[0], problem.loads.gravity
         self.rock = problem.materials[problem.blocks.material[int(b)]]
         # Joints from the toe up, each from its lower end.
@@ -92,8 +93,7 @@ class StepPath:
                 self.failed = now
                 loose = [cycle.blocks.loops(b)[0] for b in range(cycle.blocks.n_blocks) if not cycle.blocks.fixed[b]]
                 self.cut_off = min(loose, key=_area)
-        if math.isnan(self.failed):  # what is cut through is an edge of blocks from then on
-            self.last = cycle
+        self.cracks = whole_network(cycle, self.cracks)
 
     def on_end(self, summary, error=None) -> None:
         """Nothing is kept of the end."""
@@ -166,11 +166,12 @@ def report(runs: Mapping[str, StepPath]) -> str:
         links = np.degrees(seen.links[np.isfinite(seen.links)])
         held = f"{seen.held:.4f}" + ("" if math.isfinite(seen.failed) else ", stands")
         rows.append((
-            name, seen.n_joints, f"{seen.started:.4f}", f"{seen.alone:.4f}", held, f"{seen.all_at_once:.0f}",
+            name, seen.n_joints, f"{seen.started:.4f}", f"{seen.alone:.4f}",
+            f"{100 * (seen.started / seen.alone - 1):+.2f}", held, f"{seen.all_at_once:.0f}",
             f"{math.degrees(seen.kink):.1f}°", f"{links.min():.0f}° to {links.max():.0f}°" if len(links) else "",
         ))  # fmt: skip
     headers = (
-        "run", "joints", "starts at, g", "crack solver alone", "holds up to, g", "all bridges at once", "first turn",
+        "run", "joints", "starts at, g", "crack solver alone", "off, %", "holds up to, g", "all bridges at once", "first turn",
         "links, from the dip",
     )  # fmt: skip
     loads = Part("The load of failure", headers, rows, after=[" ".join(words.split()) for words in LIMITS])
@@ -193,7 +194,7 @@ def draw(seen: StepPath, file: Path) -> None:
     colours, scale = matplotlib.colormaps["viridis_r"], Normalize(0, seen.held)
     for joint in seen.joints:
         slope.plot(*joint.T, color=ink, lw=1.6)
-    cracks = seen.last.cracks
+    cracks = seen.cracks
     for segment, birth in zip(cracks.nodes[cracks.segments], cracks.birth_cycle):
         if birth:
             slope.plot(*segment.T, color=colours(scale(seen.multiples[int(birth)])), lw=3, solid_capstyle="round")

@@ -11,16 +11,20 @@ import numpy as np
 
 from geomech.model import Cycle
 from geomech.reference import roof_block as published
+from geomech.render.plots import COLOURS, figure_of
 
 #: The bridge is a fortieth of the parting, not of half-planes, and the roof above it bends a little: measured 0.1 to
-#: 0.4 %.
-FORCE_TOLERANCE = 0.006
+#: 0.4 %. In motion cracks answer to their block's mean stress, without the mean strain of what bends them open
+#: (`geomech.coupling.by_mean_stress`), and the roof's contacts share its load by 0.2 % otherwise: 0.3 and 0.6 %.
+FORCE_TOLERANCE, IN_MOTION = 0.005, 0.008
 #: The bending of the roof shears the bridge (K_II/K_I 0.05 to 0.15): it breaks at up to 1.5 (K_II/K_I)² below the load
 #: at which K_I alone would do it (`maximum tangential stress`), which statics and K_I know nothing of.
 LOAD_TOLERANCE = 0.04
 #: Way of a block in free fall is exact in the time scheme; sliding friction keeps five digits, less the walls' own
 #: springs.
 FALL_TOLERANCE, SLIDE_TOLERANCE = 1e-6, 2e-3
+#: s, when weight and thrust have grown to their full size.
+FULL_WEIGHT = 1.0
 #: Of a block that is held, m: what springs and rock give under a weight of 23 t.
 HELD = 1e-4
 
@@ -107,18 +111,26 @@ def report(runs: Mapping[str, Watch]) -> str:
     """The comparison as text."""
     lines = [
         "The bridge: force on it from K_I, and the part of the full load at which it breaks",
-        f"  {'':10s} force, kN/m  W − 2H tan(φ − α)  breaks at  K_Ic √(πc) over that force",
+        f"  {'':10s} force, kN/m  W − 2H tan(φ − α)  off, %  breaks at  K_Ic √(πc) over that force  off, %",
     ]
     for name, run in runs.items():
         if run.broke is not None:
             lines.append(
-                f"  {name:10s} {run.force / 1e3:11.2f} {run.statics / 1e3:18.2f} {run.broke[0]:10.4f} "
-                f"{run.breaks:27.4f}"
+                f"  {name:10s} {run.force / 1e3:11.2f} {run.statics / 1e3:18.2f} "
+                f"{100 * (run.force / run.statics - 1):+7.2f} {run.broke[0]:10.4f} {run.breaks:27.4f} "
+                f"{100 * (run.broke[0] / run.breaks - 1):+7.2f}"
             )
-    lines += ["Then: acceleration under full gravity", f"  {'':10s} m/s²      Newton's    way, m"]
+    lines += [
+        "The roof bends and shears the bridge: it breaks up to 4 % sooner than by K_I alone.",
+        "Then: acceleration under full gravity",
+        f"  {'':10s} m/s²      Newton's    off, m/s²    way, m",
+    ]
     for name, run in runs.items():
         if run.fell:
-            lines.append(f"  {name:10s} {run.acceleration:8.5f}  {run.newton:8.5f} {run.way[-1]:9.5f}")
+            lines.append(
+                f"  {name:10s} {run.acceleration:8.5f}  {run.newton:8.5f} "
+                f"{run.acceleration - run.newton:+11.1e} {run.way[-1]:9.5f}"
+            )
     return "\n".join(lines)
 
 
@@ -127,7 +139,7 @@ def check(runs: Mapping[str, Watch]) -> None:
     for name, run in runs.items():
         if run.broke is not None:
             assert run.parted, f"{name}: the bridge has not parted"
-            assert abs(run.force / run.statics - 1) < FORCE_TOLERANCE, (
+            assert abs(run.force / run.statics - 1) < (IN_MOTION if run.fell else FORCE_TOLERANCE), (
                 f"{name}: the bridge's force is not that of statics"
             )
             assert abs(run.broke[0] / run.breaks - 1) < LOAD_TOLERANCE, f"{name}: the bridge does not break at its K_Ic"
@@ -141,14 +153,24 @@ def check(runs: Mapping[str, Watch]) -> None:
 
 
 def draw(runs: Mapping[str, Watch], file: Path) -> None:
-    """Ways of the blocks over time, beside what they must be."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6, 4), layout="constrained")
+    """Ways of the blocks over time, beside Newton's from full weight on, with the place and speed they have then."""
+    fallen = {name.replace("_", " "): run for name, run in runs.items() if run.fell}
+    if not fallen:
+        return
+    figure, save = figure_of((6.4, 4.4), file)
     axes = figure.subplots()
-    for name, run in runs.items():
-        if run.fell:
-            axes.plot(run.time, -run.way, label=name.replace("_", " "))
-    axes.set(xlabel="time, s (weight and thrust grow until 1 s)", ylabel="the block's height, m")
-    axes.legend()
-    figure.savefig(file, dpi=120)
+    for k, (name, run) in enumerate(fallen.items()):
+        axes.plot(run.time, -run.way, color=COLOURS[k], lw=2, label=name)
+        # Place and speed at the end of the loading, from the run; the acceleration after it is Newton's.
+        time = np.linspace(FULL_WEIGHT, run.time[-1], 6)
+        place = np.interp(FULL_WEIGHT, run.time, run.way)
+        speed = (np.interp(FULL_WEIGHT + 0.02, run.time, run.way) - place) / 0.02 - run.newton * 0.01
+        newton = place + speed * (time - FULL_WEIGHT) + run.newton / 2 * (time - FULL_WEIGHT) ** 2
+        label = "Newton's" if k == len(fallen) - 1 else None
+        axes.plot(time, -newton, "o", mfc="white", mec="#2f3136", ms=5, ls="none", label=label)
+    axes.axvline(FULL_WEIGHT, color="0.8", lw=1, zorder=0)
+    axes.text(FULL_WEIGHT, 0.02, " full weight", color="0.5", fontsize=8, transform=axes.get_xaxis_transform())
+    axes.set(xlabel="time, s", ylabel="the block's way, m", title="The key block on its way down")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(frameon=False)
+    save()

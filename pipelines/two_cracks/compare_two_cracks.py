@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
-from whole_network import whole_network
 
-from geomech.model import Cracks, Cycle, Problem
+from geomech.model import Cracks, Cycle, Problem, whole_network
 from geomech.reference import two_cracks as published
 from geomech.report.part import Part
 

@@ -1,7 +1,6 @@
-"""All cracks of a specimen, those among them that it has been cut along too.
+"""All cracks of a run, those too that blocks have been cut along.
 
-Where cracks close a ring in one cycle, as the wings of two equal slots do that reach each other at once, the rock
-within is a block of its own from then on, and the segments around it are no cracks any more but faces of blocks, called
+Where cracks cut a block in two, the segments between the parts are no cracks any more but faces of blocks, called
 "crack:NAME". Coordinates of the reference are the same to the last bit.
 """
 
@@ -11,7 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from geomech.model import Blocks, Cracks, Cycle
+from .blocks import Blocks
+from .cracks import Cracks
+from .state import Cycle
 
 #: What is nearer than this part of a segment's length to it lies on it.
 _ON = 1e-9
@@ -19,7 +20,8 @@ _WALL = "crack:"
 
 
 def whole_network(cycle: Cycle, before: Cracks) -> Cracks:
-    """The cracks of ``cycle`` and the faces that cracks have left on its blocks, with nodes shared between them. A face
+    """The cracks of ``cycle`` and the faces that cracks have left on its blocks, with nodes shared between them (faces
+    have block −1). A face
     is as old as the crack of ``before``, all there were a cycle earlier, that it lies on; else it grew in that cycle."""
     ends, names = _walls(cycle.blocks)
     if not len(ends):
