@@ -246,6 +246,9 @@ class Body:
             rows = influence(g, c.take(k), nu, tol)
             return rows if system.anchors is None else system.anchored(rows, system.anchors.of_jumps(c.take(k)))
 
+        if (self.compressed or iterated) and not (old and (old.compressed or old._outside.iterated)):
+            of = [f"{g.n_unknowns} on the boundary"] * iterated + [f"{c.n_unknowns} on cracks"] * self.compressed
+            _log.info("unknowns that are iterated on, not factored: %s", ", ".join(of))
         if self.compressed:
             on_boundary, crack = gc(np.arange(c.n)), self.cracks.crack[c.source]
             on_both = system.factor if system.iterated else None

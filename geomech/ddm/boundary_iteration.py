@@ -19,10 +19,14 @@ from .influence import ElementSet, line_influence
 from .iterative import Patches, gmres, scales
 from .supports import Holds
 
-#: Boundary unknowns from which "auto" and "compressed" iterate on them. Matrices and one load take 0.8 s at 4100
-#: (factored 2.7 s) and 1.5 s at 6100 (7.1 s), processor time; another load 0.3 and 0.4 s (0.01 s), so that factors are
-#: the better for some fifteen loads at this number.
+#: Boundary unknowns from which "auto" and "compressed" iterate on them. Matrices and one load take 0.7 s at 4000
+#: (factored 2.5 s) and 1.5 s at 6100 (7.1 s), processor time, where elements are alike, and 2.8 s at 6000 (6.3 s) on an
+#: outline of eight corners with a hole of twelve, graded to elements of 1e-8 of the longest; another load 0.2, 0.4 and
+#: 1.6 s (0.01 s), so that factors are the better for some fifteen loads at this number, and for three on the graded one.
 CROSSOVER = 6000
+#: Elements join a neighbourhood that are no farther from it than so many times their length: on even outlines as many
+#: products as with all that are near (24 at 4000 unknowns, with 4 it is 30).
+NEAR = 12.0
 #: Entries of the reactions' dense columns up to which a held boundary is iterated on (a gigabyte).
 MOST_REACTIONS = 128_000_000
 
@@ -84,15 +88,16 @@ class IteratedBoundary:
     ):
         self._matrix, self._rigid, self._weights, self._extent = matrix, rigid, weights, extent
         self.n, self.products = elements.n_unknowns, 0
-        # Elements at the ends of supports are shorter by far than any other's.
-        self.scale = scales(elements) if isinstance(matrix, HeldMatrix) else None
+        # Elements at corners and at the ends of supports are shorter by far than others: by itself, round-off in their
+        # equations is more than what is left of all the rest (8.9e-9 where the shortest is 1e-8 of the longest).
+        self.scale = scales(elements)
         self._last: tuple[np.ndarray, np.ndarray] | None = None
 
         def lifted(numbers: np.ndarray) -> np.ndarray:
             unknowns = elements.unknowns(numbers)
             return between(numbers) + rigid[unknowns] @ weights[:, unknowns] / extent
 
-        self._patches = Patches(elements, np.zeros(elements.n, int), nu, tol, lifted)
+        self._patches = Patches(elements, np.zeros(elements.n, int), nu, tol, lifted, NEAR)
         zero = np.zeros(self.n)
         self._patches.change(Rows(np.zeros(self.n, bool), zero, zero, elements.per))
 

@@ -146,7 +146,9 @@ def scales(elements: ElementSet) -> np.ndarray:
 
 class Patches:
     """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element;
-    ``between(elements)`` the matrix between some of them where it is not their influence alone."""
+    ``between(elements)`` the matrix between some of them where it is not their influence alone. No element joins a
+    patch that is farther from its own than ``lengths`` times its length: what is graded towards another corner is too
+    small to be felt here, and too much of it to be factored again."""
 
     def __init__(
         self,
@@ -155,6 +157,7 @@ class Patches:
         nu: float,
         tol: float,
         between: Callable[[np.ndarray], np.ndarray] | None = None,
+        lengths: float = np.inf,
     ):
         self._elements, self._nu, self._tol = elements, nu, tol
         self._between = self._influence if between is None else between
@@ -167,6 +170,9 @@ class Patches:
             own = tree.elements(leaf)
             cut = np.concatenate([at[first[k] : first[k + 1]] for k in np.unique(crack[own])])
             near = cut[np.abs(middle[cut] - tree.centre[leaf]) <= REACH * tree.radius[leaf]]
+            if np.isfinite(lengths):
+                away = np.abs(middle[near][:, None] - middle[own]).min(axis=1)
+                near = near[away <= lengths * elements.length[near]]
             whole = np.union1d(own, near)
             self._patches.append((whole, elements.unknowns(np.sort(own))))
         self._factors: list[tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor] | None]
@@ -256,7 +262,7 @@ class Coupled:
         self._on_boundary, self._on_cracks = on_boundary, on_cracks
         self.first = boundary.n
         cracks = scales(reduced.cracks.targets)
-        self.scale = None if boundary.scale is None else np.concatenate([boundary.scale, cracks])
+        self.scale = np.concatenate([boundary.scale, cracks])
 
     def times(self, v: np.ndarray, transposed: bool = False) -> np.ndarray:
         u, w = v[: self.first], v[self.first :]

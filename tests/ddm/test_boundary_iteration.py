@@ -82,6 +82,29 @@ def test_bodies_without_cracks_and_bodies_that_grow(few):
     np.testing.assert_allclose(factors(grown.solve(load)), factors(alone), rtol=0, atol=1e-9 * size)
 
 
+def test_graded_boundaries_are_iterated_on_to_the_end(few, caplog):
+    """Corners graded to 1e-8 of the longest element: round-off in the shortest elements' equations is not what stops
+    the iteration, nor are neighbourhoods as large as the whole; both once ended in factoring after all, for four times
+    its cost."""
+    caplog.set_level("INFO")
+    load, graded = ddm.BodyLoad(remote_stress=[0.0, 1e6, 2e5]), {"grading_ratio": 0.15, "grading_layers": 8}
+    crack = Cracks.from_polylines([np.array([[2.0, 2.0], [2.8, 2.4]])], aperture=np.inf)
+    dense, other = (
+        ddm.Body([BLOCK], crack, ROCK, DdmSettings(2, solver=solver, **graded), holes=[HOLE]).solve(load)
+        for solver in ("dense", "auto")
+    )
+    outside = other.body._outside
+    lengths = outside.elements.length
+    assert outside.iterated and lengths.min() < 1e-8 * lengths.max()
+    parts = np.array([len(elements) for elements, _ in outside.factor._patches._patches])
+    assert parts.sum() < 2.2 * outside.elements.n
+    np.testing.assert_allclose(factors(other), factors(dense), rtol=0, atol=1e-9 * np.abs(factors(dense)).max())
+    assert [r.message for r in caplog.records] == [
+        f"unknowns that are iterated on, not factored: {outside.factor.n} on the boundary, "
+        f"{other.body.faces.n_unknowns} on cracks"
+    ]
+
+
 def test_what_the_iteration_does_not_solve_is_factored(few, monkeypatch):
     load = pressed([0.0, 1e6, 2e5])
     dense = ddm.Body([OUTLINE], network(1), ROCK, DdmSettings(solver="dense")).solve(load)
