@@ -14,6 +14,7 @@ import pytest
 
 from geomech import __version__, doctor
 from geomech.cli import BAD_INPUT, DONE, FAILED, default_folder, main
+from geomech.cli.verb import check_folder, check_writable
 
 VERBS = ("check", "run", "safety", "render", "report", "doctor")
 SPECIMEN = """
@@ -296,7 +297,7 @@ def test_a_failure_is_told_once(scene, tmp_path, monkeypatch, capsys):
 
 def test_a_run_folder_that_cannot_be_is_told_in_a_line(scene, tmp_path, capsys):
     (tmp_path / "file").write_text("")
-    assert main(["run", str(scene), "--out", str(tmp_path / "file" / "run")]) == FAILED
+    assert main(["run", str(scene), "--out", str(tmp_path / "file" / "run")]) == BAD_INPUT
     (line,) = capsys.readouterr().err.splitlines()
     assert str(tmp_path / "file") in line and "not a directory" in line
 
@@ -461,3 +462,33 @@ def test_a_fault_of_ours_is_no_bad_input_of_safety(tmp_path, capsys, monkeypatch
 def test_seeds_are_two_numbers_and_belong_to_slopes(asked, capsys):
     assert main(["bench", *asked]) == BAD_INPUT
     assert "--seeds" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "bench ddm --quick --out FOLDER", "bench ddm --quick --out FILE/figures.json", "safety SCENE --out FOLDER",
+        "report RUN --out FOLDER", "build SCENE --out FILE", "build SCENE --picture FOLDER", "render RUN --out FILE",
+        "run SCENE --out FILE",
+    ],
+)  # fmt: skip
+def test_files_that_cannot_be_written_are_refused_before_anything_is_done(line, tmp_path, monkeypatch, capsys):
+    """A benchmark was measured for half a minute and then could not be written."""
+    places = {name: tmp_path / name.lower() for name in ("FOLDER", "FILE", "SCENE", "RUN")}
+    places["FOLDER"].mkdir()
+    places["FILE"].write_text("")
+    for what in ("bench.topic", "bench.figures.yardstick", "scene.load_scene", "output.Run"):
+        monkeypatch.setattr(f"geomech.{what}", lambda *given, **options: pytest.fail("went on"))
+    words = line.split()
+    for name, place in places.items():
+        words = [word.replace(name, str(place)) for word in words]
+    assert main(words) == BAD_INPUT
+    told = capsys.readouterr().err
+    assert told.startswith("geomech: --out: " if "--out" in line else "geomech: --picture: ")
+    assert "is a folder" in told or "is a file" in told
+
+
+def test_the_folder_of_a_file_need_not_be_there(tmp_path):
+    check_writable("--out", tmp_path / "new" / "deep" / "figures.json")
+    check_folder("--out", tmp_path / "new" / "deep")
+    assert not (tmp_path / "new").exists()

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from ..bench import TOPICS, topic
-from .verb import DONE, FAILED, BadInput, Verbs, add_verb
+from .verb import DONE, FAILED, BadInput, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
@@ -48,6 +48,8 @@ def _bench(options: argparse.Namespace) -> int:
     except (OSError, ValueError) as error:
         raise BadInput(f"--against: {error}") from error
     seeds = _seeds(options)
+    out = options.out or Path("outputs/bench/figures.json")
+    check_writable("--out", out)
     if options.blocks is not None and ("dda" not in options.topics or options.blocks < 1):
         raise BadInput("--blocks takes a number of blocks and belongs to dda: geomech bench dda --blocks 100000")
     unit, found = figures.yardstick(), {}
@@ -69,7 +71,6 @@ def _bench(options: argparse.Namespace) -> int:
         }
         print(found[name].text, end="\n\n", flush=True)
     print(figures.told_times(spent), end="\n\n")
-    out = options.out or Path("outputs/bench/figures.json")
     print(figures.write(out, found, quick=options.quick, unit=unit, spent=spent))
     if before is None:
         return DONE

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .scenes import default_folder, scene_arguments, scenes_asked
 from .telling import say_warnings
-from .verb import DONE, Verbs, add_verb
+from .verb import DONE, Verbs, add_verb, check_folder, check_writable
 
 
 def declare(verbs: Verbs) -> None:
@@ -26,6 +26,8 @@ def declare(verbs: Verbs) -> None:
 
 
 def _build(options: argparse.Namespace) -> int:
+    check_folder("--out", options.out)
+    check_writable("--picture", options.picture)
     from ..output.block_system import write_block_system
     from ..render.block_map import draw_block_map
     from ..scene import load_scene

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from .runs import open_run
-from .verb import DONE, BadInput, Verbs, add_verb
+from .verb import DONE, BadInput, Verbs, add_verb, check_folder
 
 #: Pixels, as for a scene's own render.width_px.
 LEAST_WIDTH = 64
@@ -34,6 +34,7 @@ def _render(options: argparse.Namespace) -> int:
         raise BadInput(f"no stress component {options.component!r}; there are {', '.join(COMPONENTS)}")
     if options.width is not None and options.width < LEAST_WIDTH:
         raise BadInput(f"a width of {options.width} pixels shows nothing; give at least {LEAST_WIDTH}")
+    check_folder("--out", options.out)
     run = open_run(options.run)
     wishes = {"component": options.component, "width": options.width, "movie": options.gif}
     for path in draw(run, options.out, **{key: value for key, value in wishes.items() if value is not None}):

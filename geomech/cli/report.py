@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .runs import open_run, run_folders
 from .telling import say
-from .verb import DONE, Verbs, add_verb
+from .verb import DONE, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
@@ -33,6 +33,7 @@ def declare(verbs: Verbs) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
+    check_writable("--out", options.out)
     from ..report import as_csv, as_text, is_benchmark, table, write_page
 
     place, benchmark = options.runs[0], len(options.runs) == 1 and is_benchmark(options.runs[0])

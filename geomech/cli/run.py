@@ -8,7 +8,7 @@ from typing import Any
 
 from .scenes import default_folder, scene_arguments, scenes_asked, variants_asked
 from .telling import say_warnings
-from .verb import DONE, BadInput, Verbs, add_verb
+from .verb import DONE, BadInput, Verbs, add_verb, check_folder
 
 
 def declare(verbs: Verbs) -> None:
@@ -23,6 +23,7 @@ def declare(verbs: Verbs) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    check_folder("--out", options.out)
     prepare_for_a_run()
     place: Path = options.scene
     if place.is_dir() and (place / "run.py").is_file():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .scenes import scene_arguments, scenes_asked
 from .telling import say, say_warnings
-from .verb import DONE, BadInput, Verbs, add_verb
+from .verb import DONE, BadInput, Verbs, add_verb, check_writable
 
 
 def declare(verbs: Verbs) -> None:
@@ -40,6 +40,7 @@ def declare(verbs: Verbs) -> None:
 
 
 def _safety(options: argparse.Namespace) -> int:
+    check_writable("--out", options.out)
     from ..dda import NothingToReduce
     from ..output.summary import write_json
     from ..pipeline import CracksInBlocks, cracked_and_free, factor_of_safety
@@ -73,6 +74,7 @@ def _safety(options: argparse.Namespace) -> int:
             answer["cracks_left_out"], answer["caution"] = left_out, _caution(left_out)
         sys.stdout.flush()
     if options.out:
+        options.out.parent.mkdir(parents=True, exist_ok=True)
         write_json(options.out, told)
     return DONE
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable
+from pathlib import Path
 
 #: What the verbs of a command line are added to.
 Verbs = argparse._SubParsersAction
@@ -13,6 +15,32 @@ DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 3
 
 class BadInput(ValueError):
     """Something on the command line that cannot be: exit code 2."""
+
+
+def check_writable(option: str, path: Path | None) -> None:
+    """Refuse a file that what follows could not write, before it has cost anything: raise BadInput where ``path`` is a
+    folder or may not be written, or where what is to be its folder is a file."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise BadInput(f"{option}: {path} is a folder; give a file in it, as {path / 'NAME'}")
+    _check_place(option, path)
+
+
+def check_folder(option: str, path: Path | None) -> None:
+    """The same of a folder that is to be written into."""
+    if path is not None:
+        if path.exists() and not path.is_dir():
+            raise BadInput(f"{option}: {path} is a file, not a folder")
+        _check_place(option, path)
+
+
+def _check_place(option: str, path: Path) -> None:
+    there = next(place for place in (path.absolute(), *path.absolute().parents) if place.exists())
+    if there != path.absolute() and not there.is_dir():
+        raise BadInput(f"{option}: {there} is a file and not a directory that {path} could be in")
+    if not os.access(there, os.W_OK):
+        raise BadInput(f"{option}: {path} may not be written")
 
 
 def add_verb(
