@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -210,6 +211,15 @@ def test_errors_of_a_half_plane_name_their_place(scene, faults, change, place, s
         return
     ((where, message),) = faults(BELOW_SURFACE, change)
     assert f" {place}" in f" {where}" and said in message, (where, message)
+
+
+@pytest.mark.parametrize(("name", "surface"), [("inclined_crack", None), ("crack_below_surface", (0.0, 1.0))])
+def test_examples_have_nothing_to_be_warned_of(name, surface):
+    loaded = load_scene(Path(__file__).parents[2] / "geometry" / f"{name}.toml")
+    endless = loaded.problem().endless
+    assert not loaded.warnings and (endless.surface and endless.surface[1]) == surface
+    # What leads is what rises.
+    assert endless.load_at(0.0) == 0.0 and endless.load_at(2.0) == pytest.approx(2 * endless.load_at(1.0))
 
 
 def test_an_edge_that_is_no_surface(faults):
