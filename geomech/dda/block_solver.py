@@ -18,7 +18,9 @@ from collections.abc import Callable
 import numpy as np
 from numba import njit
 
+from ..compiled import kept
 from .multifrontal import Factors
+from .shared_tasks import add_at_once, await_value, crew
 from .work import Work
 
 _jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
@@ -42,15 +44,15 @@ FEW = 12
 #: Free blocks from which factors are in single precision: half the memory, and on walls of 10 000 bricks three quarters
 #: of the time although a solution takes two substitutions more; of 1 000 as quick.
 SINGLE = 4000
+#: Blocks from which products are formed on all cores, the rows of so many at a time.
+SHARED, SHARE = 4000, 512
 
 
 @njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
-def multiply(data, pointer, columns, x):
-    """A x for 6×6 blocks stored row by row. (Written out, for only whole sums of six become vector instructions: four
-    times as fast as loops.)"""
-    n = len(pointer) - 1
-    out = np.empty(6 * n)
-    for i in range(n):
+def _multiply_rows(first, last, data, pointer, columns, x, out):
+    """A x for the rows of 6×6 blocks from ``first`` to before ``last``. (Written out, for only whole sums of six become
+    vector instructions: four times as fast as loops.)"""
+    for i in range(first, last):
         s0 = s1 = s2 = s3 = s4 = s5 = 0.0
         for k in range(pointer[i], pointer[i + 1]):
             b, at = data[36 * k : 36 * k + 36], 6 * columns[k]
@@ -63,6 +65,31 @@ def multiply(data, pointer, columns, x):
             s5 += b[30] * v0 + b[31] * v1 + b[32] * v2 + b[33] * v3 + b[34] * v4 + b[35] * v5
         mine = out[6 * i : 6 * i + 6]
         mine[0], mine[1], mine[2], mine[3], mine[4], mine[5] = s0, s1, s2, s3, s4, s5
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _multiply_shared(claimed, told, share, data, pointer, columns, x, out):
+    """The rows of ``share`` blocks at a time, by turns with other threads; ``claimed`` and ``told`` (1,) as for the
+    elimination of fronts."""
+    n = len(pointer) - 1
+    shares = (n + share - 1) // share
+    while True:
+        q = add_at_once(claimed, 0, 1)
+        if q >= shares:
+            break
+        _multiply_rows(q * share, min(n, (q + 1) * share), data, pointer, columns, x, out)
+        add_at_once(told, 0, 1)
+    await_value(told, 0, shares)
+
+
+def multiply(data: np.ndarray, pointer: np.ndarray, columns: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """A x for 6×6 blocks stored row by row; from many on by all cores, to the same bit."""
+    out = np.empty(6 * (len(pointer) - 1))
+    given = data, pointer, columns, x, out
+    if len(pointer) <= SHARED:
+        _multiply_rows(0, len(pointer) - 1, *given)
+    else:
+        crew().share(_multiply_shared, np.zeros(1, np.int64), np.zeros(1, np.int64), SHARE, *given)
     return out
 
 

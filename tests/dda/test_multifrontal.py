@@ -223,10 +223,15 @@ def test_a_solution_goes_no_farther_than_it_is_asked_to():
     assert done[0] < done[1]
 
 
-def test_products_and_their_largest_terms():
+def test_products_and_their_largest_terms(monkeypatch):
     _, rows, columns, data = springs_between(30, seed=9)
     matrix, x = full(rows, columns, data, 30), np.random.default_rng(2).normal(size=180)
     at = data.ravel(), np.searchsorted(rows, np.arange(31)), columns, x
     size = (abs(matrix) @ np.abs(x)).max()
     assert block_solver.largest_terms(*at) == pytest.approx(size, rel=1e-14)
-    assert np.abs(block_solver.multiply(*at) - matrix @ x).max() <= 1e-14 * size
+    product = block_solver.multiply(*at)
+    assert np.abs(product - matrix @ x).max() <= 1e-14 * size
+    # The same to the bit when threads share the rows.
+    monkeypatch.setattr(block_solver, "SHARED", 0)
+    monkeypatch.setattr(block_solver, "SHARE", 4)
+    assert np.array_equal(block_solver.multiply(*at), product)
