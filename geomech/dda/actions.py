@@ -59,7 +59,7 @@ class StepActions:
         self.bolts: BoltSet | None = None
         self.memory = np.empty(0, BOLT)
         if loads.bolts:
-            check_bolts(loads.bolts, blocks, blocks.fixed)
+            check_bolts(loads.bolts, blocks.fixed)
             self.bolts, self.memory = BoltSet.of(loads.bolts, state.bolts, state.time, point_at, order, middle, removed)
         #: (n_contacts,) m: what the fixed blocks' motion makes of the contacts' motion along their edges.
         self.along = np.zeros(0)

@@ -21,6 +21,7 @@ from .overlap import refuse_overlap
 from .rigid import with_rigid
 from .step import CrackResponse, NotConverged, StepResult
 from .step_length import StepLength
+from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, told_rows
 from .turned_in import turned_in
@@ -53,7 +54,8 @@ class BlockSystem:
     ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``slack`` (m) is the rounding of coordinates:
     less is no motion.
 
-    Raises ValueError when materials or joints are missing or a block has no area.
+    Raises ValueError when materials or joints are missing, a block has no area, or one that moves has no mass in a
+    dynamic run.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class BlockSystem:
         self.settings = settings or DdaSettings()
         self.scheme = TimeScheme.of(self.settings)
         self.load_map = LoadMap(blocks)
+        self._stray_loads = StrayLoads(blocks)
         self._excavations = Excavations(blocks)
 
         of = np.asarray(blocks.material, dtype=int)
@@ -100,6 +103,7 @@ class BlockSystem:
         areas = blocks.areas()
         if (areas <= 0).any():
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
+        self._refuse_massless()
         self.mass = self.density * areas
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
         self.slack = _SLACK * float(np.abs(vertices).max())
@@ -113,11 +117,18 @@ class BlockSystem:
         share = self.settings.penetration_tolerance
         if self.settings.contact == "penalty":
             return 0.0
-        if self.settings.contact != "augmented":
-            raise ValueError(f'contact is "penalty" or "augmented", not {self.settings.contact!r}')
-        if not 0 < share < 1:
-            raise ValueError(f"penetration_tolerance must lie between 0 and 1, got {share!r}")
         return max(share * size, _FINEST * self.slack)
+
+    def _refuse_massless(self) -> None:
+        """In dynamics a block without mass has no equation of motion."""
+        massless = ~self.fixed & (self.density == 0.0)
+        if not self.scheme.static and massless.any():
+            block = int(massless.argmax())
+            material = self.materials[int(self.blocks.material[block])].name
+            raise ValueError(
+                f"{self.finder.names[block]!r} may move, but its material {material!r} has no density: in dynamics "
+                "blocks without mass have no equation of motion"
+            )
 
     @property
     def allowed_ratio(self) -> float:
@@ -165,8 +176,9 @@ class BlockSystem:
         holds them up in statics.
         """
         dt = self.settings.time_step if dt is None else float(dt)
-        if not dt > 0:
+        if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
+        self._stray_loads.refuse(loads)
         removed = self.removed(loads, state.time)
         if removed is not self.taken_out:
             self._take_out(removed, self._excavations.drained(loads, state.time))
@@ -330,6 +342,8 @@ def run(
 
     ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
     """
+    if not end_time >= 0:
+        raise ValueError(f"end_time must not be negative, got {end_time!r} s")
     system = BlockSystem(blocks, materials, joints, joint_index, settings)
     state = State.at_rest(blocks) if state is None else state
     yield state

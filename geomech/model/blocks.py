@@ -59,8 +59,11 @@ class Blocks:
         """Build from ``polygons[block][loop]`` = (n, 2) vertices without the closing repetition; a bare (n, 2) array
         stands for a block without holes. ``edge_names[block][loop][edge]`` names edges. Loops are turned to the
         house's sense. Raises ValueError naming the block for loops of fewer than three vertices, repeated vertices,
-        non-finite coordinates, edges that cross, no area, or holes outside the outline."""
+        non-finite coordinates, edges that cross, no area, or holes outside the outline, and for lists that have not
+        one entry a block."""
         n_blocks = len(polygons)
+        given = {"material": material, "fixed": fixed, "held": held, "edge_names": edge_names, "names": names}
+        _refuse_lengths(n_blocks, given)
         names = tuple(names) if names is not None else tuple(f"block {b}" for b in range(n_blocks))
         loops, block_loop = [], [0]
         for block in polygons:
@@ -70,6 +73,8 @@ class Blocks:
         owner = np.repeat(np.arange(n_blocks), np.diff(block_loop))
         outer = np.zeros(len(loops), bool)
         outer[block_loop[:-1]] = True
+        if edge_names is not None:
+            _refuse_loops(edge_names, block_loop, names)
         labels = None if edge_names is None else [list(label) for block in edge_names for label in block]
         for k, loop in enumerate(loops):
             _refuse_shape(loop, None if labels is None else labels[k], names[owner[k]])
@@ -229,6 +234,29 @@ class Blocks:
     def with_vertices(self, vertices: np.ndarray) -> Blocks:
         """The same blocks with other reference coordinates."""
         return replace(self, vertices=np.asarray(vertices, dtype=float))
+
+
+def _refuse_lengths(n_blocks: int, given: dict[str, Sequence | None]) -> None:
+    for what, entries in given.items():
+        if entries is not None and len(entries) != n_blocks:
+            raise ValueError(f"{what} needs an entry for each of {n_blocks} blocks, got {len(entries)}")
+    held = given["held"]
+    if held is not None and np.shape(held) != (n_blocks, 6) and n_blocks:
+        raise ValueError(
+            f"held needs six entries a block (u0, v0, r0, εx, εy, γxy), got an array of shape {np.shape(held)}"
+        )
+    material = given["material"]
+    if material is not None and n_blocks:
+        wrong = np.flatnonzero((np.asarray(material) < 0) | (np.asarray(material) != np.asarray(material, dtype=int)))
+        if len(wrong):
+            raise ValueError(f"material of block {wrong[0]} must be an index from 0 on, got {material[wrong[0]]!r}")
+
+
+def _refuse_loops(edge_names: Sequence[Sequence[Sequence[str]]], block_loop: list[int], names: Sequence[str]) -> None:
+    for b, name in enumerate(names):
+        loops = block_loop[b + 1] - block_loop[b]
+        if len(edge_names[b]) != loops:
+            raise ValueError(f"{name}: edge_names needs a list for each of {loops} loops, got {len(edge_names[b])}")
 
 
 def _refuse_shape(loop: np.ndarray, label: list[str] | None, name: str) -> None:

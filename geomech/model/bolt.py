@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .blocks import Blocks
+from .numbers import POSITIVE, Number, refuse_numbers, refuse_point, told
 from .polygon import winding_number
 
 #: The far end of an anchor that is held by the ground itself.
@@ -59,19 +60,10 @@ class Bolt:
     name: str = "bolt"
 
     def __post_init__(self) -> None:
-        for what, unit in (
-            ("stiffness", "N/m"),
-            ("yield_force", "N/m"),
-            ("breaking_strain", ""),
-            ("shear_strength", "N/m"),
-        ):
-            value = getattr(self, what)
-            if not value > 0 or (what == "stiffness" and not math.isfinite(value)):
-                raise ValueError(f"bolt {self.name!r}: {what} must be positive, got {value!r} {unit}".rstrip())
-        for what, unit in (("pretension", "N/m"), ("shear_stiffness", "N/m"), ("installation", "s")):
-            value = getattr(self, what)
-            if not (value >= 0 and math.isfinite(value)):
-                raise ValueError(f"bolt {self.name!r}: {what} must not be negative, got {value!r} {unit}")
+        who = f"bolt {self.name!r}"
+        refuse_numbers(self, _NUMBERS, who)
+        refuse_point(f"{who}: its start", self.start)
+        refuse_point(f"{who}: its end", self.end)
         if self.pretension > self.yield_force:
             raise ValueError(
                 f"bolt {self.name!r}: its pretension, {self.pretension:g} N/m, is beyond its yield force, "
@@ -81,6 +73,18 @@ class Bolt:
             raise ValueError(f"bolt {self.name!r}: its ends are one point, ({self.start[0]:g}, {self.start[1]:g})")
         if self.block == self.other:
             raise ValueError(f"bolt {self.name!r}: both ends are in one block, which it cannot hold")
+
+
+#: What the numbers of `Bolt` may be.
+_NUMBERS = {
+    "stiffness": Number(closed=False, unit="N/m"),
+    "yield_force": Number(closed=False, unit="N/m", infinite=True),
+    "breaking_strain": Number(closed=False, infinite=True),
+    "shear_strength": Number(closed=False, unit="N/m", infinite=True),
+    "pretension": Number(unit="N/m"),
+    "shear_stiffness": Number(unit="N/m"),
+    "installation": Number(unit="s"),
+}
 
 
 class CrossesNoJoint(ValueError):
@@ -103,8 +107,14 @@ def grouted_bolt(
     joint (m, of the order of a few diameters to half a metre; local reinforcement, Lorig 1985): each crossing becomes a
     `Bolt` of stiffness ``axial_stiffness`` (EA, N per metre of thickness) over ``active_length``, its ends half that
     length into the two blocks (less where a block is thinner). ``properties`` as for `Bolt`; it takes compression too
-    unless told otherwise. Raises CrossesNoJoint when the bar does not.
+    unless told otherwise. Raises CrossesNoJoint when the bar does not, and
+    ValueError naming it for a stiffness or length that is not positive.
     """
+    for what, value, unit in (("axial_stiffness", axial_stiffness, "N"), ("active_length", active_length, "m")):
+        if not POSITIVE.holds(value):
+            raise ValueError(f"bolt {name!r}: {what} must be positive and finite, got {told(value)} {unit}")
+    refuse_point(f"bolt {name!r}: its start", start)
+    refuse_point(f"bolt {name!r}: its end", end)
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.hypot(*(b - a)))
     pieces = _pieces(blocks, a, b)

@@ -61,6 +61,8 @@ class Wave:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.frequency) and self.frequency > 0):
             raise ValueError(f"a sinusoid needs a positive frequency, got {self.frequency!r} Hz")
+        if not (math.isfinite(self.phase) and math.isfinite(self.start) and np.isfinite(self.amplitude).all()):
+            raise ValueError("a sinusoid has an amplitude, a phase or a start that is not finite")
         if not self.end > self.start:
             raise ValueError(f"a sinusoid must end after it starts, got {self.start!r} to {self.end!r} s")
 
@@ -99,6 +101,9 @@ class History:
             raise ValueError(f"a history needs times (n,) and values (n, k), got {times.shape} and {values.shape}")
         if not (np.isfinite(times).all() and np.isfinite(values).all()):
             raise ValueError("a history has times or values that are not finite")
+        for what, more in (("rate", self.rate), ("wave", None if self.wave is None else self.wave.amplitude)):
+            if more is not None and not (np.shape(more) == values.shape[1:] and np.isfinite(more).all()):
+                raise ValueError(f"the {what} of a history needs {values.shape[1]} finite numbers, got {more!r}")
         if (np.diff(times) <= 0).any():
             at = int(np.argmax(np.diff(times) <= 0))
             raise ValueError(f"the times of a history must ascend: {times[at + 1]:g} s follows {times[at]:g} s")

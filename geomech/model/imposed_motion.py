@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from .history import History
+from .numbers import refuse_point
 
 #: The six unknowns of a block, in order.
 UNKNOWNS = ("u0", "v0", "r0", "ex", "ey", "gxy")
@@ -78,11 +79,12 @@ class PointMotion:
 
     def __post_init__(self) -> None:
         _known_kind(self.kind, "the motion of a point")
+        refuse_point(f"the motion of a point of block {self.block}", self.at)
         columns = np.shape(self.history.values)[1]
         if columns != (2 if self.direction is None else 1):
             wanted = "two columns, x and y" if self.direction is None else "one column, along its direction"
             raise ValueError(f"the motion of a point of block {self.block} needs {wanted}, its history has {columns}")
-        if self.direction is not None and not math.hypot(*self.direction) > 0:
+        if self.direction is not None and not 0 < math.hypot(*self.direction) < math.inf:
             raise ValueError(f"the motion of a point of block {self.block} has no direction: {self.direction}")
         if self.stiffness is not None and not (math.isfinite(self.stiffness) and self.stiffness > 0):
             raise ValueError(f"the stiffness that moves a point must be positive, got {self.stiffness!r} N/m")

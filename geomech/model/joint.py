@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from .numbers import Number, refuse_numbers
+
 #: Barton & Choubey (1977) do not let the angle of their strength grow beyond this where the normal stress vanishes.
 STEEPEST = math.radians(70.0)
 
@@ -37,7 +39,7 @@ class Roughness:
             raise ValueError(f"joint roughness coefficient must lie in (0, 20], got {self.jrc!r}")
         if not (self.jcs > 0 and math.isfinite(self.jcs)):
             raise ValueError(f"compressive strength of a joint's wall must be positive, got {self.jcs!r} Pa")
-        if not self.reduction > 0:
+        if not 0 < self.reduction < math.inf:
             raise ValueError(f"the strength of a rough joint is divided by a positive number, got {self.reduction!r}")
         for what, value in (("length", self.length), ("sample_length", self.sample_length)):
             if value is not None and not (value > 0 and math.isfinite(value)):
@@ -111,18 +113,9 @@ class JointLaw:
             value = getattr(self, what)
             if value is not None and not 0 <= value < math.pi / 2:
                 self._refuse(f"{what.replace('_', ' ')} must lie in [0°, 90°), got {math.degrees(value):g}°")
-        for what in ("cohesion", "tensile_strength", "residual_cohesion"):
-            value = getattr(self, what)
-            if not value >= 0:
-                self._refuse(f"{what} must not be negative, got {value!r} Pa")
-        for what in ("normal_stiffness", "shear_stiffness"):
-            value = getattr(self, what)
-            if value is not None and not value > 0:
-                self._refuse(f"{what} must be positive, got {value!r} Pa/m")
-        if not 0 <= self.softening_slip < math.inf:
-            self._refuse(f"softening_slip must not be negative, got {self.softening_slip!r} m")
-        if not self.dilation_slip > 0:
-            self._refuse(f"dilation_slip must be positive, got {self.dilation_slip!r} m")
+        refuse_numbers(self, _NUMBERS, f"joint {self.name!r}")
+        if math.isinf(self.cohesion) and self.softening_slip:
+            self._refuse("an infinite cohesion does not fall over a softening_slip")
         if self.residual_friction_angle is not None and self.residual_friction_angle > self.friction_angle:
             self._refuse(
                 f"the residual friction angle ({math.degrees(self.residual_friction_angle):g}°) is above the peak "
@@ -137,11 +130,8 @@ class JointLaw:
                 f"the dilation angle ({math.degrees(self.dilation_angle):g}°) is above the friction angle "
                 f"({math.degrees(self.friction_angle):g}°): sliding would yield work"
             )
-        if self.max_closure is not None:
-            if not self.max_closure > 0:
-                self._refuse(f"max_closure must be positive, got {self.max_closure!r} m")
-            if self.normal_stiffness is None:
-                self._refuse("max_closure needs a normal_stiffness, the initial one")
+        if self.max_closure is not None and self.normal_stiffness is None:
+            self._refuse("max_closure needs a normal_stiffness, the initial one")
         if self.roughness is not None:
             plain = JointLaw.__dataclass_fields__
             for what in (
@@ -180,3 +170,16 @@ class JointLaw:
             and self.roughness is None
             and self.max_closure is None
         )
+
+
+#: What the numbers of `JointLaw` may be, but for its angles.
+_NUMBERS = {
+    "cohesion": Number(unit="Pa", infinite=True),
+    "tensile_strength": Number(unit="Pa", infinite=True),
+    "residual_cohesion": Number(unit="Pa", infinite=True),
+    "normal_stiffness": Number(closed=False, unit="Pa/m", optional=True),
+    "shear_stiffness": Number(closed=False, unit="Pa/m", optional=True),
+    "softening_slip": Number(unit="m"),
+    "dilation_slip": Number(closed=False, unit="m", infinite=True),
+    "max_closure": Number(closed=False, unit="m", optional=True),
+}

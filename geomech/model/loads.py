@@ -9,6 +9,14 @@ import numpy as np
 from .bolt import Bolt
 from .history import History
 from .imposed_motion import BaseMotion, BlockMotion, PointMotion
+from .numbers import refuse_point
+
+
+def _refuse_columns(what: str, history: History, wanted: int = 2) -> None:
+    columns = np.shape(history.values)[1]
+    if columns != wanted:
+        columns_wanted = "two columns, x and y" if wanted == 2 else "one column"
+        raise ValueError(f"{what} needs a history of {columns_wanted}, got {columns}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +56,9 @@ class EdgeTraction:
     follower: bool = False
     profile: LinearProfile | None = None
 
+    def __post_init__(self) -> None:
+        _refuse_columns(f"the traction on edges named {self.edge_name!r}", self.history)
+
 
 @dataclass(frozen=True, eq=False)
 class PointLoad:
@@ -58,6 +69,10 @@ class PointLoad:
     at: tuple[float, float]
     history: History
     follower: bool = False
+
+    def __post_init__(self) -> None:
+        refuse_point(f"the point load on block {self.block}", self.at)
+        _refuse_columns(f"the point load on block {self.block}", self.history)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +104,8 @@ class WaterTable:
             )
         if not (np.isfinite(self.unit_weight) and self.unit_weight > 0):
             raise ValueError(f"the unit weight of water must be positive, got {self.unit_weight!r} N/m³")
+        if self.level is not None:
+            _refuse_columns("the level of a water table", self.level, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +118,10 @@ class ViscousBoundary:
 
     edge_name: str
     incoming: History | None = None
+
+    def __post_init__(self) -> None:
+        if self.incoming is not None:
+            _refuse_columns(f"the wave that enters through edges named {self.edge_name!r}", self.incoming)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +142,8 @@ class Excavation:
             raise ValueError(f"an excavation needs a time, got {self.time!r} s")
         if self.polygon is not None and (np.ndim(self.polygon) != 2 or len(self.polygon) < 3):
             raise ValueError("the polygon of an excavation needs at least three points (x, y)")
+        if self.polygon is not None and not np.isfinite(np.asarray(self.polygon, dtype=float)).all():
+            raise ValueError("the polygon of an excavation has a point that is not finite")
         if self.polygon is None and not self.blocks:
             raise ValueError(f"the excavation at {self.time:g} s names no blocks and has no polygon")
 
@@ -139,3 +162,6 @@ class Loads:
     point_motions: tuple[PointMotion, ...] = ()
     bolts: tuple[Bolt, ...] = ()
     excavations: tuple[Excavation, ...] = ()
+
+    def __post_init__(self) -> None:
+        _refuse_columns("gravity", self.gravity)

@@ -14,6 +14,7 @@ from .in_situ import InSituStress
 from .joint import JointLaw
 from .loads import Loads
 from .material import Material
+from .numbers import Number, refuse_numbers
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class DdaSettings:
     s damp blocks by α M + β K besides (`rayleigh_coefficients` finds them). ``max_displacement_ratio`` bounds the
     largest displacement in a step, in units of half the height of the domain. ``equilibrium`` says when a run seeks
     static equilibrium (`dda.equilibrium`): "" never, "start" before it begins, "loads" at every load of a static run
-    too; ``unbalanced_tolerance`` is its unbalanced force over the mean force.
+    too; ``unbalanced_tolerance`` is its unbalanced force over the mean force. Raises ValueError naming the setting
+    that is none of its numbers (`_DDA_NUMBERS`) or words.
     """
 
     time_step: float = 1.0
@@ -55,6 +57,38 @@ class DdaSettings:
     penetration_tolerance: float = 1e-8
     max_open_close_iterations: int = 60
     max_step_cuts: int = 12
+
+    def __post_init__(self) -> None:
+        refuse_numbers(self, _DDA_NUMBERS)
+        for name, known in (("contact", ("penalty", "augmented")), ("equilibrium", ("", "start", "loads"))):
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} is {' or '.join(map(repr, known))}, not {getattr(self, name)!r}")
+        if len(self.newmark) != 2 or not all(Number().holds(value) for value in self.newmark):
+            raise ValueError(f"newmark must be two finite numbers, β and γ, got {self.newmark!r}")
+        beta, gamma = self.newmark
+        if not (2 * beta >= gamma >= 0.5):
+            raise ValueError(
+                f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: it takes 2β ≥ γ ≥ ½ "
+                "(trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
+            )
+
+
+#: What the numbers of `DdaSettings` may be.
+_DDA_NUMBERS = {
+    "time_step": Number(closed=False, unit="s"),
+    "dynamic_factor": Number(most=1.0),
+    "spectral_radius": Number(most=1.0, optional=True),
+    "unbalanced_tolerance": Number(closed=False),
+    "damping": Number(),
+    "rayleigh_mass": Number(unit="1/s"),
+    "rayleigh_stiffness": Number(unit="s"),
+    "max_displacement_ratio": Number(closed=False),
+    "normal_penalty": Number(closed=False, unit="Pa", optional=True),
+    "shear_penalty": Number(closed=False, unit="Pa", optional=True),
+    "penetration_tolerance": Number(most=1.0, closed=False),
+    "max_open_close_iterations": Number(least=1, whole=True),
+    "max_step_cuts": Number(whole=True),
+}
 
 
 #: Highest polynomial order of an element. K of a straight crack of four elements is right to 1e-12 there; from then on

@@ -1,0 +1,82 @@
+"""Loads on blocks that are not there, or at points that their block does not hold: refused before a step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..model import GROUND, Blocks, Loads
+from ..model.polygon import winding_number
+from .bolts import labels
+
+#: A point belongs to a block when it is no further outside than this part of the block's size …
+_OF_BLOCK = 1e-3
+#: … or this part of the whole drawing's: scenes take points for a block's that lie 1e-6 of it outside.
+_OF_DRAWING = 2e-6
+
+
+class StrayLoads:
+    """Looks at every load of given blocks once."""
+
+    def __init__(self, blocks: Blocks) -> None:
+        self._blocks = blocks
+        self._seen: tuple = ()
+        self._held: set[tuple[int, tuple[float, float]]] = set()
+        self._reach = _OF_DRAWING * float(np.ptp(blocks.vertices, axis=0).max()) if blocks.n_vertices else 0.0
+
+    def refuse(self, loads: Loads) -> None:
+        """Raises ValueError naming the load whose block is not there, or does not hold its point."""
+        seen = loads.point_loads, loads.point_motions, loads.block_motions, loads.bolts, loads.base
+        if len(seen) == len(self._seen) and all(a is b for a, b in zip(seen, self._seen)):
+            return
+        for what, block in self._on_blocks(loads):
+            self._name(what, block)
+        for what, block, at in self._at_points(loads):
+            key = block, tuple(at)
+            if key not in self._held:
+                self._refuse_outside(what, block, np.asarray(at, dtype=float))
+                self._held.add(key)
+        self._seen = seen
+
+    @staticmethod
+    def _on_blocks(loads: Loads) -> Iterator[tuple[str, int]]:
+        for motion in loads.block_motions:
+            yield "the motion of a block", motion.block
+        for block in () if loads.base is None or loads.base.blocks is None else loads.base.blocks:
+            yield "the motion of the base", block
+
+    @staticmethod
+    def _at_points(loads: Loads) -> Iterator[tuple[str, int, tuple[float, float]]]:
+        for k, load in enumerate(loads.point_loads):
+            yield f"point load {k + 1}", load.block, load.at
+        for k, motion in enumerate(loads.point_motions):
+            yield f"the motion of point {k + 1}", motion.block, motion.at
+        for label, bolt in zip(labels(loads.bolts), loads.bolts):
+            yield f"bolt {label!r}", bolt.block, bolt.start
+            if bolt.other != GROUND:
+                yield f"bolt {label!r}", bolt.other, bolt.end
+
+    def _name(self, what: str, block: int) -> str:
+        n = self._blocks.n_blocks
+        if not (isinstance(block, (int, np.integer)) and 0 <= block < n):
+            raise ValueError(f"{what} names block {block!r}, but there are {n}, numbered from 0")
+        return self._blocks.names[block] if self._blocks.names else f"block {block}"
+
+    def _refuse_outside(self, what: str, block: int, at: np.ndarray) -> None:
+        name, loops = self._name(what, block), self._blocks.loops(block)
+        if abs(winding_number(loops, at)) > 0.5:
+            return
+        away = min(_distance(loop, at) for loop in loops)
+        if away > max(_OF_BLOCK * float(np.ptp(loops[0], axis=0).max()), self._reach):
+            raise ValueError(
+                f"{what} acts on {name!r} at ({at[0]:g}, {at[1]:g}), which lies {away:.3g} m outside of it: points are "
+                "given in the coordinates in which the blocks were drawn"
+            )
+
+
+def _distance(loop: np.ndarray, point: np.ndarray) -> float:
+    """m from ``point`` (2,) to the outline ``loop`` (n, 2)."""
+    along = np.roll(loop, -1, axis=0) - loop
+    share = np.clip(np.sum((point - loop) * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)
+    return float(np.hypot(*(point - loop - share[:, None] * along).T).min())

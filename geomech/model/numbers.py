@@ -1,0 +1,78 @@
+"""Which numbers a setting or a constant may be: a table beside each class says it, and is held against it once, when
+an object is made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Number:
+    """The numbers from ``least`` to ``most``; without ``closed`` the least itself is none of them. ``unit`` is told.
+
+    ``infinite``: +∞ is one too, and means that there is no limit. ``whole``: whole ones only. ``optional``: None says
+    that nothing is given. nan is never one.
+    """
+
+    least: float = 0.0
+    most: float = math.inf
+    closed: bool = True
+    unit: str = ""
+    infinite: bool = False
+    whole: bool = False
+    optional: bool = False
+
+    def holds(self, value: object) -> bool:
+        if value is None:
+            return self.optional
+        if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+            return False
+        if self.whole and not isinstance(value, (int, np.integer)):
+            return False
+        if math.isinf(value):
+            return self.infinite and value > 0
+        return self.least <= value <= self.most and (self.closed or value > self.least)
+
+    @property
+    def wish(self) -> str:
+        """What to say of one that does not hold: "must be positive"."""
+        if self.whole:
+            return f"must be a whole number of at least {self.least:g}"
+        if self.most < math.inf:
+            if self.closed:
+                return f"must be from {self.least:g} to {self.most:g}"
+            return f"must be more than {self.least:g} and at most {self.most:g}"
+        if self.least == 0.0:
+            return "must not be negative" if self.closed else "must be positive"
+        return f"must be {'at least' if self.closed else 'more than'} {self.least:g}"
+
+
+#: Kinds that come again and again.
+POSITIVE, NOT_NEGATIVE = Number(closed=False), Number()
+
+
+def refuse_numbers(of: object, table: Mapping[str, Number], who: str = "") -> None:
+    """Raises ValueError, naming ``who`` and the number, for the first of ``table`` that the attribute of ``of`` so
+    called is not."""
+    for name, number in table.items():
+        value = getattr(of, name)
+        if number.holds(value):
+            continue
+        finite = isinstance(value, (float, np.floating)) and math.isinf(value) and value > 0 and number.most == math.inf
+        wish = f"{number.wish} and finite" if finite else number.wish
+        raise ValueError(f"{f'{who}: ' if who else ''}{name} {wish}, got {told(value)} {number.unit}".rstrip())
+
+
+def told(value: object) -> str:
+    """``value`` as a person writes it: numpy's numbers without their type."""
+    return repr(value.item() if isinstance(value, np.generic) else value)
+
+
+def refuse_point(what: str, point: object) -> None:
+    """Raises ValueError, saying ``what`` it is, for a ``point`` that is not two finite coordinates."""
+    if np.shape(point) != (2,) or not np.isfinite(np.asarray(point, dtype=float)).all():
+        raise ValueError(f"{what} needs two finite coordinates (x, y) in m, got {point!r}")
