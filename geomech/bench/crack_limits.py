@@ -218,6 +218,6 @@ def falling(crack: float, dt: float) -> Outcome:
     weight = ROCK.density * GRAVITY * side * math.sqrt(math.pi * 0.5 * crack)
     return Outcome(
         max(k / weight, abs(speed)),
-        gain=abs(last.statistics["energy_residual"] / last.statistics["gravity_work"]),
+        drift=abs(last.statistics["energy_residual"] / last.statistics["gravity_work"]),
         residual=last.statistics["traction_imbalance"],
     )

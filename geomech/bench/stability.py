@@ -17,16 +17,17 @@ from ..output.summary import write_json
 from . import crack_limits
 from . import stability_scenes as scenes
 from .figures import Measured
-from .stability_grid import QUANTITIES, REFUSED, REPORTED, RIGHT, WRONG, Map, table
+from .stability_grid import OF_BLOCKS, OF_CRACKS, REFUSED, REPORTED, RIGHT, WRONG, Map, table
 
 
 def measure(quick: bool = False) -> Measured:
-    """The maps as text; JSON and pictures of the verdicts, and of condition numbers, residuals, energy gained and
-    penetration go to outputs/stability. ``quick`` takes every other value and fewer steps, and draws the
-    verdicts only."""
-    from ..render.stability_map import draw, draw_quantity
+    """The maps as text; the cells as JSON, and pictures of them, of blocks and of cracks, go to outputs/stability: in a
+    row for each map its errors and verdicts, then penetration, energy drift and steps cut, or condition number and
+    residual. ``quick`` takes every other value and fewer steps, and draws errors and verdicts only."""
+    from ..render.stability_map import draw
 
     of_blocks, of_cracks = list(_maps(quick)), list(crack_limits.maps(quick))
+    of_block_cells = sum(len(grid.rows) * len(grid.columns) for grid in of_blocks)
     maps = of_blocks + of_cracks
     lines, every = [], []
     for grid in maps:
@@ -38,14 +39,10 @@ def measure(quick: bool = False) -> Measured:
     folder = Path("outputs/stability")
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "stability.json", [asdict(cell) for cell in every])
-    draw(of_blocks, every, folder / "stability.png")
-    draw(of_cracks, every, folder / "cracks.png")
     # Of a quick run the verdicts only: a picture takes as long as a map.
-    quantities = {} if quick else QUANTITIES
-    for quantity, name in quantities.items():
-        draw_quantity(maps, every, quantity, name, folder / f"{quantity}.png")
-    pictures = ["stability", "cracks", *quantities]
-    lines.append(", ".join([f"{folder}/stability.json", *(f"{name}.png" for name in pictures)]))
+    draw(of_blocks, every[:of_block_cells], folder / "stability.png", {} if quick else OF_BLOCKS)
+    draw(of_cracks, every[of_block_cells:], folder / "stability_cracks.png", {} if quick else OF_CRACKS)
+    lines.append(f"{folder}/stability.json, stability.png, stability_cracks.png")
     # Not each cell's own: many are round-off. A cell that was right and is not, shows in the share.
     wrong = {f"{grid.title}: share of cells not right": 0.0 for grid in maps}
     for grid in maps:

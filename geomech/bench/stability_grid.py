@@ -16,13 +16,14 @@ from .stability_scenes import Outcome
 
 RIGHT, REPORTED, REFUSED, WRONG = "right", "reported", "refused", "wrong"
 
-#: What cells tell besides their error.
-QUANTITIES = {
-    "condition": "condition number",
-    "residual": "residual",
-    "gain": "energy gain",
-    "penetration": "penetration, of a block",
+#: What cells of blocks, and of cracks, tell besides their error.
+OF_BLOCKS = {
+    "penetration": "worst penetration, over the block's size",
+    "drift": "energy drift, over all that was turned over",
+    "cuts": "steps cut",
 }
+OF_CRACKS = {"condition": "condition number", "residual": "residual of the equations"}
+QUANTITIES = {**OF_CRACKS, **OF_BLOCKS}
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ class Cell:
     error: float
     penetration: float
     gain: float
-    cuts: int
+    drift: float
+    cuts: float
     condition: float
     residual: float
     reason: str = ""
@@ -101,6 +103,8 @@ def table(grid: Map, cells: Sequence[Cell]) -> Iterator[str]:
     told = []
     for quantity, name in QUANTITIES.items():
         known = [value for value in (getattr(c, quantity) for c in ran) if not math.isnan(value)]
-        told += [f"{name} {max(known):.1e}"] if known else []
-    cuts = sum(c.cuts for c in ran)
-    yield "    largest " + ", ".join([*told, *([f"{cuts} steps cut"] if cuts else [])])
+        if known and quantity == "cuts":
+            told.append(f"{sum(known):g} steps cut")
+        elif known:
+            told.append(f"{name.split(',')[0]} {max(known):.1e}")
+    yield "    largest " + ", ".join(told)

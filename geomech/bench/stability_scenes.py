@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,13 +23,15 @@ WEIGHT = Loads(gravity=History.constant([0.0, -GRAVITY]))
 @dataclass(frozen=True)
 class Outcome:
     """What a scene did: ``error`` in the measure that its map states; ``penetration`` in block sizes; ``gain`` of
-    mechanical energy over all there was; ``cuts`` of steps; ``condition`` number and ``residual`` of the equations.
-    nan: there are none."""
+    mechanical energy over all there was; ``drift`` of energy, the larger of that gain and of what the balance of the
+    run leaves unexplained, over all energy turned over; ``cuts`` of steps; ``condition`` number and ``residual`` of the
+    equations. nan: there are none."""
 
     error: float
     penetration: float = math.nan
     gain: float = math.nan
-    cuts: int = 0
+    drift: float = math.nan
+    cuts: float = math.nan
     condition: float = math.nan
     residual: float = math.nan
 
@@ -52,12 +54,14 @@ def _system(polygons, fixed, friction_deg: float, materials=None, material=None,
 
 @dataclass
 class _Watch:
-    """Worst penetration, energy gained, steps cut while a system moves."""
+    """Worst penetration, energy gained, the run's balance, steps cut while a system moves."""
 
     system: dda.BlockSystem
     gain: float = 0.0
     penetration: float = 0.0
     cuts: int = 0
+    # What it would warn of is not for a run of blocks alone to hear.
+    budget: dda.EnergyBudget = field(default_factory=lambda: dda.EnergyBudget(warned=math.inf))
     _began: np.ndarray | None = None
     _scale: float = 1.0
 
@@ -65,6 +69,7 @@ class _Watch:
         statistics = result.statistics
         self.penetration = max(self.penetration, statistics["worst_penetration"])
         self.cuts += int(statistics["step_cuts"])
+        self.budget = self.budget.after(result.energy, result.state.time)
 
     def run(self, state: State, loads: Loads, end: float, dt: float, max_steps: int = 10**6) -> State:
         """Until ``end`` or for ``max_steps`` steps, mechanical energy watched."""
@@ -100,7 +105,8 @@ class _Watch:
         return potential + sum(statistics[name] for name in parts)
 
     def outcome(self, error: float, size: float = 1.0) -> Outcome:
-        return Outcome(float(error), self.penetration / size, self.gain, self.cuts)
+        drift = max(self.gain, abs(self.budget.left_over()))
+        return Outcome(float(error), self.penetration / size, self.gain, drift, self.cuts)
 
 
 def _inclined(friction: float, side: float, offset=0.0, **settings):

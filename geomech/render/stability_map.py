@@ -1,15 +1,16 @@
-"""The picture of `geomech bench stability`: a panel a map, a square a scene, coloured by what became of it."""
+"""The pictures of `geomech bench stability`: a row of panels a map, a square a scene; the first panel is coloured by what
+became of it, each of the others by a quantity."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
 COLOURS = {"right": "#9cc5a1", "reported": "#f2d388", "refused": "#c9ccd1", "wrong": "#d1495b"}
+#: The colour of a square whose quantity is zero.
+_ZERO = "#f4f4f4"
 
 
 class Judged(Protocol):
@@ -20,6 +21,7 @@ class Judged(Protocol):
 
 class Grid(Protocol):
     title: str
+    measure: str
     row_name: str
     rows: Sequence[float]
     column_name: str
@@ -27,80 +29,97 @@ class Grid(Protocol):
     bound: float
 
 
-def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path) -> Path:
-    """``cells`` in the order of their grids, row by row; each square carries its error."""
+def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path, quantities: Mapping[str, str]) -> Path:
+    """``cells`` in the order of their grids, row by row, each with its error, and in a panel each those of its
+    ``quantities`` (attribute → what it is called) that a grid has: the logarithm is the colour, from the least to the
+    largest in the picture."""
     from matplotlib.patches import Patch
 
-    figure, panels, last = _panels(len(grids))
-    for panel, grid in zip(panels, grids):
+    figure, panels, foot = _panels([len(grid.rows) for grid in grids], 1 + len(quantities))
+    shades = {quantity: _Shades([getattr(c, quantity) for c in cells]) for quantity in quantities}
+    for row, grid in zip(panels, grids):
         mine = [c for c in cells if c.map == grid.title]
         texts = ["–" if c.verdict == "refused" else _short(c.error) for c in mine]
-        _squares(panel, grid, [COLOURS[c.verdict] for c in mine], texts)
-        panel.set_title(f"{grid.title}  (right below {grid.bound:g})", fontsize=10, loc="left")
-    last.legend(
+        _squares(row[0], grid, [COLOURS[c.verdict] for c in mine], texts)
+        row[0].set_title(f"{grid.title}: error, right below {grid.bound:g}", fontsize=10, loc="left")
+        for panel, (quantity, name) in zip(row[1:], quantities.items()):
+            values = [math.nan if c.verdict == "refused" else float(getattr(c, quantity)) for c in mine]
+            if all(math.isnan(value) for value in values):
+                panel.set_axis_off()
+                continue
+            faces = [COLOURS["refused"] if math.isnan(v) else shades[quantity](v) for v in values]
+            texts = ["–" if math.isnan(v) else _short(v) for v in values]
+            _squares(panel, grid, faces, texts)
+            panel.set_title(name, fontsize=10, loc="left")
+    figure.legend(
         [Patch(facecolor=colour) for colour in COLOURS.values()],
-        ["right: error below the bound", "reported: beyond it, a warning says so", "refused with a reason",
+        ["right: error below the bound", "reported: beyond it, a warning says so", "refused with a reason (–)",
          "wrong in silence"],
-        loc="center", frameon=False, fontsize=11,
+        loc="lower center", ncols=4 if quantities else 2, frameon=False, fontsize=10, bbox_to_anchor=(0.5, foot),
     )  # fmt: skip
-    return _saved(figure, path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+    return path
 
 
-def draw_quantity(grids: Sequence[Grid], cells: Sequence[Judged], quantity: str, name: str, path: Path) -> Path | None:
-    """The ``quantity`` that cells have (nan: have not), its logarithm as the colour; None where no grid has any."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap, LogNorm
-    from matplotlib.ticker import LogLocator
+class _Shades:
+    """Colours of positive numbers by their logarithm; those of zero and less are pale."""
 
-    told = {g.title: [getattr(c, quantity) for c in cells if c.map == g.title] for g in grids}
-    grids = [g for g in grids if any(v > 0 for v in told[g.title])]
-    if not grids:
-        return None
-    positive = [v for g in grids for v in told[g.title] if v > 0]
-    # The darker half would hide the figures.
-    shades = ListedColormap(colormaps["YlGnBu"](np.linspace(0.05, 0.7, 256)))
-    norm = LogNorm(min(positive), 1.001 * max(positive))
-    figure, panels, last = _panels(len(grids))
-    for panel, grid in zip(panels, grids):
-        values = told[grid.title]
-        faces = [shades(norm(v)) if v > 0 else "#f4f4f4" for v in values]
-        _squares(panel, grid, faces, ["–" if math.isnan(v) else _short(v) for v in values])
-        panel.set_title(grid.title, fontsize=10, loc="left")
-    bar = figure.colorbar(
-        ScalarMappable(norm, shades), ax=last, orientation="horizontal", fraction=0.15, ticks=LogLocator(numticks=6),
-        label=f"{name} (–: refused, or none)",
-    )  # fmt: skip
-    bar.minorticks_off()
-    return _saved(figure, path)
+    def __init__(self, values: Sequence[float]) -> None:
+        from matplotlib import colormaps
+
+        positive = [math.log(v) for v in values if v > 0]
+        self._least = min(positive, default=0.0)
+        self._range = max(max(positive, default=0.0) - self._least, 1e-12)
+        # The darker half would hide the figures.
+        self._map = colormaps["YlGnBu"]
+
+    def __call__(self, value: float):
+        if not value > 0:
+            return _ZERO
+        return self._map(0.05 + 0.65 * (math.log(value) - self._least) / self._range)
 
 
-def _panels(number: int):
-    """A figure, its panels, and one panel more, empty, for what the colours mean."""
+def _panels(rows: Sequence[int], across: int):
+    """A figure; its panels, a row of ``across`` for each grid of so many ``rows``; and the height of its foot, for what
+    the colours mean, as a part of the figure's. Without further panels the grids stand three abreast."""
     from matplotlib.figure import Figure
 
-    across = 3
-    down = math.ceil((number + 1) / across)
-    height = 3.1 * down
-    figure = Figure(figsize=(14, height), dpi=120)
     # Margins in inches, the same for all: a layout that measures every text takes longer than all else.
-    room = {
-        "left": 0.06,
-        "right": 0.99,
-        "bottom": 0.55 / height,
-        "top": 1 - 0.35 / height,
-        "wspace": 0.2,
-        "hspace": 0.36,
-    }
-    axes = figure.subplots(down, across, gridspec_kw=room).ravel()
-    for panel in axes[number:]:
-        panel.set_axis_off()
-    return figure, axes[:number], axes[number]
+    over, under, square, foot = 0.35, 0.55, 0.21, 0.4
+    if across == 1:
+        abreast = 3
+        rows = [max(rows[k : k + abreast]) for k in range(0, len(rows), abreast)]
+        figure, made, height = _stacked(Figure, rows, abreast, over, under, square, foot)
+        return figure, [[panel] for row in made for panel in row], 0.08 / height
+    figure, made, height = _stacked(Figure, rows, across, over, under, square, foot)
+    return figure, made, 0.08 / height
+
+
+def _stacked(make, rows: Sequence[int], across: int, over: float, under: float, square: float, foot: float):
+    high = [square * max(n, 3) for n in rows]
+    height, width = sum(high) + len(rows) * (over + under) + foot, 4.1 * across
+    figure = make(figsize=(width, height), dpi=100)
+    panels, top = [], height
+    for tall in high:
+        top -= over + tall
+        panels.append(
+            [
+                figure.add_axes(((4.1 * k + 0.75) / width, top / height, 3.2 / width, tall / height))
+                for k in range(across)
+            ]
+        )
+        top -= under
+    for row in panels:
+        for panel in row:
+            panel.set_axis_off()
+    return figure, panels, height
 
 
 def _squares(panel, grid: Grid, colours: Sequence, texts: Sequence[str]) -> None:
     from matplotlib.patches import Rectangle
 
+    panel.set_axis_on()
     n, m = len(grid.rows), len(grid.columns)
     for k, (colour, text) in enumerate(zip(colours, texts)):
         i, j = divmod(k, m)
@@ -109,19 +128,15 @@ def _squares(panel, grid: Grid, colours: Sequence, texts: Sequence[str]) -> None
     panel.set(xlim=(0, m), ylim=(n, 0), xlabel=grid.column_name, ylabel=grid.row_name)
     panel.set_xticks([j + 0.5 for j in range(m)], [f"{v:g}" for v in grid.columns], fontsize=8)
     panel.set_yticks([i + 0.5 for i in range(n)], [f"{v:g}" for v in grid.rows], fontsize=8)
+    panel.xaxis.label.set_fontsize(9)
+    panel.yaxis.label.set_fontsize(9)
     panel.tick_params(length=0)
     for side in panel.spines.values():
         side.set_visible(False)
 
 
-def _saved(figure, path: Path) -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
-    return path
-
-
-def _short(error: float) -> str:
-    if error == 0:
-        return "0"
-    figure, power = f"{error:.0e}".split("e")
+def _short(value: float) -> str:
+    if value == int(value) and abs(value) < 1000:
+        return f"{value:g}"
+    figure, power = f"{value:.0e}".split("e")
     return f"{figure}e{int(power)}"

@@ -225,11 +225,11 @@ def test_a_grouted_bar_becomes_a_bolt_at_every_joint():
 
 
 def test_faulty_bolts_are_refused_by_name():
-    good = {"block": 1, "start": (0.0, 0.0), "other": 0, "end": (0.0, 1.0), "stiffness": 1e8, "name": "A"}
+    good = {"block": 1, "start": (2.0, 0.0), "other": 0, "end": (0.0, 1.0), "stiffness": 1e8, "name": "A"}
     for wrong, match in (
         ({"stiffness": 0.0}, "bolt 'A': stiffness must be positive"),
         ({"pretension": 2e5, "yield_force": 1e5}, "bolt 'A': its pretension, 200000 N/m, is beyond its yield force"),
-        ({"end": (0.0, 0.0)}, "bolt 'A': its ends are one point"),
+        ({"end": (2.0, 0.0)}, "bolt 'A': its ends are one point"),
         ({"other": 1}, "bolt 'A': both ends are in one block"),
         ({"installation": -1.0}, "bolt 'A': installation must not be negative"),
     ):

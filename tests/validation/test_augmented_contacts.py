@@ -151,8 +151,8 @@ def test_impact_keeps_momentum_and_gains_no_energy(dt, ratio):
 def test_refusals():
     blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)])
     for settings, message in (
-        (DdaSettings(contact="mortar"), '"penalty" or "augmented"'),
-        (augmented(None, penetration_tolerance=0.0), "penetration_tolerance"),
+        (lambda: DdaSettings(contact="mortar"), "'penalty' or 'augmented'"),
+        (lambda: augmented(None, penetration_tolerance=0.0), "penetration_tolerance"),
     ):
         with pytest.raises(ValueError, match=message):
-            dda.BlockSystem(blocks, [ROCK], settings=settings)
+            dda.BlockSystem(blocks, [ROCK], settings=settings())

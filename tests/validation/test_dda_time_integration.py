@@ -291,8 +291,8 @@ def test_stress_turns_with_the_block_whatever_the_axes():
         ({"newmark": (0.2, 0.5)}, "not stable at every time step"),
         ({"damping": -0.1}, "damping must not be negative"),
         ({"rayleigh_mass": -1.0}, "rayleigh_mass must not be negative"),
-        ({"spectral_radius": 1.5}, "spectral radius"),
-        ({"dynamic_factor": 1.2}, "dynamic factor is from 0"),
+        ({"spectral_radius": 1.5}, "spectral_radius must be from 0 to 1"),
+        ({"dynamic_factor": 1.2}, "dynamic_factor must be from 0 to 1"),
     ],
 )
 def test_schemes_that_drive_the_blocks_are_refused(change, message):
