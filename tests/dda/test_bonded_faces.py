@@ -46,9 +46,16 @@ def pushed(system: dda.BlockSystem, thrust: float, eccentricity: float, shear: f
     lower = int(np.flatnonzero(system.blocks.fixed)[0])
     edge = system.blocks.vertices[system.blocks.vertex_start[lower] :][:2]
     along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
-    at = (0.5 * FACE + eccentricity) * along
+    # Beyond the face by a lever: a block's motion is affine, so that of a point further out is extrapolated from two.
+    lever = max(1.0, abs(eccentricity) / (0.5 * FACE))
+    middle, at = 0.5 * FACE * along, (0.5 * FACE + eccentricity / lever) * along
     force = shear * along - thrust * np.array([-along[1], along[0]])
-    loads = Loads(point_loads=(PointLoad(1 - lower, tuple(at), History.constant(force)),))
+    loads = Loads(
+        point_loads=tuple(
+            PointLoad(1 - lower, tuple(point), History.constant(share * force))
+            for point, share in ((middle, 1.0 - lever), (at, lever))
+        )
+    )
     # A step in which the block flies off is cut to where inertia, 2 m/dt², bears 1e-5 of what stiff rock and its
     # springs do.
     return system.step(State.at_rest(system.blocks) if state is None else state, loads, 3e-2)
