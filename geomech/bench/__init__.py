@@ -16,6 +16,7 @@ TOPICS = {
     "coupling": "geomech.bench.coupling_cost",
     "dda": "geomech.bench.block_cost",
     "ddm": "geomech.bench.work_precision",
+    "debris": "geomech.bench.debris",
     "geometry": "geomech.bench.cutting_cost",
     "kernels": "geomech.bench.kernels",
     "many": "geomech.bench.many_cracks",

@@ -35,6 +35,9 @@ def declare(verbs: Verbs) -> None:
     bench.add_argument(
         "--blocks", type=int, metavar="N", help="of dda: a wall of so many blocks too (100000: some minutes and 3 GB)"
     )
+    bench.add_argument(
+        "--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: some twenty minutes)"
+    )
 
 
 def _bench(options: argparse.Namespace) -> int:
@@ -52,6 +55,8 @@ def _bench(options: argparse.Namespace) -> int:
     check_writable("--out", out)
     if options.blocks is not None and ("dda" not in options.topics or options.blocks < 1):
         raise BadInput("--blocks takes a number of blocks and belongs to dda: geomech bench dda --blocks 100000")
+    if options.seconds is not None and ("debris" not in options.topics or not options.seconds > 0):
+        raise BadInput("--seconds takes a time in s and belongs to debris: geomech bench debris --seconds 60")
     unit, found = figures.yardstick(), {}
     spent: dict[str, dict[str, float]] = {}
     print(figures.said(figures.machine()), end="\n\n")
@@ -63,6 +68,8 @@ def _bench(options: argparse.Namespace) -> int:
             found[name] = measure_many(seeds)
         elif name == "dda":
             found[name] = topic(name)(options.quick, options.blocks)
+        elif name == "debris":
+            found[name] = topic(name)(options.quick, options.seconds)
         else:
             found[name] = topic(name)(options.quick)
         spent[name] = {

@@ -33,6 +33,9 @@ log = logging.getLogger(__name__)
 _WINDOW = 2.2
 #: No step moves a vertex by more than this part of the smallest block's size, √area, whatever the settings allow.
 _BLOCK_SHARE = 0.1
+#: A step that speed limits uses this part of what it may move: round-off, arcs and what blocks hit take the rest, so
+#: that it need not be cut.
+_AIM = 0.99
 #: Gaps below this many times the largest coordinate, its round-off, decide nothing.
 _SLACK = 5e-16
 #: Multipliers are not asked to close gaps below this many times that round-off.
@@ -302,6 +305,7 @@ class BlockSystem:
         speed = float(np.sqrt(np.max(vx * vx + vy * vy)))
         g = float(np.hypot(*loads.gravity.at(time + dt)))
         # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
+        limit *= _AIM
         return min(dt, float(2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit))))
 
     def pattern_of(
