@@ -96,12 +96,17 @@ class CrackEnergy:
     #: block → whether it feels its mean stress only.
     _hangs: dict[int, bool] = field(default_factory=dict)
     _growing: dict[_Key, _Growing] = field(default_factory=dict)
-    #: block with tips that grow → its mean stress, Pa, what its limit leaves of it, and the strain of its cracks then.
-    _limited: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=dict)
+    #: block with tips that grow → its mean stress, Pa, its limit, the strain of its cracks then, and the share as of a
+    #: tip.
+    _limited: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict)
     #: Tips with K as it is felt, as the present step began, in its first pass and in its last one.
     _began: np.ndarray | None = None
     _first: np.ndarray | None = None
     _last: np.ndarray | None = None
+    #: … and the crack strains of blocks that feel their mean stress.
+    _strain_began: dict[int, np.ndarray] = field(default_factory=dict)
+    _strain_first: dict[int, np.ndarray] = field(default_factory=dict)
+    _strain_last: dict[int, np.ndarray] = field(default_factory=dict)
 
     def passed(
         self,
@@ -115,7 +120,9 @@ class CrackEnergy:
         block → the `ddm.Solution` that it is strained by, those ``by_mean_stress`` by no more than their mean
         stress."""
         tips = _felt_tips(tips, felt, by_mean_stress)
-        self._first = tips if self._first is None else self._first
+        self._strain_last = {block: of.crack_strain for block, of in felt.items() if block in by_mean_stress}
+        if self._first is None:
+            self._first, self._strain_first = tips, self._strain_last
         self._last = tips
         if not len(tips):
             self._parted |= bool(self._growing)
@@ -136,14 +143,13 @@ class CrackEnergy:
                 # A tip that has met something: G rises without bound as the last ligament goes, its integral by no
                 # rule.
                 self._parted = True
-        for block, (stress, limit, strain) in self._limited.items():
+        for block, (stress, limit, strain, share) in self._limited.items():
             # What is taken for no softer than so much (`ByMeanStress.limit`) spends less on growth as its limit falls.
             if block in felt:
                 now_stress, now_limit = by_mean_stress.stress[block]
                 less, known = now_limit - limit, felt[block]
-                self._released += (
-                    0.5 * known.body.area * float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
-                )
+                both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
+                self._released += 0.5 * known.body.area * share * both
         turned = np.where(hangs, _kink_release(tips), tips["k_eq"] ** 2) / modulus
         shares = self._shares()
         grows = np.flatnonzero(tips["grown"] > 0)
@@ -152,7 +158,7 @@ class CrackEnergy:
             for row in grows.tolist()
         }
         self._limited = {
-            block: (*by_mean_stress.stress[block], felt[block].crack_strain)
+            block: (*by_mean_stress.stress[block], felt[block].crack_strain, self._share_of(block))
             for block in np.unique(tips["block"][grows]).tolist()
             if block in by_mean_stress
         }
@@ -174,10 +180,17 @@ class CrackEnergy:
                 shares[key] = max(0.0, float((k_i * row["k_i"] + k_ii * row["k_ii"]) / size))
         return shares
 
+    def _share_of(self, block: int) -> float:
+        """The same of what goes with the square of the ``block``'s load, from the strain of its cracks."""
+        before, first = self._strain_began.get(block), self._strain_first.get(block)
+        if before is None or first is None or not first.any():
+            return 1.0
+        return max(0.0, float(before @ first) / float(first @ first))
+
     def parts(self) -> None:
         """Blocks part in the present step, and have other numbers from then on."""
         self._parted = True
-        self._hangs, self._limited = {}, {}
+        self._hangs, self._limited, self._strain_last = {}, {}, {}
 
     @property
     def under_way(self) -> bool:
@@ -216,9 +229,10 @@ class CrackEnergy:
             self.residual += rest
         self.stored, self.friction = stored, friction
         self._released, self._asked, self._parted = 0.0, 0.0, False
-        self._began, self._first = self._last, None
+        self._began, self._first, self._strain_began = self._last, None, self._strain_last
         # What grows now does so as the next step begins.
         self._growing = {key: replace(of, share=1.0) for key, of in self._growing.items()}
+        self._limited = {block: (*of[:3], 1.0) for block, of in self._limited.items()}
 
     def statistics(self) -> dict[str, float]:
         """Columns of a history, J/m."""

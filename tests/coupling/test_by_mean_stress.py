@@ -150,3 +150,15 @@ def test_what_hangs_by_less_than_a_quarter_is_taken_for_no_softer():
 def test_a_block_that_is_stiff_enough_has_no_limit():
     body = ddm.Body([BAR], edge_crack(0.75, np.inf, 0), ROCK)
     np.testing.assert_array_equal(ByMeanStress().limit(0, body, ROCK.compliance()), np.eye(3))
+
+
+def test_growth_never_stiffens_a_limited_block():
+    """An edge crack on its way through: in no direction is the bar stiffer than before, and in those beside the one
+    with the limit it is as soft as it is."""
+    elastic, felt = ROCK.compliance(), [np.zeros((3, 3))]
+    for ratio in (0.7, 0.8, 0.9, 0.97):
+        body = ddm.Body([BAR], edge_crack(ratio, np.inf, 0), ROCK)
+        limit = ByMeanStress().limit(0, body, elastic)
+        felt.append(limit.T @ body.compliance() @ limit)
+        more = np.linalg.eigvals(np.linalg.solve(elastic, felt[-1] - felt[-2])).real
+        assert more.min() > -1e-9 * SOFTEST and more.max() > 0.1
