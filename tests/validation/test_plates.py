@@ -70,11 +70,12 @@ def test_edge_crack(ratio):
         assert in_bending == pytest.approx(plates.EDGE_CRACK_BENDING[ratio], rel=3e-5)
 
 
-@pytest.mark.parametrize("ratio", [0.2, 0.5, 0.7])
+@pytest.mark.parametrize("ratio", [0.3, 0.5, 0.7])
 def test_three_point_bending(ratio):
     """Span four times the depth. Loads spread over b to either side, with elements as long as b next to where they end:
-    converged to 1e-4 in b, order and elements. Srawley (1976) states 0.5 %; we find him 1.1, 0.7 and 0.2 % high, and
-    finite elements with a J-integral tend to the same (within 5e-4 on 33 000 unknowns)."""
+    converged to 1e-4 in b, order and elements; boundary collocation with point loads is as near. Srawley (1976) states
+    0.5 %; we find him 0.5, 0.7 and 0.1 % high, and finite elements with a J-integral tend to the same (within 5e-4 on
+    33 000 unknowns)."""
     depth, half, b = 1.0, 2.2, 0.01
     steps = b * np.array([-13, -6, -3, -1, 0, 1, 3, 6, 13])
     below = np.concatenate([[-half], -2 + steps, 2 + steps, [half]])
@@ -90,9 +91,9 @@ def test_three_point_bending(ratio):
     tractions[..., 1] = push[:, None]
     load = ddm.BodyLoad(edges[loaded], tractions[loaded])
     k = tips([outline], slot([0, 0], [0, ratio], surface=[(True, False)]), load)[0, 0]
-    exact = plates.three_point_bending(ratio, 1.0, depth)
-    print(f"three-point bending a/W {ratio}: {k / exact - 1:+.1e}")
-    assert k == pytest.approx(exact, rel=1.2e-2)
+    exact, fit = plates.THREE_POINT_BENDING[ratio], plates.three_point_bending(ratio, 1.0, depth)
+    print(f"three-point bending a/W {ratio}: {k / exact - 1:+.1e} (to the fit {k / fit - 1:+.1e})")
+    assert k == pytest.approx(exact, rel=3e-4) and k == pytest.approx(fit, rel=8e-3)
 
 
 #: Degrees between crack and load at which a crack of a/R = 0.5 is in pure shear (the root of
