@@ -22,7 +22,7 @@ OF_BLOCKS = {
     "drift": "energy drift, over all that was turned over",
     "cuts": "steps cut",
 }
-OF_CRACKS = {"condition": "condition number", "residual": "residual of the equations"}
+OF_CRACKS = {"condition": "condition number", "residual": "residual"}
 QUANTITIES = {**OF_CRACKS, **OF_BLOCKS}
 
 

@@ -50,6 +50,7 @@ def draw(grids: Sequence[Grid], cells: Sequence[Judged], path: Path, quantities:
             faces = [COLOURS["refused"] if math.isnan(v) else shades[quantity](v) for v in values]
             texts = ["–" if math.isnan(v) else _short(v) for v in values]
             _squares(panel, grid, faces, texts)
+            panel.set_ylabel("")
             panel.set_title(name, fontsize=10, loc="left")
     figure.legend(
         [Patch(facecolor=colour) for colour in COLOURS.values()],
