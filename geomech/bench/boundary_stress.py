@@ -95,6 +95,20 @@ def errors(phi_deg: int, stress: float) -> dict[str, list[float]]:
     return out
 
 
+def quick_errors() -> dict[str, float]:
+    """Those of the routes in a quick `measure`, by name."""
+    phi, stress = PHI_DEG[0], STRESSES[0]
+    return {
+        _named(route, phi, stress, mode): error
+        for route, pair in errors(phi, stress).items()
+        for mode, error in zip(("k_i", "k_ii"), pair)
+    }
+
+
+def _named(route: str, phi_deg: int, stress: float, mode: str) -> str:
+    return f"{route}, φ = {phi_deg}, {stress / 1e6:g} MPa: {mode}"
+
+
 def by_order(phi_deg: int, orders: Sequence[int] = (2, 3, 4, 6)) -> list[Point]:
     """Time and error of the first load by every route, against order 10, in elements of these ``orders``; the block's
     boundary has three times the elements of the study's own, so that it is the order that counts."""
@@ -174,7 +188,7 @@ def measure(quick: bool = False) -> Measured:
     lines += [f"  {p.method:<18}p = {p.size}   {p.error:8.1e}   {1e3 * p.seconds:8.1f} ms" for p in points]
     named = {f"{p.method}, order {p.size}": p.error for p in points}
     named |= {
-        f"{row['route']}, φ = {row['phi_deg']}, {row['stress_pa'] / 1e6:g} MPa: {mode}": row[f"error_{mode}"]
+        _named(row["route"], row["phi_deg"], row["stress_pa"], mode): row[f"error_{mode}"]
         for row in rows
         for mode in ("k_i", "k_ii")
     }

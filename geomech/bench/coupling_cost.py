@@ -144,6 +144,6 @@ def measure(quick: bool = False) -> Measured:
         for w in walls
         for part in ("blocks", "coupling")
     }
-    errors = {f"K by a tolerance of {p.size:g}": p.error for p in points}
+    errors = pass_tolerance.by_name(points)
     times |= {"specimen": specimen["seconds"]} if specimen else {}
     return Measured.of("\n".join(lines), errors=errors, times=times)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -16,17 +17,23 @@ from ..ddm import influence as matrices
 from ..ddm.influence import ElementSet, add_fields, influence
 from .figures import Measured
 
+#: Where the picture goes, below the working folder.
+FOLDER = Path("outputs/bench_kernels")
+
 
 def measure(quick: bool = False) -> Measured:
-    """The table: ns a pair, CPU time of the fastest of some repeats."""
+    """The table: ns a pair, CPU time of the fastest of some repeats; leaves ``kernels.png`` in `FOLDER`."""
+    from ..render.bars import draw_bars
+
     threads, matrices.THREADS = matrices.THREADS, 1
     try:
-        rows = [*_matrices(3 if quick else 9), *_fields(2 if quick else 5)]
+        rows = [*_matrices(2 if quick else 9), *_fields(1 if quick else 5)]
     finally:
         matrices.THREADS = threads
     width = max(len(label) for label, _ in rows)
     lines = ["element–point pairs, nodal matrices and fields, one thread, ns of CPU a pair"]
     text = "\n".join(lines + [f"  {label:<{width}}  {ns:6.1f}" for label, ns in rows])
+    draw_bars({"ns": dict(rows)}, FOLDER / "kernels.png", "ns of CPU an element–point pair", "Kernels, one thread")
     return Measured.of(text, times={label: 1e-9 * ns for label, ns in rows})
 
 

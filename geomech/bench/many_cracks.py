@@ -7,6 +7,7 @@ time of one thread or more, matrices and solution together, a body made anew.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -14,14 +15,17 @@ from .figures import Measured
 
 #: Cracks are the squares of these; networks beyond ``FACTORED`` cracks a side are not factored (minutes, many
 #: gigabytes).
+#: Where the picture goes, below the working folder.
+FOLDER = Path("outputs/bench_many")
 SIDES, FACTORED = (5, 7, 11, 16, 23, 36), 16
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; ``quick`` leaves out what takes more than a second."""
+    """The table; leaves ``many.png`` in `FOLDER`. ``quick`` leaves out what takes more than a second."""
     from ..ddm import Body, BodyLoad
     from ..model import Cracks, DdmSettings, Material
     from ..reference.crack_arrays import cracks_in_cells
+    from ..render.bars import draw_bars
 
     rock = Material("rock", 10e9, 0.25)
     load = BodyLoad(remote_stress=np.array([0.2e6, 1e6, 0.3e6]))
@@ -51,4 +55,10 @@ def measure(quick: bool = False) -> Measured:
             times[f"{cracks.n_cracks} cracks, factored"] = longer
             row += f" {longer:8.2f} s   {error:.1e}"
         lines.append(row)
+    ways = {
+        way: {name.removesuffix(f", {way}"): spent for name, spent in times.items() if name.endswith(f", {way}")}
+        for way in ("iterated", "factored")
+    }
+    title = "Many cracks: matrices and solution"
+    draw_bars(ways, FOLDER / "many.png", "seconds of processor", title)
     return Measured.of("\n".join(lines), errors=errors, times=times)

@@ -64,7 +64,9 @@ def wall(n: int, end: float) -> Problem:
 
 
 def measure(quick: bool = False) -> Measured:
-    """The table; leaves ``output.json`` in `FOLDER`. ``quick``: 500 bricks, 30 cycles."""
+    """The table; leaves ``output.json`` and ``output.png`` in `FOLDER`. ``quick``: 500 bricks, 30 cycles."""
+    from ..render.bars import draw_bars
+
     n, cycles, steps = (500, 30, 8) if quick else (10_000, 500, 4)
     problem = wall(n, (steps - 0.5) * TIME_STEP)
     spent, cycle = steps_of(problem)
@@ -79,6 +81,12 @@ def measure(quick: bool = False) -> Measured:
     }  # fmt: skip
     write_json(FOLDER / "output.json", told)
     ours = writers[OURS]
+    spent_on = {f"one file of the blocks: {name}": 1e3 * spent for name, spent in writers.items()}
+    spent_on |= {"all series, a cycle": 1e3 * found.processor, "a step after sudden weight": 1e3 * moving}
+    draw_bars(
+        {"ms": spent_on}, FOLDER / "output.png", "ms (files by the clock, cycles and steps of processor)",
+        f"Writing {found.blocks} blocks",
+    )  # fmt: skip
     lines = [
         (
             f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles written: "

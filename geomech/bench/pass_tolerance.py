@@ -32,6 +32,15 @@ class Passes(Point):
     passes: int
 
 
+def errors() -> dict[str, float]:
+    """Those of K by the tolerance, by name."""
+    return by_name(points())
+
+
+def by_name(found: list[Passes]) -> dict[str, float]:
+    return {f"K by a tolerance of {p.size:g}": p.error for p in found}
+
+
 def points() -> list[Passes]:
     # The first run may compile, and is what the others are held against.
     exact, _, _ = _run(EXACT)

@@ -8,7 +8,7 @@ a reason, reported (beyond the bound, and a warning says so), or wrong. The boun
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from ..output.summary import write_json
 from . import crack_limits
 from . import stability_scenes as scenes
 from .figures import Measured
-from .stability_grid import OF_BLOCKS, OF_CRACKS, REFUSED, REPORTED, RIGHT, WRONG, Map, table
+from .stability_grid import OF_BLOCKS, OF_CRACKS, REFUSED, REPORTED, RIGHT, WRONG, Cell, Map, table
 
 
 def measure(quick: bool = False) -> Measured:
@@ -44,11 +44,20 @@ def measure(quick: bool = False) -> Measured:
     draw(of_cracks, every[of_block_cells:], folder / "stability_cracks.png", {} if quick else OF_CRACKS)
     lines.append(f"{folder}/stability.json, stability.png, stability_cracks.png")
     # Not each cell's own: many are round-off. A cell that was right and is not, shows in the share.
-    wrong = {f"{grid.title}: share of cells not right": 0.0 for grid in maps}
-    for grid in maps:
-        verdicts = [cell.verdict for cell in every if cell.map == grid.title]
-        wrong[f"{grid.title}: share of cells not right"] = 1 - verdicts.count(RIGHT) / len(verdicts)
-    return Measured.of("\n".join(lines), errors=wrong)
+    return Measured.of("\n".join(lines), errors=not_right(every))
+
+
+def not_right(every: Sequence[Cell]) -> dict[str, float]:
+    """Of each map the share of its cells that are not right."""
+    verdicts: dict[str, list[str]] = {}
+    for cell in every:
+        verdicts.setdefault(cell.map, []).append(cell.verdict)
+    return {f"{title}: share of cells not right": 1 - seen.count(RIGHT) / len(seen) for title, seen in verdicts.items()}
+
+
+def quick_shares(titles: Sequence[str]) -> dict[str, float]:
+    """The shares of those maps of blocks in a quick `measure` that have one of these ``titles``."""
+    return not_right([cell for grid in _maps(True) if grid.title in titles for cell in grid.cells()])
 
 
 def _maps(quick: bool) -> Iterator[Map]:

@@ -11,4 +11,4 @@ from geomech.bench import skips
 def test_results_with_and_without_every_skip_are_the_same(monkeypatch):
     monkeypatch.chdir(Path(__file__).parents[2])
     found = skips.measure(quick=True)
-    assert len(found.figures) == 10
+    assert len(found.figures) == 12
