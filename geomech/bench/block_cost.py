@@ -42,7 +42,7 @@ LONGEST, WALLS = (0.5, 6.0), 10_000
 #: Static steps of so many seconds, so many of them, bring blocks to rest; of so many settled steps the first, which
 #: factors, is not counted. Up to so many blocks, in a quick run and else: the static steps take as long as those from
 #: rest.
-STATIC, REST, SETTLED, SETTLES = 1.0, 3, 6, (150, 15_000)
+STATIC, REST, SETTLED, SETTLES = 1.0, 3, 6, (150, 1100)
 SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
 
 #: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours →

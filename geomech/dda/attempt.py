@@ -278,7 +278,10 @@ class Attempt:
 
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray) -> Settled:
             most = system.settings.max_open_close_iterations
-            return settle(pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved)
+            return settle(
+                pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved,
+                system.scheme.static,
+            )  # fmt: skip
 
         if not system.allowed_penetration or not len(found):
             stretch = found.stretch + found.swing

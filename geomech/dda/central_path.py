@@ -97,33 +97,38 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _pulls(goals, numbers, missed, soft, stiff_along, slope):
+def _pulls(goals, numbers, missed, soft, stiff_along, slope, rise, climb):
     """(3, n) N of a Newton step where blocks stand still: normal forces, shear forces without what answers these, and
     with it. ``goals`` (3, n) J for the products, ``numbers`` (6, n) N, w, α, β and the strengths left above and below
-    S, ``missed`` (2, n) m of gap and slip."""
+    S, ``missed`` (2, n) m of gap and slip; slip lifts by ``rise``, motion along the edge by ``climb``."""
     out = np.empty((3, len(soft)))
     for c in range(len(soft)):
         normal, width, back, ahead, above, below = numbers[:, c]
-        given = (goals[0, c] - normal * (width + missed[0, c])) / soft[c]
-        along = stiff_along[c] * (goals[2, c] / below - ahead - goals[1, c] / above + back - missed[1, c])
+        more, less = goals[2, c] / below - ahead, goals[1, c] / above - back
+        slid = more - less - missed[1, c]
+        risen = climb[c] * slid + (rise[c] * (more + less) if rise[c] > 0.0 else 0.0)
+        given = (goals[0, c] - normal * (width + missed[0, c] - risen)) / soft[c]
+        along = stiff_along[c] * slid
         out[0, c], out[1, c], out[2, c] = given, along, along + slope[c] * given
     return out
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _changes(goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, kn, mu, rough):
+def _changes(goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, rise, climb, kn, mu, rough):
     """Changes (6, n) of the ``numbers``, (n,) of S, and how far along them positive numbers stay so, at most 1:
     ``motion`` (n, 2) m of the blocks, the rest as for `_pulls`."""
     n = len(stiff)
     out, shear, far = np.empty((6, n)), np.empty(n), 1.0
     for c in range(n):
         _, _, back, ahead, above, below = numbers[:, c]
-        pushed = pulls[0, c] - stiff[c] * motion[c, 0]
+        pushed = pulls[0, c] - stiff[c] * (motion[c, 0] + climb[c] * motion[c, 1])
         sheared = pulls[1, c] - stiff_along[c] * motion[c, 1] + slope[c] * pushed
         more, less = mu[c] * pushed - sheared, mu[c] * pushed + sheared
         out[0, c], out[1, c] = pushed, motion[c, 0] + pushed / kn[c] + missed[0, c]
         out[2, c] = goals[1, c] / above - back - back / above * more
         out[3, c] = goals[2, c] / below - ahead - ahead / below * less
+        if rise[c] > 0.0:
+            out[1, c] -= rise[c] * (out[2, c] + out[3, c])
         out[4, c], out[5, c], shear[c] = more, less, sheared
         for k in range(6 if rough[c] else 2):
             if out[k, c] < 0.0:
@@ -181,6 +186,7 @@ class CentralPath:
         # Bonds are springs either way.
         self._bonds = springs.normal[held], springs.shear[held], gap[held], found.shear[held]
         self._lift, self._kn, self._ks = springs.lift[some], springs.normal[some], springs.shear[some]
+        self._rise = np.zeros(len(some))
         slides = found.state[some] == SLIP
         friction = np.where(slides, springs.friction[some], springs.peak[some])
         firm = np.where(slides, springs.sliding[some], springs.hold[some] + slipped[some] * springs.cohesion[some])
@@ -266,15 +272,18 @@ class CentralPath:
         moved_held[:, 0] -= self._all_lift[len(kn) :] * moved_held[:, 1]
         pulled, sheared = -kn_held * (gap_held + moved_held[:, 0]), before_held - ks_held * moved_held[:, 1]
         add_forces(residual, *self._held_at, pulled, sheared)
-        gap_missed = self._g + normal / kn - width
+        gap_missed = self._g + normal / kn - width - self._rise * (back + ahead)
         slip_missed = self._s + self._shear / ks - (ahead - back)
-        soft = width + normal / kn
-        stiff, stiff_along = normal / soft, rough / (1.0 / ks + ahead / below + back / above)
-        slope = stiff_along * mu * (back / above - ahead / below)
+        either, apart = back / above + ahead / below, back / above - ahead / below
+        stiff_along = rough / (1.0 / ks + either)
+        slope, climb = stiff_along * mu * apart, self._rise * stiff_along * apart
+        soft = width + normal / kn + normal * self._rise * (mu * either - slope * apart)
+        stiff = normal / soft
         assembly.assemble(
             pattern, self._data, self._matrix, self._upper, self._lower, *self._all_at,
             np.concatenate([stiff, kn_held]), np.concatenate([stiff_along, ks_held]),
-            np.concatenate([slope, np.zeros(len(kn_held))]), self._all_lift,
+            np.concatenate([slope, np.zeros(len(kn_held))]),
+            self._all_lift - np.concatenate([climb, np.zeros(len(kn_held))]),
         )  # fmt: skip
         solve = solution_of(pattern, self._data)
 
@@ -283,13 +292,15 @@ class CentralPath:
         def newton(goals, within=WITHIN, start=None):
             """Changes of the unknowns, of gap and motion along, of the six positive numbers and of S, and how far they
             may go."""
-            pulls = _pulls(goals, numbers, missed, soft, stiff_along, slope)
+            pulls = _pulls(goals, numbers, missed, soft, stiff_along, slope, self._rise, climb)
             side = residual.copy()
             add_forces(side, *self._at, pulls[0], pulls[2])
             step = solve(side, within, start)
             motion = contact_states.moved(step, *self._at)
             motion[:, 0] -= self._lift * motion[:, 1]
-            changed = _changes(goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, kn, mu, rough)
+            changed = _changes(
+                goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, self._rise, climb, kn, mu, rough
+            )  # fmt: skip
             return step, motion, *changed
 
         guess, _, changes, _, far = newton(np.zeros((3, len(kn))), _GUESSED)

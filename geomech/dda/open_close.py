@@ -6,11 +6,11 @@ Bonds, lost for good, break only when all else is right.
 
 Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states
 returns, the `CentralPath` proposes states to go on from, unless contacts are few. If it is blocked, `RoundedLaws` do
-(for more blocks than a dense matrix holds), and if they fail too, rounds of `LaggedFriction`, slowly and surely. If
-these end without, the sliding contacts stick again and only the worst contact of each block is switched, and if a
-combination still returns, only the first (the least-index rule, which cannot cycle where the problem has one solution;
-Murty 1974). Laws that are curved are lines within an iteration, and the iteration goes on until lines and laws agree on
-the forces.
+(for more blocks than a dense matrix holds), and if they fail too, rounds of `LaggedFriction`, slowly and surely (in
+statics, where a shorter step helps little, `ConvexRounds` before them). If these end without, the sliding contacts
+stick again and only the worst contact of each block is switched, and if a combination still returns, only the first
+(the least-index rule, which cannot cycle where the problem has one solution; Murty 1974). Laws that are curved are
+lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from .central_path import CentralPath
 from .contact_springs import Springs
 from .contact_states import check_states, contact_forces
 from .contacts import ContactSet
+from .convex_rounds import ConvexRounds
 from .curved_joints import CurvedJoints
 from .joint_states import clusters, settled_together, with_neighbours
 from .lagged_friction import LaggedFriction
@@ -57,9 +58,15 @@ _FEW, _CAUTIOUS = 40, 12
 #: more than this part of the forces on blocks is out of balance. At its end, where ε is round-off, the first of these
 #: suffices: a wall of 100 000 bricks leaves twenty that hardly touch.
 _DECIDED, _LEFT, _LEFT_PART, _BALANCED = 0.006, 12, 2e-4, 1e-3
+#: A path of many blocks that has used up its iterations goes on while ε falls to this part within so many of them, up to so many
+#: times as far: what would follow takes hundreds.
+_AHEAD, _LOOKED, _LONGER = 0.2, 5, 3
 #: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces
 #: change by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
-_PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
+_PATIENCE, _CHANGE, _CLOSER, _NEARER, _SAME = 4, 2e-2, 0.2, 0.5, 1e-7
+#: Rounds of convex problems go on while normal forces change by no more than this part of what they did so many rounds
+#: before.
+_FALLING, _ROUNDS = 0.7, 6
 #: Iterations to go from such states to the end.
 _FINISH = 8
 
@@ -163,6 +170,7 @@ class _Equations:
     gap: np.ndarray
     slack: float
     curved: CurvedJoints | None
+    statics: bool
 
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
@@ -266,13 +274,15 @@ def _proposed(
     path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int, patient: bool
 ) -> tuple[_States | None, int]:
     """States that the ``path`` proposes once nearly all contacts are decided, none of those ``offered`` already, or
-    None if it ends, takes more than ``budget`` iterations or, unless ``patient``, is blocked; and the iterations spent.
-    Raises `Unsettled`."""
-    for spent in range(1, budget + 1):
+    None if it ends or takes more than ``budget`` iterations; and the iterations spent. Unless ``patient`` a path that
+    is blocked has ended, and one that gets ahead may take more. Raises `Unsettled`."""
+    epsilons = []
+    for spent in range(1, (1 if patient else _LONGER) * max(budget, 0) + 1):
         try:
             undecided = path.advance()
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
+        epsilons.append(path.epsilon)
         few = _DECIDED * len(bonded)
         if not path.arrived:
             if path.ended or (path.blocked and not patient):
@@ -283,9 +293,9 @@ def _proposed(
             if states.key not in offered:
                 offered.add(states.key)
                 return states, spent
-        if path.ended:
+        if path.ended or (spent >= budget and epsilons[-1] > _AHEAD * max(epsilons[-_LOOKED - 1 :])):
             return None, spent
-    return None, max(budget, 0)
+    return None, len(epsilons)
 
 
 def _lagged(
@@ -312,14 +322,41 @@ def _lagged(
         raise Unsettled(str(error)) from error
 
 
+def _convex(
+    equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
+) -> Iterator[tuple[_States, int]]:
+    """As `_lagged`, by `ConvexRounds` while they get nearer to one another."""
+    of = equations
+    convex = ConvexRounds(
+        of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, of.found.normal
+    )
+    told, bound, changes = 0, _CHANGE, []
+    try:
+        for change in convex.rounds():
+            changes.append(change)
+            if change < bound:
+                states = _States(*convex.decided(), bonded)
+                if states.key not in offered:
+                    offered.add(states.key)
+                    bound = _NEARER * change
+                    yield states, convex.solutions - told
+                    told = convex.solutions
+            wanders = len(changes) > _ROUNDS and change > _FALLING * changes[-_ROUNDS - 1]
+            if wanders or convex.solutions > 2 * budget or change < _SAME:
+                return
+    except np.linalg.LinAlgError as error:
+        raise Unsettled(str(error)) from error
+
+
 def _slower(
     equations: _Equations, answer: _Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
-    """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (which knows
-    of no lift), and the solutions spent since the last. Where the matrix is dense a hundred solutions cost little, and
-    blocks that topple one by one go the surer way at once. Raises `Unsettled`."""
+    """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (in
+    statics of `_convex` before; neither knows of lift), and the solutions spent since the last. Where the matrix is dense a
+    hundred solutions cost little, and blocks that topple one by one go the surer way at once. Raises `Unsettled`."""
     of, told = equations, 0
-    if of.pattern.solver is not None:
+    large = of.pattern.solver is not None
+    if large:
         laws = RoundedLaws(
             of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, path.unknowns,
             float(np.sqrt(path.epsilon)),
@@ -334,8 +371,10 @@ def _slower(
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         told = laws.solutions - told
-    if not of.springs.lift.any():
-        for states, spent in _lagged(equations, answer, bonded, offered, budget):
+    if of.springs.lift.any():
+        return
+    for rounds in (_convex, _lagged) if large and of.statics else (_lagged,):
+        for states, spent in rounds(equations, answer, bonded, offered, budget):
             yield states, told + spent
             told = 0
 
@@ -351,14 +390,15 @@ def settle(
     slack: float,
     max_iterations: int,
     curved: CurvedJoints | None = None,
+    statics: bool = False,
 ) -> Settled:
-    """Iterate from the states of ``found`` to consistent ones; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the
+    """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the
     blocks' own part, ``springs`` and ``gap`` those of this step (dashpots included). ``curved`` joints bend them from
     iteration to iteration. An iteration is a solution of the step's equations, those along the central path included.
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
-    equations = _Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved)
+    equations = _Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics)
     states = _States(*((found.state, found.direction) if found.tried is None else found.tried), found.bonded)
     normal_force, slip = found.normal, np.zeros(len(found))
     seen: set[bytes] = set()
@@ -433,7 +473,7 @@ def settle(
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration
                 proposal, spent = _proposed(path, states.bonded, offered, budget, small)
-                iteration += spent
+                iteration, max_iterations = iteration + spent, max_iterations + max(0, spent - max(budget, 0))
             seen.clear()
             if proposal is None:
                 if slower is None:

@@ -94,7 +94,7 @@ def test_bonds_break_only_where_they_must():
 class _PathOf:
     """A central path that leaves so many contacts undecided, one after the other."""
 
-    blocked, missed = False, 0.0
+    blocked, missed, epsilon = False, 0.0, 1.0
 
     def __init__(self, undecided, arrived):
         self._left, self._arrived = list(undecided), arrived
