@@ -7,16 +7,27 @@ what a tip releases over an increment is ∫ G da, G = (K_I² + K_II²)/E' (Irwi
 before, of K_eq, for the way it turns, and after, each K once at the load of the step's end and once at that of its
 begin. So four quantities found apart from each other have to add up; what is left over is told. K is that of the forces
 whose strain the blocks feel: where that is their mean stress alone (`by_mean_stress`), that stress brings it.
+
+At rest forces have to be passed on as they are spread, and open cracks by more than their mean stress does. There the
+work of all of them counts (`work_on_cracks`); what it is beyond A σ : dε_c has a column of its own, for the blocks have
+not counted it. Where G is above what rock takes, at rest the surplus is lost (in motion it moves the rock).
+
+Cracks that run through at rest do so under forces that are held up until the block parts: G and the work of the forces
+grow without bound as the last ligament goes, though no such work is ever done. So what is counted of a step in which a
+block parts is what it must have spent: K_Ic²/E' for the way of its tips, from what its cracks had stored; what there is
+more of that is lost, what is missing the forces have done.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import Blocks, Material, State
+from .work_on_cracks import first_work_on_cracks, work_on_cracks
 
 if TYPE_CHECKING:
     from ..ddm import Solution
@@ -30,6 +41,10 @@ _LARGEST_KINK = 2.2
 
 def _keys(tips: np.ndarray) -> list[_Key]:
     return list(zip(tips["crack"].tolist(), tips["end"].tolist()))
+
+
+def _add(sums: dict[int, float], block: int, energy: float) -> None:
+    sums[block] = sums.get(block, 0.0) + energy
 
 
 def _felt_tips(tips: np.ndarray, felt: dict[int, Solution], by_mean_stress: ByMeanStress) -> np.ndarray:
@@ -57,11 +72,13 @@ def _kink_release(tips: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Growing:
-    """A tip that grows by ``way``, m; what it released before, J/m², and what part there was of what it releases after,
-    over the step."""
+    """A tip in ``block`` that grows by ``way``, m; what it released before, and what rock takes (``cost``), J/m²; what
+    part there was of what it releases after, over the step."""
 
     way: float
     before: float
+    block: int
+    cost: float
     share: float = 1.0
 
 
@@ -70,27 +87,34 @@ class CrackEnergy:
     """Sums since the beginning of a run, J/m.
 
     work       of the blocks' mean stress (that of the middle of each step) on the strain of their cracks
+    uneven     at rest: of the forces on them, beyond that of their mean stress
     stored     around cracks, now
     friction   rubbed off between crack faces
     fracture   released at tips that grew, of what the blocks spend: of those that feel no more than their mean stress
-               (`by_mean_stress`) by the K of that stress
+               (`by_mean_stress`) by the K of that stress; at rest no more than rock takes
+    runaway    released there at rest beyond what rock takes: lost
     toughness  K_Ic²/E' times the way of all tips: what rock takes as it breaks. Of the bending that breaks it a block
                of one strain stores nothing, and spends nothing: there fracture is less
     parting    released as tips met something and blocks parted: the last ligaments, what the cracks stored that are
                walls now, and what the blocks stored less their parts (and the contacts between them)
     set_free   by the blocks themselves as they parted
-    residual   work + set_free − stored − friction − fracture − parting: of increments and steps
+    residual   work + uneven + set_free − stored − friction − fracture − runaway − parting: of increments and steps
     """
 
+    static: bool = False
     work: float = 0.0
+    uneven: float = 0.0
     stored: float = 0.0
     friction: float = 0.0
     fracture: float = 0.0
+    runaway: float = 0.0
     toughness: float = 0.0
     parting: float = 0.0
     set_free: float = 0.0
     residual: float = 0.0
-    _released: float = 0.0
+    #: block → released in the present step, and of it beyond what rock takes, J/m.
+    _released: dict[int, float] = field(default_factory=dict)
+    _lost: dict[int, float] = field(default_factory=dict)
     _asked: float = 0.0
     _parted: bool = False
     #: block → whether it feels its mean stress only.
@@ -99,6 +123,9 @@ class CrackEnergy:
     #: block with tips that grow → its mean stress, Pa, its limit, the strain of its cracks then, and the share as of a
     #: tip.
     _limited: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict)
+    #: At rest: block → its solution as the present step began, and what rock has taken in it since then, J/m.
+    _rested: dict[int, Solution] = field(default_factory=dict)
+    _taken: dict[int, float] = field(default_factory=dict)
     #: Tips with K as it is felt, as the present step began, in its first pass and in its last one.
     _began: np.ndarray | None = None
     _first: np.ndarray | None = None
@@ -137,8 +164,12 @@ class CrackEnergy:
         release = (tips["k_i"] ** 2 + tips["k_ii"] ** 2) / modulus
         now = dict(zip(keys, release.tolist()))
         for key, of in self._growing.items():
+            taken = of.way * of.cost
+            _add(self._taken, of.block, taken)
             if key in now:
-                self._released += 0.5 * of.way * of.share * (of.before + now[key])
+                released = 0.5 * of.way * of.share * (of.before + now[key])
+                _add(self._released, of.block, released)
+                _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
                 # A tip that has met something: G rises without bound as the last ligament goes, its integral by no
                 # rule.
@@ -149,12 +180,19 @@ class CrackEnergy:
                 now_stress, now_limit = by_mean_stress.stress[block]
                 less, known = now_limit - limit, felt[block]
                 both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
-                self._released += 0.5 * known.body.area * share * both
+                _add(self._released, block, 0.5 * known.body.area * share * both)
         turned = np.where(hangs, _kink_release(tips), tips["k_eq"] ** 2) / modulus
         shares = self._shares()
         grows = np.flatnonzero(tips["grown"] > 0)
+        cost = np.array([m.k_ic for m in materials])[rock] ** 2 / modulus
         self._growing = {
-            keys[row]: _Growing(float(tips["grown"][row]), float(turned[row]), shares.get(keys[row], 1.0))
+            keys[row]: _Growing(
+                float(tips["grown"][row]),
+                float(turned[row]),
+                int(tips["block"][row]),
+                float(cost[row]),
+                shares.get(keys[row], 1.0),
+            )
             for row in grows.tolist()
         }
         self._limited = {
@@ -162,8 +200,7 @@ class CrackEnergy:
             for block in np.unique(tips["block"][grows]).tolist()
             if block in by_mean_stress
         }
-        toughness = np.array([m.k_ic for m in materials])[rock]
-        self._asked += float(tips["grown"][grows] @ (toughness[grows] ** 2 / modulus[grows]))
+        self._asked += float(tips["grown"][grows] @ cost[grows])
 
     def _shares(self) -> dict[_Key, float]:
         """What part of a tip's G there is over the present step, in which its load has changed: K·K₀/K² with K₀ as the
@@ -187,10 +224,38 @@ class CrackEnergy:
             return 1.0
         return max(0.0, float(before @ first) / float(first @ first))
 
-    def parts(self) -> None:
-        """Blocks part in the present step, and have other numbers from then on."""
+    def parts(self, parent: np.ndarray) -> None:
+        """Blocks part in the present step; from then on they are those of which ``parent`` (n_blocks,) were whole."""
         self._parted = True
         self._hangs, self._limited, self._strain_last = {}, {}, {}
+        if not self.static:
+            return
+        whole = np.bincount(parent)[parent] == 1
+        now = {int(parent[child]): child for child in np.flatnonzero(whole).tolist()}
+        for block in [block for block in self._rested if block not in now]:
+            self._runs_through(block)
+        self._rested = {now[block]: of for block, of in self._rested.items()}
+        self._taken, self._released, self._lost = (
+            {now[block]: energy for block, energy in sums.items() if block in now}
+            for sums in (self._taken, self._released, self._lost)
+        )
+        self._growing = {
+            key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now
+        }
+
+    def _runs_through(self, block: int, rubbed: float = 0.0) -> None:
+        """At rest ``block`` is cut by tips that have grown in the present step or are about to; ``rubbed`` J/m have been
+        rubbed off in it since the step began. What was released in it until then was not paid for."""
+        own = [key for key, of in self._growing.items() if of.block == block]
+        taken = self._taken.pop(block, 0.0) + sum(of.way * of.cost for of in map(self._growing.pop, own))
+        for sums in (self._released, self._lost):
+            sums.pop(block, None)
+        stored = self._rested.pop(block).crack_energy if block in self._rested else 0.0
+        self.stored -= stored
+        self.friction += rubbed
+        self.fracture += taken
+        self.uneven += max(0.0, taken + rubbed - stored)
+        self.runaway += max(0.0, stored - taken - rubbed)
 
     @property
     def under_way(self) -> bool:
@@ -205,42 +270,83 @@ class CrackEnergy:
         felt: dict[int, Solution],
         by_mean_stress: ByMeanStress,
         set_free: float = 0.0,
+        cut: Collection[int] = (),
     ) -> None:
         """The step from ``before`` to ``state`` has been taken; ``felt`` at its end is block → the `ddm.Solution` that
         it is strained by; ``by_mean_stress`` are those that feel no more than their mean stress. Blocks that have
-        parted since the last step stored ``set_free`` J/m more before than their parts and new contacts did."""
+        parted since the last step stored ``set_free`` J/m more before than their parts and new contacts did; those that
+        are ``cut`` part here, by what now grows."""
         strain = state.crack_strain - before.crack_strain
         mean = 0.5 * (before.stress + state.stress)
-        work = float(blocks.areas(before.vertices) @ np.sum(mean * strain, axis=1))
+        each = blocks.areas(before.vertices) * np.sum(mean * strain, axis=1)
+        work = float(each.sum())
+        if self.static:
+            gone = {block: felt[block] for block in cut if block in felt}
+            felt = {block: of for block, of in felt.items() if block not in gone}
+            for block, of in gone.items():
+                rubbed = of.frictional_work - _rubbed(self._rested.get(block))
+                self._runs_through(block, rubbed)
+                each[block] = 0.0
+        hangs = {block: block in by_mean_stress for block in felt}
+        done = sum(self._work_at_rest(before, felt, hangs, each)) if self.static else work
         stored = sum(solution.crack_energy for solution in felt.values())
         friction = sum(solution.frictional_work for solution in felt.values())
-        hangs = {block: block in by_mean_stress for block in felt}
+        if self.static:
+            friction += sum(of.frictional_work for of in gone.values())
         # What a block stored that begins to hang, or is whole no more, was of another kind.
-        self._parted |= any(hangs.get(block) != hung for block, hung in self._hangs.items())
+        self._parted |= any(hangs.get(block) != hung for block, hung in self._hangs.items() if block not in cut)
         self._hangs = hangs
-        rest = work + set_free - (stored - self.stored) - (friction - self.friction) - self._released
+        released, lost = sum(self._released.values()), sum(self._lost.values())
+        rest = done + set_free - (stored - self.stored) - (friction - self.friction) - released
         self.work += work
+        self.uneven += done - work
         self.set_free += set_free
-        self.fracture += self._released
+        self.fracture += released - lost
+        self.runaway += lost
         self.toughness += self._asked
         if self._parted:
             self.parting += rest
         else:
             self.residual += rest
         self.stored, self.friction = stored, friction
-        self._released, self._asked, self._parted = 0.0, 0.0, False
+        self._released, self._lost, self._taken = {}, {}, {}
+        self._asked, self._parted = 0.0, False
         self._began, self._first, self._strain_began = self._last, None, self._strain_last
         # What grows now does so as the next step begins.
         self._growing = {key: replace(of, share=1.0) for key, of in self._growing.items()}
         self._limited = {block: (*of[:3], 1.0) for block, of in self._limited.items()}
+        self._rested = dict(felt) if self.static else {}
+
+    def _work_at_rest(
+        self, before: State, felt: dict[int, Solution], hangs: dict[int, bool], by_mean: np.ndarray
+    ) -> Iterator[float]:
+        """J/m that forces at rest have done in opening the cracks, block by block; ``by_mean`` (n_blocks,) that of the
+        mean stress, which is all of it where a block ``hangs`` and where there are no forces on cracks."""
+        for block, of in felt.items():
+            began = self._rested.get(block)
+            if hangs[block] or self._hangs.get(block, False):
+                yield float(by_mean[block])
+            elif began is not None:
+                yield work_on_cracks(began, of)
+            else:
+                # Cracks that are cut into stressed rock open against less than bears them: what is left over is free.
+                self._parted |= bool(np.any(before.stress[block])) and bool(of.jumps.size)
+                yield first_work_on_cracks(before.stress[block], float(before.rotation[block]), of)
+        yield float(sum(by_mean[block] for block in range(len(by_mean)) if block not in felt))
 
     def statistics(self) -> dict[str, float]:
         """Columns of a history, J/m."""
+        at_rest = {"uneven_work": self.uneven, "runaway_loss": self.runaway} if self.static else {}
         return {
             "crack_elastic": self.stored,
             "crack_friction": self.friction,
             "fracture_energy": self.fracture,
             "toughness_energy": self.toughness,
             "parting_energy": self.parting,
+            **at_rest,
             "crack_residual": self.residual,
         }
+
+
+def _rubbed(solution: Solution | None) -> float:
+    return 0.0 if solution is None else solution.frictional_work

@@ -54,7 +54,7 @@ class CrackedBlocks:
         # What crack faces with friction remember of the load step before: its passes all begin there.
         self.history: dict[int, object] = {}
         self.solved_from: dict[int, object] = {}
-        self.budget, self.crack_energy = dda.EnergyBudget(), CrackEnergy()
+        self.budget, self.crack_energy = dda.EnergyBudget(), CrackEnergy(problem.dda.dynamic_factor == 0.0)
         self.acted: dict[str, float] = {}
         self.removed: np.ndarray | None = None
         self._motion: tuple[State, Motion] | None = None
@@ -155,7 +155,7 @@ class CrackedBlocks:
         self.history = inherited(self.history, split.parent, split.cracks)
         self.blocks, self.state, self.cracks = split.blocks, split.state, split.cracks
         self.budget = self.budget.cut()
-        self.crack_energy.parts()
+        self.crack_energy.parts(split.parent)
         self._take_blocks(split.parent)
 
     def take_out(self) -> list[int]:

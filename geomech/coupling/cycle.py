@@ -10,7 +10,7 @@ step does.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -219,7 +219,8 @@ class Coupling:
                 events += initiations(now, tips, result.state)
                 stops = self._stops(events)
             # Blocks part where the pass has left them, in equilibrium with what their faces bear.
-            parts = not endless and part_here(now, growth, result.state)
+            cut = () if endless else part_here(now, growth, result.state)
+            parts = len(cut) > 0
             ends = growth is None or self.follows or (parts and not static)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed
@@ -232,7 +233,7 @@ class Coupling:
             if (now.bodies or now.crack_energy.under_way) and not endless:
                 now.crack_energy.passed(tips, now.blocks, now.problem.materials, now.felt(), now.by_mean_stress)
                 if ends or parts:
-                    self._count_at_cracks(result.state, budget)
+                    self._count_at_cracks(result.state, budget, cut)
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual)
             if self.tips is not None and len(tips):
@@ -283,12 +284,13 @@ class Coupling:
             self._count_at_cracks(result.state, budget)
             now.take_step(result.state, budget)
 
-    def _count_at_cracks(self, state: State, budget: dda.EnergyBudget) -> None:
-        """A step has been taken to ``state``, after which the blocks have this ``budget``."""
+    def _count_at_cracks(self, state: State, budget: dda.EnergyBudget, cut: Sequence[int] = ()) -> None:
+        """A step has been taken to ``state``, after which the blocks have this ``budget``, and in which some are
+        ``cut``."""
         now = self.now
         # (What was dug out without a block that parts is its own.)
         set_free = now.budget.split - budget.split if now.budget.is_cut else 0.0
-        now.crack_energy.after(now.state, state, now.blocks, now.felt(), now.by_mean_stress, set_free)
+        now.crack_energy.after(now.state, state, now.blocks, now.felt(), now.by_mean_stress, set_free, cut)
 
     def _excavated(self) -> tuple[Event, ...]:
         """Take out the blocks whose time has come; an event for each."""

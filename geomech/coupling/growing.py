@@ -99,14 +99,15 @@ def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Eve
     return tuple(events)
 
 
-def part_here(now: CrackedBlocks, growth, state: State) -> bool:
-    """Whether ``growth`` (None: there is none) cuts blocks in two whose parts can go on from ``state``, where the pass
-    has left them."""
+def part_here(now: CrackedBlocks, growth, state: State) -> list[int]:
+    """The blocks that ``growth`` (None: there is none) cuts in two, where their parts can go on from ``state``, in
+    which the pass has left them."""
     if growth is None or not growth.joins:
-        return False
+        return []
     with now.timed("growth"):
         cut = divided(now.blocks, growth.cracks)
-    return bool(len(cut)) and (now.problem.dda.dynamic_factor != 0.0 or holds_together(state, cut))
+    together = len(cut) and (now.problem.dda.dynamic_factor != 0.0 or holds_together(state, cut))
+    return cut.tolist() if together else []
 
 
 def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tuple[Event, ...]:

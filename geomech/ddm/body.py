@@ -378,6 +378,13 @@ class Body:
             rest += np.concatenate([self._outside.known @ imposed, self._c_known @ imposed])
         return applied, self._loads.of(applied), rest, imposed
 
+    def closed_traction(self, load: BodyLoad) -> np.ndarray:
+        """(n_crack_unknowns,) Pa, along and normal: what ``load`` brings to crack faces that nothing opens or moves."""
+        _, units, rest, _ = self.lay_out(load)
+        total = rest + sum(unit.applied @ size for unit, size in units)
+        n_g = self.boundary.n_unknowns
+        return total[n_g:] - self._cg @ self._outside.solve(total[:n_g]) if n_g else total
+
     def unit_answers(self, segments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What forces of one N/m at the ends of ``segments`` (m, 2, 2) come to, A_ΓΓ⁻¹ g (n_boundary_unknowns, 4 m) and
         traction on closed faces (n_crack_unknowns, 4 m): columns as of `UnitLoad`."""

@@ -185,6 +185,20 @@ class Solution:
         change = (body.crack_system.matrix @ self.jumps * self.jumps).reshape(c.n, 2, c.per).sum(axis=1)
         return -0.5 * float(np.sum(c.quadrature * change)) / (2 * body.material.shear_modulus)
 
+    @property
+    def closed_traction(self) -> np.ndarray:
+        """(n_crack_unknowns,) Pa: the same of this load, t₀, as `Body.closed_traction` has it."""
+        return self._face_load - self.body._cg @ self._eliminated if self.jumps.size else np.zeros(0)
+
+    def work_at_cracks(self, closed: np.ndarray) -> float:
+        """J/m ∫ t₀·[u] ds: by reciprocity the work of the load that brings t₀, ``closed`` (n_crack_unknowns,), to closed
+        faces on the displacement that the cracks of this solution add to the body."""
+        c = self.body.faces
+        if not self.jumps.size:
+            return 0.0
+        done = (closed * self.jumps).reshape(c.n, 2, c.per).sum(axis=1)
+        return float(np.sum(c.quadrature * done)) / (2 * self.body.material.shear_modulus)
+
     @cached_property
     def residual(self) -> float:
         """Largest traction left over at the collocation nodes, relative to the largest that acts there (`_acting`).
