@@ -1,16 +1,16 @@
 """How far blocks and cracks must agree: time and error of a wall with cracked bricks by the tolerance of the coupling's
 passes.
 
-A step is repeated until the strain of every brick's cracks is the one that the blocks were moved with, to a tolerance.
-A loose one takes a single pass, as staggered schemes do; the error is that of the stress intensity factors, against a
-tolerance of 1e-9.
+A static step is repeated until the strain of every brick's cracks is the one that the blocks were moved with, to a
+tolerance. A loose one takes a single pass, as staggered schemes do; the error is that of the stress intensity factors,
+against a tolerance of 1e-10. (In motion cracks answer to their block's mean stress, and open ones take one pass.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ PROBLEM = "wall with cracked bricks, by tolerance of the passes"
 METHOD, ONE_PASS = "passes until strains agree", "one pass a step (staggered)"
 METHODS = (METHOD, ONE_PASS)
 #: Relative strain; the first takes a single pass.
-TOLERANCES, EXACT = (1e3, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6), 1e-9
+TOLERANCES, EXACT = (1e3, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6), 1e-10
 #: Bricks, those that are cracked, load steps.
 WALL, STEPS = (40, 8), 3
 
@@ -60,7 +60,8 @@ def _run(tolerance: float) -> tuple[np.ndarray, int, float]:
 
     passes, cycle = 0, None
     with _until(tolerance):
-        steps = cycles(wall(*WALL))
+        problem = wall(*WALL)
+        steps = cycles(replace(problem, dda=replace(problem.dda, dynamic_factor=0.0)))
         next(steps)
         spent_on = stopwatch()
         for cycle in steps:
@@ -75,10 +76,10 @@ def _run(tolerance: float) -> tuple[np.ndarray, int, float]:
 def _until(tolerance: float) -> Iterator[None]:
     from ..coupling import balance
 
-    before = balance.DYNAMIC_TOLERANCE, balance.NO_ANSWER
+    before = balance.COMPLIANCE_TOLERANCE, balance.NO_ANSWER
     # A loose tolerance takes what the coupling itself would call no answer.
-    balance.DYNAMIC_TOLERANCE, balance.NO_ANSWER = tolerance, max(before[1], tolerance)
+    balance.COMPLIANCE_TOLERANCE, balance.NO_ANSWER = tolerance, max(before[1], tolerance)
     try:
         yield
     finally:
-        balance.DYNAMIC_TOLERANCE, balance.NO_ANSWER = before
+        balance.COMPLIANCE_TOLERANCE, balance.NO_ANSWER = before
