@@ -36,7 +36,7 @@ def declare(verbs: Verbs) -> None:
         "--blocks", type=int, metavar="N", help="of dda: a wall of so many blocks too (100000: some minutes and 3 GB)"
     )
     bench.add_argument(
-        "--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: some twenty minutes)"
+        "--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: an hour)"
     )
 
 

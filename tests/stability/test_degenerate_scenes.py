@@ -197,7 +197,7 @@ def test_text_in_another_encoding_is_refused(run):
 def test_a_run_folder_that_cannot_be_made(run, tmp_path):
     (tmp_path / "taken").write_text("a file")
     code, shown, _ = run(plate(), "--out", str(tmp_path / "taken"))
-    assert code == cli.FAILED and "taken: file exists" in shown
+    assert code == cli.BAD_INPUT and "taken" in shown and "folder" in shown
 
 
 def test_a_run_does_not_write_over_its_scene(tmp_path, capfd):
