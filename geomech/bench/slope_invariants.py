@@ -49,6 +49,9 @@ INVARIANTS = {
         GAIN,
         ("without work", _STRAINED),
     ),
+    "budget": Invariant(
+        "the same of blocks and cracks together", GAIN, ("not accounted for", "without work", _STRAINED)
+    ),
     "toughness": Invariant(
         "K_eq over K_Ic, less 1, of tips that stand in statics (event steps: to 1e-6)",
         1e-5,
@@ -135,6 +138,7 @@ class Invariants:
         turned = max(turned, sum(told.get(f"{name}_energy", 0.0) for name in stores))
         if turned > 0:
             yield "energy", abs(told.get("energy_residual", 0.0)) / turned, "the blocks"
+        yield "budget", abs(told.get("budget_residual", 0.0)), "blocks and cracks"
 
     def _growth(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
         # Whether the tips of a cycle stand is known when the next one is that of another load.

@@ -239,9 +239,7 @@ class CrackEnergy:
             {now[block]: energy for block, energy in sums.items() if block in now}
             for sums in (self._taken, self._released, self._lost)
         )
-        self._growing = {
-            key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now
-        }
+        self._growing = {key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now}
 
     def _runs_through(self, block: int, rubbed: float = 0.0) -> None:
         """At rest ``block`` is cut by tips that have grown in the present step or are about to; ``rubbed`` J/m have been

@@ -21,6 +21,7 @@ from ..dda.blas_threads import alike, asked_for, blas_threads
 from ..dda.excavation import until_next_event
 from ..model import TIP, Cycle, Event, Problem, State
 from .balance import Balance, balanced
+from .budget_watch import BudgetWatch
 from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .elastic_range import ElasticRange
@@ -93,6 +94,7 @@ class Coupling:
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
         self.range, self.balance, self.mechanism = ElasticRange(), LoadBalance(), Mechanism()
+        self.energy = BudgetWatch()
         self.under_way: UnderWay | None = None
         #: s, when the present load step began.
         self.began = self.now.state.time
@@ -236,6 +238,7 @@ class Coupling:
                     self._count_at_cracks(result.state, budget, cut)
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual)
+            self.energy.check(statistics["budget_residual"], result.state.time)
             if self.tips is not None and len(tips):
                 statistics["fastest_tip"] = self.tips.speed.fastest(whole)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics)

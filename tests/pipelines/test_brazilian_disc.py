@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from geomech.cli import DONE, main
+from geomech.output import Run
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "brazilian_disc"
 sys.path.insert(0, str(FOLDER))
@@ -33,6 +34,9 @@ def run_pipeline(out: Path, *variants: str, wishes: tuple[str, ...] = ()) -> dic
         assert main(["run", str(FOLDER), "--quiet", "--out", str(out), *named, *settings]) == DONE
     finally:
         Pressed.on_end = ended
+    for name in variants:
+        # Of the energy turned over, in any cycle, through growth and splitting.
+        assert np.nanmax(np.abs(Run(out / name).history["budget_residual"])) < 0.01
     return dict(zip(variants, seen))
 
 

@@ -6,6 +6,7 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from geomech.cli import DONE, main
@@ -33,6 +34,9 @@ def ran(out: Path, *variants: str) -> dict[str, study.Watch]:
         assert main(["run", str(FOLDER), "--quiet", "--out", str(out), *named, *FEW_FILES]) == DONE
     finally:
         study.check = checked
+    for name in variants:
+        # Of the energy turned over, in any cycle.
+        assert np.nanmax(np.abs(Run(out / name).history["budget_residual"])) < 0.01
     return seen
 
 
