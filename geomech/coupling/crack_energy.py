@@ -96,7 +96,8 @@ class CrackEnergy:
     toughness  K_Ic²/E' times the way of all tips: what rock takes as it breaks. Of the bending that breaks it a block
                of one strain stores nothing, and spends nothing: there fracture is less
     parting    released as tips met something and blocks parted: the last ligaments, what the cracks stored that are
-               walls now, and what the blocks stored less their parts (and the contacts between them)
+               walls now, and what the blocks stored less their parts (and the contacts between them); and where cracks are cut into
+               stressed rock
     set_free   by the blocks themselves as they parted
     residual   work + uneven + set_free − stored − friction − fracture − runaway − parting: of increments and steps
     """
@@ -142,8 +143,9 @@ class CrackEnergy:
         materials: tuple[Material, ...],
         felt: dict[int, Solution],
         by_mean_stress: ByMeanStress,
+        stressed: bool = True,
     ) -> None:
-        """A pass of the present step has ended with ``tips``, of which some are about to grow, or none; ``felt`` is
+        """A pass of the present step, which blocks began ``stressed`` or not, has ended with ``tips``, of which some are about to grow, or none; ``felt`` is
         block → the `ddm.Solution` that it is strained by, those ``by_mean_stress`` by no more than their mean
         stress."""
         tips = _felt_tips(tips, felt, by_mean_stress)
@@ -182,7 +184,7 @@ class CrackEnergy:
                 both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
                 _add(self._released, block, 0.5 * known.body.area * share * both)
         turned = np.where(hangs, _kink_release(tips), tips["k_eq"] ** 2) / modulus
-        shares = self._shares()
+        shares = self._shares(stressed)
         grows = np.flatnonzero(tips["grown"] > 0)
         cost = np.array([m.k_ic for m in materials])[rock] ** 2 / modulus
         self._growing = {
@@ -196,16 +198,18 @@ class CrackEnergy:
             for row in grows.tolist()
         }
         self._limited = {
-            block: (*by_mean_stress.stress[block], felt[block].crack_strain, self._share_of(block))
+            block: (*by_mean_stress.stress[block], felt[block].crack_strain, self._share_of(block, stressed))
             for block in np.unique(tips["block"][grows]).tolist()
             if block in by_mean_stress
         }
         self._asked += float(tips["grown"][grows] @ cost[grows])
 
-    def _shares(self) -> dict[_Key, float]:
+    def _shares(self, stressed: bool) -> dict[_Key, float]:
         """What part of a tip's G there is over the present step, in which its load has changed: K·K₀/K² with K₀ as the
         step began, 0 where it has turned about. Passes grow tips by the load of the step's end, but they grow all the
         time; forces that rise by a part of themselves would release that part too much."""
+        if self._began is None and self._first is not None and not stressed:
+            return dict.fromkeys(_keys(self._first), 0.0)
         if self._began is None or self._first is None:
             return {}
         before = {key: (row["k_i"], row["k_ii"]) for key, row in zip(_keys(self._began), self._began)}
@@ -217,8 +221,10 @@ class CrackEnergy:
                 shares[key] = max(0.0, float((k_i * row["k_i"] + k_ii * row["k_ii"]) / size))
         return shares
 
-    def _share_of(self, block: int) -> float:
+    def _share_of(self, block: int, stressed: bool) -> float:
         """The same of what goes with the square of the ``block``'s load, from the strain of its cracks."""
+        if self._began is None and not stressed:
+            return 0.0
         before, first = self._strain_began.get(block), self._strain_first.get(block)
         if before is None or first is None or not first.any():
             return 1.0
@@ -293,6 +299,9 @@ class CrackEnergy:
             friction += sum(of.frictional_work for of in gone.values())
         # What a block stored that begins to hang, or is whole no more, was of another kind.
         self._parted |= any(hangs.get(block) != hung for block, hung in self._hangs.items() if block not in cut)
+        # Cracks that are cut into stressed rock open against less than bears them: what is left over is set free.
+        new = [block for block, of in felt.items() if block not in self._hangs and of.jumps.size]
+        self._parted |= bool(np.any(before.stress[new]))
         self._hangs = hangs
         released, lost = sum(self._released.values()), sum(self._lost.values())
         rest = done + set_free - (stored - self.stored) - (friction - self.friction) - released
@@ -327,8 +336,6 @@ class CrackEnergy:
             elif began is not None:
                 yield work_on_cracks(began, of)
             else:
-                # Cracks that are cut into stressed rock open against less than bears them: what is left over is free.
-                self._parted |= bool(np.any(before.stress[block])) and bool(of.jumps.size)
                 yield first_work_on_cracks(before.stress[block], float(before.rotation[block]), of)
         yield float(sum(by_mean[block] for block in range(len(by_mean)) if block not in felt))
 

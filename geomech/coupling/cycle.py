@@ -233,11 +233,11 @@ class Coupling:
                 # Of an event step that is shorter than its inertia asks for, or goes back; of the last part of a pass.
                 statistics["dt"] = gone_by
             if (now.bodies or now.crack_energy.under_way) and not endless:
-                now.crack_energy.passed(tips, now.blocks, now.problem.materials, now.felt(), now.by_mean_stress)
+                now.crack_energy.passed(tips, now.blocks, now.problem.materials, *self._felt())
                 if ends or parts:
                     self._count_at_cracks(result.state, budget, cut)
                 statistics |= now.crack_energy.statistics()
-            statistics["budget_residual"] = budget.left_over(now.crack_energy.residual)
+            statistics["budget_residual"] = budget.left_over(now.crack_energy.residual, now.crack_energy.uneven)
             self.energy.check(statistics["budget_residual"], result.state.time)
             if self.tips is not None and len(tips):
                 statistics["fastest_tip"] = self.tips.speed.fastest(whole)
@@ -283,7 +283,7 @@ class Coupling:
                 return replace(found, result=replace(result, state=replace(result.state, time=until)))
             self.range.check(now.motion(result.state), now.blocks, result.state.time)
             budget = now.budget.after(result.energy, result.state.time)
-            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, now.felt(), now.by_mean_stress)
+            now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
             self._count_at_cracks(result.state, budget)
             now.take_step(result.state, budget)
 
@@ -294,6 +294,10 @@ class Coupling:
         # (What was dug out without a block that parts is its own.)
         set_free = now.budget.split - budget.split if now.budget.is_cut else 0.0
         now.crack_energy.after(now.state, state, now.blocks, now.felt(), now.by_mean_stress, set_free, cut)
+
+    def _felt(self) -> tuple:
+        """What the blocks feel of their cracks, and whether they began the step under stress."""
+        return self.now.felt(), self.now.by_mean_stress, bool(self.now.state.stress.any())
 
     def _excavated(self) -> tuple[Event, ...]:
         """Take out the blocks whose time has come; an event for each."""

@@ -335,10 +335,11 @@ class EnergyBudget:
     def losses(self) -> float:
         return float(self.totals[_LOSSES].sum())
 
-    def left_over(self, at_cracks: float = 0.0) -> float:
+    def left_over(self, at_cracks: float = 0.0, more_work: float = 0.0) -> float:
         """The residual as a part of all energy turned over; ``at_cracks`` J/m of the work on them are not accounted for
-        there."""
-        return (self.residual - at_cracks) / self.turnover if self.turnover else 0.0
+        there, ``more_work`` has been done on them by weight and loads than the blocks know."""
+        turnover = max(self.turnover, abs(self.work + more_work))
+        return (self.residual - at_cracks) / turnover if turnover else 0.0
 
     def statistics(self) -> dict[str, float]:
         """The columns of a history, J/m."""

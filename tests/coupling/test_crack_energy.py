@@ -84,6 +84,18 @@ def test_sliding_and_wings_under_compression_add_up(dt):
     assert abs(told["energy_residual"]) < 1e-3 * told["load_work"]
 
 
+def test_growth_within_the_first_step_adds_up():
+    """All of the load at once, from nothing: in its mean half of it acts while wings grow, and what it has done at the
+    end is stored and rubbed off. (Taken at all of the load, what wings release was a tenth of that, from nowhere.)"""
+    given = loaded(-2e6, 3.4, 3.4, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0, increment=0.02)
+    seen = [cycle for cycle in cycles(given) if cycle.number]
+    last = seen[-1].statistics
+    assert seen[-1].cracks.lengths.sum() > 1.2 * given.cracks.lengths.sum() and last["crack_elastic"] > 0
+    spent = last["crack_elastic"] + last["crack_friction"]
+    assert last["toughness_energy"] > 0.01 * spent
+    assert abs(last["crack_residual"]) < 1e-6 * spent
+
+
 @pytest.mark.parametrize("dt", [0.4, 0.1])
 def test_sliding_alone_adds_up_whatever_the_step(dt):
     """Pressure and slip rise together, so that friction takes half of what its last force would over all of the slip: 5
