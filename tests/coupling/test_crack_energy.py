@@ -86,7 +86,7 @@ def test_sliding_and_wings_under_compression_add_up(dt):
 
 def test_growth_within_the_first_step_adds_up():
     """All of the load at once, from nothing: in its mean half of it acts while wings grow, and what it has done at the
-    end is stored and rubbed off. (Taken at all of the load, what wings release was a tenth of that, from nowhere.)"""
+    end is stored and rubbed off. (Taken at all of the load, what wings release was 0.29 of that, from nowhere.)"""
     given = loaded(-2e6, 3.4, 3.4, [[-0.12, -0.12], [0.12, 0.12]], friction=20.0, increment=0.02)
     seen = [cycle for cycle in cycles(given) if cycle.number]
     last = seen[-1].statistics
