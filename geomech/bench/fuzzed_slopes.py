@@ -107,9 +107,10 @@ def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watch
     except _TimeUp as up:
         verdict, message = LONG, str(up)
     except Exception as error:  # noqa: BLE001 (any but those known is what is looked for)
-        if isinstance(error.__cause__, _TimeUp):
+        up = _time_up(error)
+        if up is not None:
             # It came within a compiled function, which makes another error of it.
-            verdict, message = LONG, str(error.__cause__)
+            verdict, message = LONG, str(up)
         else:
             reason = reason_of(error, begun=number > 0) or ""
             verdict = REFUSED if reason else WRONG
@@ -136,6 +137,13 @@ class _Heard(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         self.said.append(record.getMessage())
+
+
+def _time_up(error: BaseException | None) -> _TimeUp | None:
+    """What ``error`` was made of or followed upon, if that is the end of the time."""
+    while error is not None and not isinstance(error, _TimeUp):
+        error = error.__cause__ or error.__context__
+    return error
 
 
 @contextmanager

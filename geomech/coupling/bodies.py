@@ -59,6 +59,7 @@ def elastic_bodies(
     def made(of: tuple) -> Body:
         b, own, material, old, work = of
         surface = None if problem.endless is None else problem.endless.surface
+        _check_pinches(blocks, b)
         return ddm.Body(
             [] if problem.endless is not None else blocks.loops(b),
             own,
@@ -73,6 +74,25 @@ def elastic_bodies(
 
     bodies.update(zip([of[0] for of in to_make], side_by_side(made, to_make)))
     return bodies, nodes_of
+
+
+def _check_pinches(blocks: Blocks, block: int) -> None:
+    """Raises `dda.NotConverged` where loops of ``block`` meet in a point, as where a crack frees a splinter beside the
+    surface that it has come from: rock that hangs by a point bears no stress there that elements could resolve."""
+    loops = blocks.loops(block)
+    if len(loops) == 1:
+        return
+    vertices = np.concatenate(loops)
+    _, first, times = np.unique(vertices, axis=0, return_index=True, return_counts=True)
+    if (times > 1).any():
+        from .. import dda
+
+        name = blocks.names[block] if blocks.names else f"block {block}"
+        x, y = vertices[first[times.argmax()]]
+        raise dda.NotConverged(
+            f"{name}: cracks leave rock that holds by a single point at ({x:.6g}, {y:.6g}): no body whose cracks can be "
+            "solved; try another growth.increment_m"
+        )
 
 
 def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:

@@ -193,3 +193,19 @@ def test_a_way_along_a_surface_goes_straight_across_to_it(degrees):
     mouth = grown.cracks.nodes[grown.cracks.surface]
     assert mouth[0] == pytest.approx([0.0, 1.0], abs=1e-12)
     ddm.Body([SQUARE], grown.cracks, ROCK)
+
+
+def test_the_end_of_the_time_is_found_below_the_errors_that_followed_upon_it():
+    from geomech.bench import fuzzed_slopes
+
+    try:
+        try:
+            try:
+                raise fuzzed_slopes._TimeUp("here")
+            except BaseException as up:
+                raise SystemError("returned a result with an exception set") from up
+        except SystemError:
+            raise ValueError("another") from None
+    except ValueError as error:
+        assert str(fuzzed_slopes._time_up(error)) == "here"
+    assert fuzzed_slopes._time_up(ValueError("none")) is None
