@@ -46,10 +46,11 @@ def measure(quick: bool = False) -> Measured:
     FOLDER.mkdir(parents=True, exist_ok=True)
     told = {"points": [asdict(p) for p in points], "quick": quick}
     write_json(FOLDER / "work_precision.json", told)
-    draw(
-        points, METHODS, FOLDER / "work_precision.png", (2, 2), lambda p: f"{p.size:g}",
-        ("relative error, better to the right", "time, ms"), None,
-    )  # fmt: skip
+    if not quick:
+        draw(
+            points, METHODS, FOLDER / "work_precision.png", (2, 2), lambda p: f"{p.size:g}",
+            ("relative error, better to the right", "time, ms"), None,
+        )  # fmt: skip
     named = [(f"{p.problem}, {p.method}: {p.size:g}", p) for p in points]
     return Measured.of(
         _table(points),

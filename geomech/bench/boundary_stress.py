@@ -166,10 +166,11 @@ def measure(quick: bool = False) -> Measured:
         "routes": rows, "quadratic_elements": elements, "time and error by order": [asdict(p) for p in points],
         "quick": quick,
     }  # fmt: skip
-    draw(
-        points, ROUTES, FOLDER / "work_precision.png", (1, 2), lambda p: f"p = {p.size}",
-        ("largest error of a stress intensity factor, better to the right", "a load step, bodies made anew, ms"), None,
-    )  # fmt: skip
+    if not quick:
+        draw(
+            points, ROUTES, FOLDER / "work_precision.png", (1, 2), lambda p: f"p = {p.size}",
+            ("largest error of a stress intensity factor, better to the right", "a load step, bodies made anew, ms"), None,
+        )  # fmt: skip
     write_json(FOLDER / "boundary.json", told)
     lines = [
         "How contact forces reach the cracks: errors of K against the crack solver alone under the exact tractions",

@@ -113,10 +113,11 @@ def measure(quick: bool = False) -> Measured:
         "processors": os.cpu_count(),
     }  # fmt: skip
     write_json(FOLDER / "coupling.json", written)
-    draw(
-        points, pass_tolerance.METHODS, FOLDER / "work_precision.png", (1, 2), lambda p: f"{p.size:g}",
-        ("error of a stress intensity factor, better to the right", "steps, ms"), None,
-    )  # fmt: skip
+    if not quick:
+        draw(
+            points, pass_tolerance.METHODS, FOLDER / "work_precision.png", (1, 2), lambda p: f"{p.size:g}",
+            ("error of a stress intensity factor, better to the right", "steps, ms"), None,
+        )  # fmt: skip
     lines = [
         "Coupling beside the blocks' own cost, a pass, when nothing grows (medians)",
         f"{'blocks':>8}{'cracked':>9}{'passes':>8}{'blocks ms':>11}{'coupling ms':>13}{'ratio':>8}   goal < {RATIO:g}",

@@ -81,9 +81,10 @@ def measure(quick: bool = False) -> Measured:
             if method == FIXED_STEPS:
                 errors[f"{kind}, {name}"] = abs(off)
         lines.append(text.rstrip())
-    draw(
-        points, (FIXED_STEPS, EVENTS), FOLDER / "work_precision.png", (1, 3), lambda p: f"{p.size:g} s",
-        ("error of the load against that of the longest steps to events, better to the right", "the whole run, ms"),
-        None,
-    )  # fmt: skip
+    if not quick:
+        draw(
+            points, (FIXED_STEPS, EVENTS), FOLDER / "work_precision.png", (1, 3), lambda p: f"{p.size:g} s",
+            ("error of the load against that of the longest steps to events, better to the right", "the whole run, ms"),
+            None,
+        )  # fmt: skip
     return Measured.of("\n".join(lines), errors=errors, times={name: row["seconds"] for name, row in rows.items()})

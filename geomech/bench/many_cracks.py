@@ -60,5 +60,6 @@ def measure(quick: bool = False) -> Measured:
         for way in ("iterated", "factored")
     }
     title = "Many cracks: matrices and solution"
-    draw_bars(ways, FOLDER / "many.png", "seconds of processor", title)
+    if not quick:
+        draw_bars(ways, FOLDER / "many.png", "seconds of processor", title)
     return Measured.of("\n".join(lines), errors=errors, times=times)

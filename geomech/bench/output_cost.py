@@ -83,10 +83,11 @@ def measure(quick: bool = False) -> Measured:
     ours = writers[OURS]
     spent_on = {f"one file of the blocks: {name}": 1e3 * spent for name, spent in writers.items()}
     spent_on |= {"all series, a cycle": 1e3 * found.processor, "a step after sudden weight": 1e3 * moving}
-    draw_bars(
-        {"ms": spent_on}, FOLDER / "output.png", "ms (files by the clock, cycles and steps of processor)",
-        f"Writing {found.blocks} blocks",
-    )  # fmt: skip
+    if not quick:
+        draw_bars(
+            {"ms": spent_on}, FOLDER / "output.png", "ms (files by the clock, cycles and steps of processor)",
+            f"Writing {found.blocks} blocks",
+        )  # fmt: skip
     lines = [
         (
             f"{found.blocks} blocks, {found.cells} triangles, {found.cycles} cycles written: "

@@ -89,7 +89,8 @@ def measure(quick: bool = False) -> Measured:
         "quick": quick,
     }  # fmt: skip
     write_json(FOLDER / "work_precision.json", written)
-    draw(points, METHODS, FOLDER / "work_precision.png")
+    if not quick:
+        draw(points, METHODS, FOLDER / "work_precision.png")
     own = [(f"{p.problem}, {p.method}: {p.size}", p) for p in (*points, *surface) if p.method not in METHODS[2:]]
     return Measured.of(
         _table([*points, *surface], growth, goals),
