@@ -36,8 +36,8 @@ def bear_in_blocks(
     enough: float = 1.0,
 ):
     """``cracks`` with those that are born in the most overstressed block, as a `Growth`, and the births; (None, ())
-    when no block is strained to ``enough`` times its strength; ``limits(block)``: loops about its rock. One block at a time: the others then carry other
-    loads."""
+    when no block is strained to ``enough`` times its strength; ``limits(block)``: loops about its rock. One block at a
+    time: the others then carry other loads."""
     from ..ddm.growth import Growth
     from ..ddm.initiation import bear
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .. import dda
 from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Motion, Problem, State
 from .side_by_side import side_by_side
@@ -85,8 +86,6 @@ def _check_pinches(blocks: Blocks, block: int) -> None:
     vertices = np.concatenate(loops)
     _, first, times = np.unique(vertices, axis=0, return_index=True, return_counts=True)
     if (times > 1).any():
-        from .. import dda
-
         name = blocks.names[block] if blocks.names else f"block {block}"
         x, y = vertices[first[times.argmax()]]
         raise dda.NotConverged(

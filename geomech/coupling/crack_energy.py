@@ -145,9 +145,9 @@ class CrackEnergy:
         by_mean_stress: ByMeanStress,
         stressed: bool = True,
     ) -> None:
-        """A pass of the present step, which blocks began ``stressed`` or not, has ended with ``tips``, of which some are about to grow, or none; ``felt`` is
-        block → the `ddm.Solution` that it is strained by, those ``by_mean_stress`` by no more than their mean
-        stress."""
+        """A pass of the present step, which blocks began ``stressed`` or not, has ended with ``tips``, of which some are
+        about to grow, or none; ``felt`` is block → the `ddm.Solution` that it is strained by, those ``by_mean_stress``
+        by no more than their mean stress."""
         tips = _felt_tips(tips, felt, by_mean_stress)
         self._strain_last = {block: of.crack_strain for block, of in felt.items() if block in by_mean_stress}
         if self._first is None:

@@ -25,7 +25,7 @@ from .budget_watch import BudgetWatch
 from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .elastic_range import ElasticRange
-from .endless import endless_pass, out_of_sight
+from .endless import out_of_sight, solved_pass
 from .event_steps import SETTLED, TOGETHER, EventSteps
 from .first_change import FirstChange
 from .growing import births, growth_of_tips, initiations, part_here, take_growth
@@ -175,7 +175,7 @@ class Coupling:
                     found = self.events.first_pass(now, self.problem.run.end_time)
                     dt = found.result.dt
                 else:
-                    found = self._pass(dt, load_time) if until is None else self._until(until)
+                    found = solved_pass(now, dt, load_time) if until is None else self._until(until)
             except dda.NotConverged as failure:
                 if not (stops or self._stops(pending)):
                     raise
@@ -267,9 +267,6 @@ class Coupling:
             self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1, until, whole)
             self.between()
         raise AssertionError("unreachable: the last pass takes no growth")
-
-    def _pass(self, dt: float, load_time: float | None) -> Balance:
-        return (balanced if self.problem.endless is None else endless_pass)(self.now, dt, load_time)
 
     def _until(self, until: float) -> Balance:
         """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of

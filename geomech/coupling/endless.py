@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import Cracks, EndlessRock, Event, State
-from ..model.polygon import winding_number
-from .balance import Balance
+from ..model.polygon import distance_to_edges, winding_number
+from .balance import Balance, balanced
 from .block_graph import ON_EDGE
 from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
@@ -21,7 +21,12 @@ from .splitting import divided
 from .tractions import BoundaryLoad
 
 
-def endless_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
+def solved_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
+    """A pass of blocks (`balanced`) or of rock without an end, whichever the problem has."""
+    return (balanced if now.problem.endless is None else _endless_pass)(now, dt, load_time)
+
+
+def _endless_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
     """A pass of at most ``dt`` s, or at the loads of ``load_time``. Of ``now`` loads and solutions are renewed."""
     with now.timed("dda"):
         result = now.system.step(now.state, now.problem.loads, dt, now.response, load_time, None)
@@ -58,11 +63,10 @@ def take_endless(now: CrackedBlocks, cracks: Cracks, state: State) -> tuple[Even
 def out_of_sight(now: CrackedBlocks, growth, state: State) -> tuple[Event, ...]:
     """An event where ``growth`` leads out of the window, beyond which nothing is shown and no mouth is found."""
     outline = now.blocks.loops(0)[0]
-    along = np.roll(outline, -1, axis=0) - outline
     for node in growth.cracks.nodes:
         if winding_number([outline], node) > 0.25:
             continue
-        share = np.clip(np.sum((node - outline) * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
-        if np.hypot(*(outline + share[:, None] * along - node).T).min() > ON_EDGE * np.ptp(outline, axis=0).max():
+        away = distance_to_edges(node, outline, np.roll(outline, -1, axis=0))
+        if away > ON_EDGE * np.ptp(outline, axis=0).max():
             return (event(now, "out of sight", state, node, "a crack grows out of the piece of rock that is drawn"),)
     return ()

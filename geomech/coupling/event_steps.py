@@ -20,10 +20,10 @@ import numpy as np
 
 from ..dda.excavation import until_next_event
 from ..model import History, Loads, Problem
-from .balance import Balance, balanced
+from .balance import Balance
 from .cracked_blocks import CrackedBlocks
 from .crossing import Crossing
-from .endless import endless_pass
+from .endless import solved_pass
 from .first_change import FOUND, FirstChange
 from .growing import drive
 
@@ -169,8 +169,7 @@ class EventSteps:
     def _solve(self, now: CrackedBlocks, time: float, free: bool = False) -> Balance:
         way = time - now.state.time
         # The length of a static step is no more than its inertia: short ones would hold the blocks back.
-        solved = balanced if now.problem.endless is None else endless_pass
-        found = solved(now, max(abs(way), self.time_step), None if free and way >= self.time_step else time)
+        found = solved_pass(now, max(abs(way), self.time_step), None if free and way >= self.time_step else time)
         way = found.result.state.time - now.state.time
         if way != 0:
             self._pace = found.result.statistics["max_displacement_ratio"] / abs(way)

@@ -79,8 +79,8 @@ def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Ev
 def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[str, float]) -> float:
     """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one. Where
     the block of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of
-    the step. In rock without an end the load is what leads there. Where the weight leads (`WEIGHT`), that of a column as high as the scene, ρ g h of the heaviest moving
-    rock, Pa."""
+    the step. In rock without an end the load is what leads there. Where the weight leads (`WEIGHT`), that of a column
+    as high as the scene, ρ g h of the heaviest moving rock, Pa."""
     if problem.endless is not None:
         return problem.endless.load_at(now)
     name = problem.load_edge

@@ -17,6 +17,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..model import Blocks, Problem
+from ..model.polygon import distance_to_edges
 from .tractions import BoundaryLoad
 
 _NONE: Mapping[int, BoundaryLoad] = MappingProxyType({})
@@ -76,7 +77,7 @@ class WaveTime:
             block = int(tips["block"][row])
             load = loads.get(block)
             lines = load.segments if load is not None and len(load.segments) else _outline(blocks, block)
-            time = _distance(tips["point"][row], lines) / float(speed[row])
+            time = distance_to_edges(tips["point"][row], lines[:, 0], lines[:, 1]) / float(speed[row])
             if time > dt:
                 found.append((row, time))
         return found
@@ -86,10 +87,3 @@ def _outline(blocks: Blocks, block: int) -> np.ndarray:
     """(n, 2, 2) m, all edges of ``block``, reference coordinates."""
     own = np.arange(blocks.vertex_start[block], blocks.vertex_start[block + 1])
     return np.stack([blocks.vertices[own], blocks.vertices[blocks.next_vertex[own]]], axis=1)
-
-
-def _distance(point: np.ndarray, lines: np.ndarray) -> float:
-    """m, from ``point`` (2,) to the nearest of ``lines`` (n, 2, 2)."""
-    along, arm = lines[:, 1] - lines[:, 0], point - lines[:, 0]
-    place = np.clip(np.sum(arm * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
-    return float(np.hypot(*(arm - place[:, None] * along).T).min())

@@ -211,11 +211,8 @@ class CentralPath:
         # Motions: what makes the gap and the motion along the edge 0 where no force acts.
         self._g, self._s = gap[some], -found.shear[some] / self._ks
         self._load = max(float(np.abs(right).max()), 1e-300)
-        self.epsilon = max(
-            _START * float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0, _LEAST_START
-        )
-        self._centre(self.epsilon * self._unit)
-        self.missed, self.ended, self._blocked, self._again, self._lone = 1.0, not len(some), 0, 0, 0
+        mean = float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0
+        self._begin(max(_START * mean, _LEAST_START))
 
     @property
     def blocked(self) -> bool:
@@ -231,6 +228,12 @@ class CentralPath:
     def unknowns(self) -> np.ndarray:
         """(6 n,) the motion at hand."""
         return self._unknowns
+
+    def _begin(self, epsilon: float) -> None:
+        """Begin with ``epsilon``, centred about the motion at hand."""
+        self.epsilon, self.missed, self.ended = epsilon, 1.0, not len(self._some)
+        self._blocked, self._again, self._lone = 0, 0, 0
+        self._centre(epsilon * self._unit)
 
     def _centre(self, epsilon: np.ndarray) -> None:
         """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""

@@ -4,8 +4,8 @@ A vertex meets the interior of an edge when its corner points away from the edge
 through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
 entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
 within the other's edge, or where they lean to each other by the one whose own face leans away; where each lies within
-the other's, the two corners are the ends of a short common face, and both stand for the line. Corners meet only if neither is nearer to a neighbour of the other: on outlines with edges
-shorter than the window, as cracks leave them, all are in reach of all, and the lines of far ones are crossed by blocks
+the other's, the two corners are the ends of a short common face, and both stand for the line. Corners meet only if
+neither is nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all are in reach of all, and the lines of far ones are crossed by blocks
 that do not touch. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
 smaller penetration carries the contact; each is stored as the other's *partner*.
 """

@@ -28,6 +28,8 @@ _START = 10.0
 _ROUND, _DECIDED, _MOST = 1e-3, 1e-9, 60
 #: They are in balance to this part of the loads by then; strengths are no less than this part of the loads.
 _BALANCED, _LEAST = 1e-4, 1e-9
+#: They go on while normal forces change by no more than this part of what they did so many rounds before.
+_FALLING, _ROUNDS = 0.7, 6
 
 
 class ConvexRounds(CentralPath):
@@ -36,38 +38,31 @@ class ConvexRounds(CentralPath):
     solutions = 0
 
     def rounds(self) -> Iterator[float]:
-        """Change of the normal forces over the forces (both as norms) round by round, for ever. Raises
-        numpy.linalg.LinAlgError."""
+        """Change of the normal forces over the forces (both as norms) round by round, while rounds get nearer to one
+        another. Raises numpy.linalg.LinAlgError."""
         rough, kn, unit = self._rough, self._kn, self._unit
-        friction, firm = self._mu, self._base
+        friction, firm = self._coulomb = self._mu, self._base
         self._rise = np.where(rough, friction, 0.0)
         self._begin(_START * self._pattern.n)
         self._descend(_ROUND)
         self._rise = np.zeros_like(kn)
         least = _LEAST * np.sqrt(unit * kn)
-        while True:
+        changes: list[float] = []
+        while len(changes) <= _ROUNDS or changes[-1] <= _FALLING * changes[-_ROUNDS - 1]:
             known = self._normal
-            strength = np.where(rough, np.maximum(friction * known + firm, least), firm)
-            self._mu, self._base = np.where(rough, 0.0, friction), strength
+            self._mu = np.where(rough, 0.0, friction)
+            self._base = np.where(rough, np.maximum(friction * known + firm, least), firm)
             self._begin(float(np.mean(known * known / kn / unit)))
             self._descend(_ROUND)
-            self._mu, self._base = friction, firm
-            self._held_at_strength = strength
             size = max(float(np.linalg.norm(self._normal)), 1e-300)
-            yield float(np.linalg.norm(self._normal - known)) / size
+            changes.append(float(np.linalg.norm(self._normal - known)) / size)
+            yield changes[-1]
 
     def decided(self) -> tuple[np.ndarray, np.ndarray]:
         """States and directions (n,) of the present round, taken to its end. Raises numpy.linalg.LinAlgError."""
-        coulomb = self._mu, self._base
-        self._mu, self._base = np.where(self._rough, 0.0, self._mu), self._held_at_strength
         self._descend(_DECIDED)
-        self._mu, self._base = coulomb
+        self._mu, self._base = self._coulomb
         return self.states()
-
-    def _begin(self, epsilon: float) -> None:
-        """Centre about the motion at hand."""
-        self.ended, self._blocked, self._again, self._lone, self.epsilon = False, 0, 0, 0, epsilon
-        self._centre(epsilon * self._unit)
 
     def _descend(self, epsilon: float) -> None:
         for _ in range(_MOST):

@@ -121,23 +121,29 @@ class LaggedFriction:
         self._contact_motion = np.zeros((n, 2))
         self.solutions = 0
 
-    def rounds(self) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
-        """(state (n,), direction (n,), largest change of a normal force over the largest) round by round. Raises
+    def rounds(self) -> Iterator[float]:
+        """Largest change of a normal force over the largest, round by round, for ever. Raises
         numpy.linalg.LinAlgError."""
         springs = self._springs
         force = np.maximum(0.0, self._found.normal)
         while True:
             strength = np.where(self._bonded, np.inf, springs.friction * force + springs.sliding)
             self._minimise(strength)
-            gap, trial = self._forces(self._contact_motion)
+            gap, _ = self._forces(self._contact_motion)
             # (A bond that pulls has no friction.)
             new = np.where(self._closed(gap), np.maximum(0.0, -springs.normal * gap), 0.0)
             moved = float(np.abs(new - force).max())
             change = moved / max(float(new.max(initial=0.0)), 1e-30 * moved, 1e-300)
             force = force + _WAY * (new - force)
-            slides = np.abs(trial) > strength
-            state = np.where(self._closed(gap), np.where(slides, SLIP, STICK), OPEN)
-            yield state, np.where(state == SLIP, np.sign(trial), 0.0), change
+            self._strength = strength
+            yield change
+
+    def decided(self) -> tuple[np.ndarray, np.ndarray]:
+        """States and directions (n,) of the present round."""
+        gap, trial = self._forces(self._contact_motion)
+        slides = np.abs(trial) > self._strength
+        state = np.where(self._closed(gap), np.where(slides, SLIP, STICK), OPEN)
+        return state, np.where(state == SLIP, np.sign(trial), 0.0)
 
     def _closed(self, gap: np.ndarray) -> np.ndarray:
         return _all_pushing(gap, self._bonded, self._found.partner, self._found.reach)

@@ -58,15 +58,12 @@ _FEW, _CAUTIOUS = 40, 12
 #: more than this part of the forces on blocks is out of balance. At its end, where ε is round-off, the first of these
 #: suffices: a wall of 100 000 bricks leaves twenty that hardly touch.
 _DECIDED, _LEFT, _LEFT_PART, _BALANCED = 0.006, 12, 2e-4, 1e-3
-#: A path of many blocks that has used up its iterations goes on while ε falls to this part within so many of them, up to so many
-#: times as far: what would follow takes hundreds.
+#: A path of many blocks that has used up its iterations goes on while ε falls to this part within so many of them, up
+#: to so many times as far: what would follow takes hundreds.
 _AHEAD, _LOOKED, _LONGER = 0.2, 5, 3
 #: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces
 #: change by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
 _PATIENCE, _CHANGE, _CLOSER, _NEARER, _SAME = 4, 2e-2, 0.2, 0.5, 1e-7
-#: Rounds of convex problems go on while normal forces change by no more than this part of what they did so many rounds
-#: before.
-_FALLING, _ROUNDS = 0.7, 6
 #: Iterations to go from such states to the end.
 _FINISH = 8
 
@@ -298,62 +295,54 @@ def _proposed(
     return None, len(epsilons)
 
 
-def _lagged(
-    equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
+def _by_rounds(
+    rounds: LaggedFriction | ConvexRounds, closer: float, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
-    """States that rounds of lagged friction propose once their normal forces hardly change, and the solutions spent
-    since the last; at most ``budget`` in all. Raises `Unsettled`."""
-    of = equations
-    friction = LaggedFriction(
-        of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded
-    )  # fmt: skip
+    """States that ``rounds`` propose once their normal forces hardly change, then whenever they do ``closer`` times as
+    little, and the solutions spent since the last; at most ``budget`` in all. Raises `Unsettled`."""
     told, bound = 0, _CHANGE
     try:
-        for state, direction, change in friction.rounds():
-            states = _States(state, direction, bonded)
-            if change < bound and states.key not in offered:
-                offered.add(states.key)
-                bound = _CLOSER * change
-                yield states, friction.solutions - told
-                told = friction.solutions
-            if friction.solutions > budget or change < _SAME:
+        for change in rounds.rounds():
+            if change < bound:
+                states = _States(*rounds.decided(), bonded)
+                if states.key not in offered:
+                    offered.add(states.key)
+                    bound = closer * change
+                    yield states, rounds.solutions - told
+                    told = rounds.solutions
+            if rounds.solutions > budget or change < _SAME:
                 return
     except np.linalg.LinAlgError as error:
         raise Unsettled(str(error)) from error
+
+
+def _lagged(
+    equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
+) -> Iterator[tuple[_States, int]]:
+    """States that rounds of lagged friction propose, and the solutions spent, see `_by_rounds`."""
+    of = equations
+    rounds = LaggedFriction(of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded)
+    return _by_rounds(rounds, _CLOSER, bonded, offered, budget)
 
 
 def _convex(
     equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
-    """As `_lagged`, by `ConvexRounds` while they get nearer to one another."""
+    """As `_lagged`, by rounds of convex problems, whose solutions are those of their paths."""
     of = equations
-    convex = ConvexRounds(
+    rounds = ConvexRounds(
         of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, of.found.normal
     )
-    told, bound, changes = 0, _CHANGE, []
-    try:
-        for change in convex.rounds():
-            changes.append(change)
-            if change < bound:
-                states = _States(*convex.decided(), bonded)
-                if states.key not in offered:
-                    offered.add(states.key)
-                    bound = _NEARER * change
-                    yield states, convex.solutions - told
-                    told = convex.solutions
-            wanders = len(changes) > _ROUNDS and change > _FALLING * changes[-_ROUNDS - 1]
-            if wanders or convex.solutions > 2 * budget or change < _SAME:
-                return
-    except np.linalg.LinAlgError as error:
-        raise Unsettled(str(error)) from error
+    return _by_rounds(rounds, _NEARER, bonded, offered, 2 * budget)
 
 
 def _slower(
     equations: _Equations, answer: _Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
     """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (in
-    statics of `_convex` before; neither knows of lift), and the solutions spent since the last. Where the matrix is dense a
-    hundred solutions cost little, and blocks that topple one by one go the surer way at once. Raises `Unsettled`."""
+    statics of `_convex` before; neither knows of lift), and the solutions spent since the last. Where the matrix is
+    dense a hundred solutions cost little, and blocks that topple one by one go the surer way at once. Raises
+    `Unsettled`."""
     of, told = equations, 0
     large = of.pattern.solver is not None
     if large:
@@ -392,9 +381,9 @@ def settle(
     curved: CurvedJoints | None = None,
     statics: bool = False,
 ) -> Settled:
-    """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix`` (n, 6, 6) and ``right`` (n, 6) are the
-    blocks' own part, ``springs`` and ``gap`` those of this step (dashpots included). ``curved`` joints bend them from
-    iteration to iteration. An iteration is a solution of the step's equations, those along the central path included.
+    """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix``
+    (n, 6, 6) and ``right`` (n, 6) are the blocks' own part, ``springs`` and ``gap`` those of this step (dashpots
+    included). ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations, those along the central path included.
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """

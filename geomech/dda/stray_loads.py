@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..model import GROUND, Blocks, Loads
-from ..model.polygon import winding_number
+from ..model.polygon import distance_to_edges, winding_number
 from .bolts import labels
 
 #: A point belongs to a block when it is no further outside than this part of the block's size …
@@ -67,16 +67,9 @@ class StrayLoads:
         name, loops = self._name(what, block), self._blocks.loops(block)
         if abs(winding_number(loops, at)) > 0.5:
             return
-        away = min(_distance(loop, at) for loop in loops)
+        away = min(distance_to_edges(at, loop, np.roll(loop, -1, axis=0)) for loop in loops)
         if away > max(_OF_BLOCK * float(np.ptp(loops[0], axis=0).max()), self._reach):
             raise ValueError(
                 f"{what} acts on {name!r} at ({at[0]:g}, {at[1]:g}), which lies {away:.3g} m outside of it: points are "
                 "given in the coordinates in which the blocks were drawn"
             )
-
-
-def _distance(loop: np.ndarray, point: np.ndarray) -> float:
-    """m from ``point`` (2,) to the outline ``loop`` (n, 2)."""
-    along = np.roll(loop, -1, axis=0) - loop
-    share = np.clip(np.sum((point - loop) * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)
-    return float(np.hypot(*(point - loop - share[:, None] * along).T).min())

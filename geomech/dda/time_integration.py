@@ -173,8 +173,8 @@ def assemble_blocks(
 
     Inertia and elasticity as in the head of this file, with velocity ``carried``, ``heavier`` 1/w, ``weight`` θ and σ₁
     = (C⁻¹ + S)⁻¹ (Δε + C⁻¹σ − offset + crack strain), which without Δε is σ unless cracks have grown, or their faces
-    have opened or closed: they do so over the step, and count as the rest does with θ; ∫ Tᵀρg; the strain rows' share ρω²∫xx, ∫yy, ∫xy of a spinning
-    block; the generalised forces ``load`` (n_blocks, 6) of whatever else acts; and damping: a viscous stress ∝ C Δε/dt
+    have opened or closed: they do so over the step, and count as the rest does with θ; ∫ Tᵀρg; the strain rows' share
+    ρω²∫xx, ∫yy, ∫xy of a spinning block; the generalised forces ``load`` (n_blocks, 6) of whatever else acts; and damping: a viscous stress ∝ C Δε/dt
     that gives a block's own vibration (taken as that of a square, ω² = 12 C₁₁/(ρ h²)) the part ``block_damping`` of
     critical damping, and Rayleigh's two.
     """

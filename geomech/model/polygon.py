@@ -50,6 +50,13 @@ def winding_number(loops: list[np.ndarray], point: np.ndarray) -> float:
     return total / (2 * np.pi)
 
 
+def distance_to_edges(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """m from ``point`` (2,) to the nearest of the edges from ``start`` to ``end`` (both (n, 2))."""
+    along, arm = end - start, point - start
+    share = np.clip(np.sum(arm * along, axis=1) / np.sum(along * along, axis=1), 0.0, 1.0)
+    return float(np.hypot(*(arm - share[:, None] * along).T).min())
+
+
 def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which of many loops are convex, once round, with finite and distinct vertices, and which turn counter-clockwise.
 

@@ -5,8 +5,8 @@ they leave on the other sides, and across the crack, is taken off by
 
     Φ = P/√z + Q + q/2,   Ω = P/√z − Q + q/2
 
-with the tip in z = 0, the crack along z < 0 and q(x) the polynomial that is minus the loads' traction there (its Taylor series about the lower side): the crack's
-faces are free whatever P and Q are, and these, polynomials with real coefficients made orthogonal on the outline
+with the tip in z = 0, the crack along z < 0 and q(x) the polynomial that is minus the loads' traction there (its
+Taylor series about the lower side): the crack's faces are free whatever P and Q are, and these, polynomials with real coefficients made orthogonal on the outline
 (Brubeck, Nakatsukasa & Trefethen 2021), are fitted to the rest by least squares. K_I = 2√(2π) P(0).
 """
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..conventions import outward_normal_of, traction
 from ..model import EndlessRock, Fluid, History
+from ..model.polygon import distance_to_edges
 from .drawing import Drawing
 from .errors import Check
 from .tables import SceneTables
@@ -152,11 +153,9 @@ def _ends(c: Check, zone: str) -> None:
     if name is not None:
         outline = np.setdiff1d(outline, blocks.edges_named(name))
     a, b = blocks.vertices[outline], blocks.vertices[blocks.next_vertex[outline]]
-    along = b - a
     for node in np.flatnonzero(cracks.surface).tolist():
         at = cracks.nodes[node]
-        share = np.clip(np.sum((at - a) * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
-        if np.hypot(*(a + share[:, None] * along - at).T).min() <= _STRAIGHT * np.ptp(blocks.vertices, axis=0).max():
+        if distance_to_edges(at, a, b) <= _STRAIGHT * np.ptp(blocks.vertices, axis=0).max():
             crack = cracks.names[cracks.crack[np.argmax((cracks.segments == node).any(axis=1))]]
             c.refuse(
                 c.drawing.path_of_crack(crack),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..conventions import outward_normal_of
+from ..model.polygon import distance_to_edges
 from .actions import traction_history
 from .checks import material_of
 from .errors import Check
@@ -188,7 +189,7 @@ def _near_misses(c: Check) -> None:
     for tip in cracks.tips.tolist():
         crack, block = int(cracks.crack[owner[tip]]), int(cracks.block[owner[tip]])
         own = np.flatnonzero(blocks.vertex_block == block)
-        gap = _distance(cracks.nodes[tip], blocks.vertices[own], blocks.vertices[blocks.next_vertex[own]])
+        gap = distance_to_edges(cracks.nodes[tip], blocks.vertices[own], blocks.vertices[blocks.next_vertex[own]])
         if gap < NEAR_MISS * length[crack]:
             x, y = cracks.nodes[tip]
             c.warn(
@@ -197,13 +198,6 @@ def _near_misses(c: Check) -> None:
                 f"{blocks.names[block]!r}, without touching it",
                 "end it on the outline if it reaches the surface; the bridge left is very thin",
             )
-
-
-def _distance(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
-    """From ``point`` to the nearest of the pieces from ``a`` (n, 2) to ``b`` (n, 2)."""
-    along = b - a
-    share = np.clip(((point - a) * along).sum(axis=1) / (along * along).sum(axis=1), 0, 1)
-    return float(np.hypot(*(point - a - share[:, None] * along).T).min())
 
 
 def _strain(c: Check) -> None:
