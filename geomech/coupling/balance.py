@@ -12,7 +12,7 @@ from .. import dda
 from ..dda import StepResult
 from ..model import TIP, Motion, State
 from .bodies import boundary_loads, threads_for, tip_rows
-from .compliance import crack_response, passive, strain_rotation, stress_rotation
+from .compliance import crack_responses, passive, stress_rotations, times
 from .cracked_blocks import CrackedBlocks
 from .settling import Settling
 from .side_by_side import side_by_side
@@ -151,26 +151,31 @@ def _take_response(
     """What the next pass should assume, and how far off the last assumption was in each cracked block (relative
     strain). Sets what the next step should begin with."""
     blocks = np.array(list(now.bodies), int)
-    with now.timed("compliance"):
+    with now.timed("ddm solve"):
         answers = _answers(now, state)
+    with now.timed("compliance"):
         own = side_by_side(lambda of: _compliance(now, *of), list(answers.items()), threads_for(now.bodies))
         now.compliances.update(zip(answers, own))
         again, after = (dda.CrackResponse(now.response.compliance.copy(), now.response.offset.copy()) for _ in range(2))
+        known = np.array([now.compliances[b][2] for b in answers])
+        strain = np.array([answer.crack_strain for answer in answers.values()])
+        hang = [k for k, b in enumerate(answers) if b in now.by_mean_stress]
+        if hang:
+            limits = (
+                now.by_mean_stress.limit(b, now.bodies[b], now.system.compliance[b]) for b in blocks[hang].tolist()
+            )
+            limit = np.array(list(limits))
+            turned = limit.transpose(0, 2, 1)
+            known[hang], strain[hang] = turned @ known[hang] @ limit, times(turned, strain[hang])
         # Blocks assume what they do in the axes in which a step begins, and carry it along as they turn.
-        stress, assumed = np.empty((2, len(blocks), 3))
-        for k, (b, answer) in enumerate(answers.items()):
-            known, strain = now.compliances[b][2], answer.crack_strain
-            if b in now.by_mean_stress:
-                limit = now.by_mean_stress.limit(b, now.bodies[b], now.system.compliance[b])
-                known, strain = limit.T @ known @ limit, limit.T @ strain
-            began, ends = float(now.state.rotation[b]), float(state.rotation[b])
-            stress[k] = stress_rotation(began - ends) @ state.stress[b]
-            assumed[k] = strain_rotation(began - ends) @ state.crack_strain[b]
-            again.compliance[b], again.offset[b] = crack_response(known, strain, stress[k], began)
-            after.compliance[b], after.offset[b] = crack_response(known, strain, state.stress[b], ends)
-        found = again.offset[blocks] + (again.compliance[blocks] @ stress[..., None])[..., 0]
+        began, ends = now.state.rotation[blocks], state.rotation[blocks]
+        stress = times(stress_rotations(began - ends), state.stress[blocks])
+        assumed = times(stress_rotations(ends - began).transpose(0, 2, 1), state.crack_strain[blocks])
+        again.compliance[blocks], again.offset[blocks] = crack_responses(known, strain, stress, began)
+        after.compliance[blocks], after.offset[blocks] = crack_responses(known, strain, state.stress[blocks], ends)
+        found = again.offset[blocks] + times(again.compliance[blocks], stress)
         residual = found - assumed
-        elastic = (now.system.compliance[blocks] @ stress[..., None])[..., 0]
+        elastic = times(now.system.compliance[blocks], stress)
         size = np.abs(elastic).max(axis=1) + np.abs(found).max(axis=1)
         size = np.maximum(size, STILL * size.max())
         if not size.any():
@@ -192,8 +197,9 @@ def _answers(now: CrackedBlocks, state: State) -> dict:
             return now.solutions[block]
         body, began = now.bodies[block], now.history.get(block)
         return now.by_mean_stress.answer(
-            block, body, state.stress[block], float(state.rotation[block]), now.system.compliance[block], began
-        )
+            block, body, state.stress[block], float(state.rotation[block]), now.system.compliance[block], began,
+            now.problem.run.skip,
+        )  # fmt: skip
 
     return {block: answer(block) for block in now.bodies}
 

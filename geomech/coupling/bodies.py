@@ -242,12 +242,20 @@ def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[i
     """TIP rows of all solved bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
     if not solutions:
         return np.empty(0, TIP)
-    from ..ddm.trial_kinks import judged
+    from ..ddm.trial_kinks import judged, judged_rows
 
-    rows = []
-    for b, solution in solutions.items():
+    rows, of = [], list(solutions.items())
+    for b, solution in of:
         tips = solution.tips.copy()
         tips["node"] = nodes_of[b][tips["node"]]
-        tips["angle"], tips["k_eq"] = judged(solution, problem.growth, problem.materials[blocks.material[b]])
         rows.append(tips)
-    return rows[0] if len(rows) == 1 else np.concatenate(rows)
+    tips = rows[0] if len(rows) == 1 else np.concatenate(rows)
+    if problem.growth.trial_kink > 0:
+        angle, k_eq = zip(*(judged(each, problem.growth, problem.materials[blocks.material[b]]) for b, each in of))
+        tips["angle"], tips["k_eq"] = np.concatenate(angle), np.concatenate(k_eq)
+        return tips
+    rock = blocks.material[tips["block"]]
+    for m in np.unique(rock).tolist():
+        own = rock == m
+        tips["angle"][own], tips["k_eq"][own] = judged_rows(tips[own], problem.growth, problem.materials[m])
+    return tips

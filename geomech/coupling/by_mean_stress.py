@@ -30,6 +30,7 @@ from .compliance import stress_rotation
 
 if TYPE_CHECKING:
     from ..ddm import Body, FaceMemory, Solution
+    from ..ddm.even_stress import EvenSolution
 
 #: At rest a block hangs from where its cracks, were they all open, make it so many times softer than its rock in some
 #: direction. (An edge crack through half of a square adds 4.)
@@ -45,7 +46,7 @@ SOFTEST = 30.0
 class ByMeanStress:
     """The blocks that do, and the solutions of their bodies under the mean stress of the last pass (block →)."""
 
-    solutions: dict[int, Solution] = field(default_factory=dict)
+    solutions: dict[int, Solution | EvenSolution] = field(default_factory=dict)
     #: What crack faces with friction remember of these solutions at the end of the last step.
     _memory: dict[int, FaceMemory] = field(default_factory=dict)
     #: The mean stress of the last pass, in the block's own axes, Pa, and its `limit` then.
@@ -90,16 +91,22 @@ class ByMeanStress:
         rotation: float,
         elastic: np.ndarray,
         began: FaceMemory | None = None,
-    ) -> Solution:
+        skip: bool = True,
+    ) -> Solution | EvenSolution:
         """The solution of ``body``, which has turned by ``rotation`` rad, under what its `limit` leaves of its mean
-        ``stress`` (3,), Pa, current axes. Faces begin with what they remember of such solutions, or with ``began``
-        where there is none. Raises `ddm.NotConverged`."""
+        ``stress`` (3,), Pa, current axes; scaled from unit ones where that is enough and nothing is to be worked out
+        anew (``skip``). Faces begin with what they remember of such solutions, or with ``began`` where there is none.
+        Raises `ddm.NotConverged`."""
         from .. import ddm
+        from ..ddm.even_stress import scaled
 
         own = stress_rotation(-rotation) @ stress
         limit = self.limit(block, body, elastic)
-        load = ddm.BodyLoad(remote_stress=limit @ own)
-        known = body.solve(load, warm=self.solutions.get(block), history=self._memory.get(block, began))
+        before, even = self.solutions.get(block), limit @ own
+        known = scaled(body, even, before) if skip else None
+        if known is None:
+            load = ddm.BodyLoad(remote_stress=even)
+            known = body.solve(load, warm=before, history=self._memory.get(block, began))
         self.solutions[block], self.stress[block] = known, (own, limit)
         return known
 

@@ -22,17 +22,21 @@ def stress_rotation(angle: float) -> np.ndarray:
     return np.array([[c * c, s * s, -2 * s * c], [s * s, c * c, 2 * s * c], [s * c, -s * c, c * c - s * s]])
 
 
+def stress_rotations(angle: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) `stress_rotation` of every ``angle`` (n,)."""
+    c, s = np.cos(angle), np.sin(angle)
+    cc, ss, sc = c * c, s * s, s * c
+    out = np.empty((len(c), 3, 3))
+    out[:, 0, 0] = out[:, 1, 1] = cc
+    out[:, 0, 1] = out[:, 1, 0] = ss
+    out[:, 2, 0], out[:, 2, 1], out[:, 2, 2] = sc, -sc, cc - ss
+    out[:, 0, 2], out[:, 1, 2] = -2 * sc, 2 * sc
+    return out
+
+
 def strain_rotation(angle: float) -> np.ndarray:
     """The same for strain with engineering shear: Q⁻ᵀ, since σ·ε does not change; Q⁻¹ turns back."""
     return stress_rotation(-angle).T
-
-
-def turned_compliance(compliance: np.ndarray, angle: float) -> np.ndarray:
-    """S (3, 3) of a body that has turned by ``angle`` rad."""
-    if angle == 0.0:
-        return compliance
-    back = stress_rotation(-angle)
-    return back.T @ compliance @ back
 
 
 def passive(compliance: np.ndarray) -> np.ndarray:
@@ -56,5 +60,21 @@ def crack_response(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(S, offset) in current axes from ``compliance`` and ``crack_strain`` in the block's reference axes and the mean
     ``stress`` (current axes) at which the crack strain was found."""
-    s = turned_compliance(compliance, angle)
-    return s, strain_rotation(angle) @ crack_strain - s @ stress
+    parts = (np.asarray(part)[None] for part in (compliance, crack_strain, stress, angle))
+    s, offset = crack_responses(*parts)
+    return s[0], offset[0]
+
+
+def crack_responses(
+    compliance: np.ndarray, crack_strain: np.ndarray, stress: np.ndarray, angle: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """`crack_response` of blocks, (n, 3, 3), (n, 3), (n, 3) and (n,)."""
+    back = stress_rotations(-angle)
+    turned = back.transpose(0, 2, 1)
+    s = turned @ compliance @ back
+    return s, times(turned, crack_strain) - times(s, stress)
+
+
+def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """(n, 3) every matrix (n, 3, 3) times its vector (n, 3)."""
+    return (matrices @ vectors[..., None])[..., 0]

@@ -22,6 +22,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -47,17 +49,32 @@ def _add(sums: dict[int, float], block: int, energy: float) -> None:
     sums[block] = sums.get(block, 0.0) + energy
 
 
-def _felt_tips(tips: np.ndarray, felt: dict[int, Solution], by_mean_stress: ByMeanStress) -> np.ndarray:
-    """``tips`` with the K that the mean stress brings in blocks that feel no more."""
-    blocks = [block for block in np.unique(tips["block"]).tolist() if block in by_mean_stress]
-    if not blocks:
-        return tips
-    out = tips.copy()
-    for block in blocks:
-        own = tips["block"] == block
-        for name in ("k_i", "k_ii"):
-            out[name][own] = felt[block].tips[name]
-    return out
+class _FeltTips:
+    """``tips`` with the K that the mean stress brings in blocks that feel no more, ``felt`` by the blocks ``hang`` (block
+    → solution); found when something grows."""
+
+    def __init__(self, tips: np.ndarray, hang: dict[int, Solution]) -> None:
+        self._tips, self._hang = tips, hang
+
+    def __getstate__(self) -> dict[str, np.ndarray]:
+        return {"rows": self.rows}
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(n_tips,) TIP."""
+        out = self._tips.copy()
+        for first, last in _runs(out["block"]):
+            solution = self._hang.get(int(out["block"][first]))
+            if solution is not None:
+                for name in ("k_i", "k_ii"):
+                    out[name][first:last] = solution.tips[name]
+        return out
+
+
+def _runs(number: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Where rows of one ``number`` (n,) begin and end; those of a block stand together."""
+    marks = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
+    return pairwise(marks) if len(number) else iter(())
 
 
 def _kink_release(tips: np.ndarray) -> np.ndarray:
@@ -128,9 +145,9 @@ class CrackEnergy:
     _rested: dict[int, Solution] = field(default_factory=dict)
     _taken: dict[int, float] = field(default_factory=dict)
     #: Tips with K as it is felt, as the present step began, in its first pass and in its last one.
-    _began: np.ndarray | None = None
-    _first: np.ndarray | None = None
-    _last: np.ndarray | None = None
+    _began: _FeltTips | None = None
+    _first: _FeltTips | None = None
+    _last: _FeltTips | None = None
     #: … and the crack strains of blocks that feel their mean stress.
     _strain_began: dict[int, np.ndarray] = field(default_factory=dict)
     _strain_first: dict[int, np.ndarray] = field(default_factory=dict)
@@ -148,17 +165,18 @@ class CrackEnergy:
         """A pass of the present step, which blocks began ``stressed`` or not, has ended with ``tips``, of which some are
         about to grow, or none; ``felt`` is block → the `ddm.Solution` that it is strained by, those ``by_mean_stress``
         by no more than their mean stress."""
-        tips = _felt_tips(tips, felt, by_mean_stress)
-        self._strain_last = {block: of.crack_strain for block, of in felt.items() if block in by_mean_stress}
+        hang = {block: of for block, of in felt.items() if block in by_mean_stress}
+        self._strain_last = {block: of.crack_strain for block, of in hang.items()}
+        self._last = _FeltTips(tips, hang)
         if self._first is None:
-            self._first, self._strain_first = tips, self._strain_last
-        self._last = tips
+            self._first, self._strain_first = self._last, self._strain_last
         if not len(tips):
             self._parted |= bool(self._growing)
             self._growing, self._limited = {}, {}
             return
         if not (self._growing or (tips["grown"] > 0).any()):
             return
+        tips = self._last.rows
         rock = blocks.material[tips["block"]]
         modulus = np.array([m.plane_modulus for m in materials])[rock]
         hangs = np.array([block in by_mean_stress for block in tips["block"].tolist()])
@@ -209,12 +227,13 @@ class CrackEnergy:
         step began, 0 where it has turned about. Passes grow tips by the load of the step's end, but they grow all the
         time; forces that rise by a part of themselves would release that part too much."""
         if self._began is None and self._first is not None and not stressed:
-            return dict.fromkeys(_keys(self._first), 0.0)
+            return dict.fromkeys(_keys(self._first.rows), 0.0)
         if self._began is None or self._first is None:
             return {}
-        before = {key: (row["k_i"], row["k_ii"]) for key, row in zip(_keys(self._began), self._began)}
+        began, first = self._began.rows, self._first.rows
+        before = {key: (row["k_i"], row["k_ii"]) for key, row in zip(_keys(began), began)}
         shares = {}
-        for key, row in zip(_keys(self._first), self._first):
+        for key, row in zip(_keys(first), first):
             size = row["k_i"] ** 2 + row["k_ii"] ** 2
             if key in before and size > 0:
                 k_i, k_ii = before[key]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,7 @@ def record(
     if endless is not None:
         state = replace(state, stress=np.broadcast_to(endless.stress_at(state.time), state.stress.shape).copy())
     work = vars(Work.total(now.works)) if now.works else {}
-    cycle = Cycle(
+    cycle = _Told(
         number=now.number,
         load_step=now.load_step,
         growth_pass=growth_pass,
@@ -37,7 +38,6 @@ def record(
         state=state,
         cracks=now.cracks,
         tips=tips,
-        faces=joined_faces(now.cracks, solutions),
         bodies=solutions,
         events=tuple(events),
         monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in now.monitors.items()},
@@ -47,7 +47,16 @@ def record(
         skips=skips(now, work),
     )
     vars(cycle)["motion"] = motion  # known here: the property need not find it again
+    del vars(cycle)["faces"]  # found when somebody asks for them
     return cycle
+
+
+class _Told(Cycle):
+    """A cycle whose crack faces are put together when they are asked for."""
+
+    @cached_property
+    def faces(self) -> CrackFaces | None:
+        return joined_faces(self.cracks, self.bodies)
 
 
 def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
@@ -63,6 +72,7 @@ def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
         found |= {
             "bodies": Skip(work["bodies_kept"], work["bodies"], seconds.get("ddm assembly", 0.0)),
             "solutions": Skip(work["solutions_kept"], work["solutions"], seconds.get("ddm solve", 0.0)),
+            "scaled solutions": Skip(work["solutions_scaled"], work["solutions"], seconds.get("ddm solve", 0.0)),
             "compliances": Skip(
                 work["compliances_kept"], work["compliances"] - 1, now.each.seconds.get("compliances", 0.0)
             ),

@@ -28,6 +28,7 @@ from .boundary import BoundarySystem
 from .boundary_iteration import is_iterated
 from .contact import settle_faces
 from .crack_system import CrackSystem
+from .even_stress import EvenResponse, even_response, scales
 from .face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
 from .friction import FaceEquations
 from .functionals import TipFunctionals
@@ -137,6 +138,8 @@ class Body:
         self._functionals: tuple[tuple, TipFunctionals] | None = None
         #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}
+        #: How cracks answer to an even stress, by the states of their faces (`even_stress`).
+        self.even: dict[bytes, EvenResponse] = {}
         #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`bases`).
         self.on_bases: dict[bytes, object] = {}
         self._assemble(previous, holds, many)
@@ -439,6 +442,10 @@ class Body:
             raise ValueError("the compliance that cracks add is that of a body without supports")
         if not self.faces.n:
             return np.zeros((3, 3))
+        if scales(self):
+            closed = np.zeros(self.faces.n_unknowns, bool) if sol is None else sol.closed
+            response = self.strain_weights @ even_response(self, closed).jumps[:, :3]
+            return 0.5 * (response + response.T)
         right = np.column_stack([-on_elements(self.faces, unit) for unit in np.eye(3)])
         try:
             jumps = self._jumps_of(right, sol)

@@ -34,10 +34,17 @@ DIRECTIONS = np.radians(np.arange(-120.0, 121.0, 10.0))
 def judged(solution: Solution, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
     """(n_tips,) angle and K_eq of the tips of ``solution`` by the criterion that ``growth`` asks for. Raises
     ValueError where it is none, or one that trial kinks know nothing of."""
-    check_criterion(growth)
     if growth.trial_kink > 0:
+        check_criterion(growth)
         return driven(solution, growth.trial_kink, material)
-    return CRITERIA[growth.criterion](solution.tips["k_i"], solution.tips["k_ii"], material)
+    return judged_rows(solution.tips, growth, material)
+
+
+def judged_rows(tips: np.ndarray, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """(n_tips,) the same of TIP rows, of one or many bodies, by a criterion that asks for no more than K. Raises
+    ValueError where there is none."""
+    check_criterion(growth)
+    return CRITERIA[growth.criterion](tips["k_i"], tips["k_ii"], material)
 
 
 def check_criterion(growth: GrowthSettings) -> None:
