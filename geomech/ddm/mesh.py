@@ -19,7 +19,7 @@ import numpy as np
 
 from ..model import Cracks, DdmSettings
 from ..model.polygon import signed_area
-from . import shapes
+from .crack_nodes import cut, ends_at, share_ends, straight_on
 from .grading import KINK, Grading
 from .half_plane import ON_SURFACE, HalfPlane
 from .influence import ElementSet
@@ -88,7 +88,7 @@ def mesh(
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
     source[len(boundary[0]) :] += len(edges)
     pieces = np.concatenate([edges, cracks.nodes[cracks.segments]])
-    touching, n_pieces = _touching(sides[2], edges, cracks, extent), len(pieces)
+    touching, n_pieces = _touching(sides[2], pieces, len(edges), cracks, extent), len(pieces)
     if half_plane is not None:
         (start, end, pieces), kind, source, touching = _with_images(
             half_plane, (start, end, pieces), kind, source, touching, ON_SURFACE * extent
@@ -270,59 +270,39 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     count = np.maximum(1, np.rint(settings.elements_per_crack * share).astype(int))
     layers = _node_layers(cracks, length / count, grading, edges)
     inner: list[float] = []
-    pieces = np.ones(n, int)
+    pieces = np.ones(n, np.int64)
     for s in np.flatnonzero((count > 1) | layers.any(axis=1)).tolist():
         m, (at_start, at_end) = int(count[s]), layers[s].tolist()
         if m == 1 and at_start and at_end:
             m = 2
-        a, b = cracks.nodes[cracks.segments[s]]
-        part = m / length[s]
-        fine = grading.fractions(at_start, grading.finest(a, length[s], extent) * part) + list(range(1, m))
-        fine += [m - f for f in grading.fractions(at_end, grading.finest(b, length[s], extent) * part)][::-1]
+        a, b = cracks.nodes[cracks.segments[s]].tolist()
+        long = float(length[s])
+        part = m / long
+        fine = list(range(1, m))
+        if at_start:
+            fine = grading.fractions(at_start, grading.finest(a, long, extent) * part) + fine
+        if at_end:
+            fine += [m - f for f in grading.fractions(at_end, grading.finest(b, long, extent) * part)][::-1]
         inner += [q / m for q in fine]
         pieces[s] += len(fine)
-    return (*_cut(cracks, pieces, np.array(inner)[:, None]), np.repeat(np.arange(n), pieces))
-
-
-def _cut(cracks: Cracks, pieces: np.ndarray, inner: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Start, end and kind of the elements of all segments, ``pieces`` (n_segments,) of each; ``inner`` (m, 1) are the
-    fractions of the segments, one after the other, where they are cut."""
-    total = int(pieces.sum())
-    last = np.cumsum(pieces) - 1
-    first = last - pieces + 1
-    a, b = cracks.nodes[cracks.segments[:, 0]], cracks.nodes[cracks.segments[:, 1]]
-    at = np.repeat(np.arange(len(pieces)), pieces - 1)
-    points = (1 - inner) * a[at] + inner * b[at]
-    start, end, kind = np.empty((total, 2)), np.empty((total, 2)), np.full(total, shapes.ORDINARY)
-    follows, goes_on = np.ones(total, bool), np.ones(total, bool)
-    follows[first] = goes_on[last] = False
-    start[first], start[follows], end[last], end[goes_on] = a, points, b, points
     tip = np.zeros(len(cracks.nodes), bool)
     tip[cracks.tips] = True
-    from_tip, to_tip = tip[cracks.segments].T
-    kind[first[from_tip]] = shapes.TIP_START
-    kind[last[to_tip]] = shapes.TIP_END
-    kind[first[from_tip & to_tip & (pieces == 1)]] = shapes.TIP_BOTH
-    return start, end, kind
+    nodes, segments = np.ascontiguousarray(cracks.nodes), np.ascontiguousarray(cracks.segments, dtype=np.int64)
+    return cut(nodes, segments, tip, pieces, np.array(inner, dtype=float))
 
 
 def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
     """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
     layers = np.zeros((cracks.n_segments, 2), int)
-    step = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
-    headings = np.arctan2(step[:, 1], step[:, 0])
-    plain = _straight_through(cracks, headings, size) if grading.target is None else np.zeros(len(cracks.nodes), bool)
-    ends: list[list[tuple[int, int]]] = [[] for _ in range(len(cracks.nodes))]
-    for s, (i, j) in enumerate(cracks.segments.tolist()):
-        ends[i].append((s, 0))
-        ends[j].append((s, 1))
-    heading = headings.tolist()
-    closed = _closed(cracks).tolist()
-    surface, crack, size = cracks.surface.tolist(), cracks.crack.tolist(), size.tolist()
+    closed, crack, surface = _closed(cracks), cracks.crack, cracks.surface
+    first, ends = ends_at(cracks)
+    plain = (cracks.valence == 0) | ((cracks.valence == 1) & ~surface)
+    if grading.target is None:
+        nodes, segments = np.ascontiguousarray(cracks.nodes), np.ascontiguousarray(cracks.segments, dtype=np.int64)
+        # Well below what counts, which round-off does not decide here.
+        plain |= straight_on(nodes, segments, crack, surface, size, closed, first, ends, 0.9 * KINK, 0.9 * JUMP)
     for node in np.flatnonzero(~plain).tolist():
-        here = ends[node]
-        if not here or (len(here) == 1 and not surface[node]):
-            continue
+        here = [divmod(end, 2) for end in ends[first[node] : first[node + 1]].tolist()]
         if len(here) != 2 or surface[node] or crack[here[0][0]] != crack[here[1][0]]:
             deep = _layers_at(cracks, node, edges, grading)
             for at in here:
@@ -332,37 +312,26 @@ def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.n
         else:
             (s, e), (r, f) = here
             # Straight on means that one arrives where the other leaves.
-            turn = abs(math.remainder(heading[s] - heading[r] + (math.pi if e == f else 0.0), 2 * math.pi))
+            turn = _heading(cracks, s) - _heading(cracks, r) + (math.pi if e == f else 0.0)
+            turn = abs(math.remainder(turn, 2 * math.pi))
             if closed[s] and closed[r]:
                 deep = grading.at_closed_kink(turn)
             else:
-                deep = grading.at_kink(turn, KINK < turn and _forgotten(cracks, ends, here))
+                deep = grading.at_kink(turn, KINK < turn and _forgotten(cracks, first, ends, here))
             if deep:
                 layers[s, e] = layers[r, f] = deep
-        least = min(size[s] for s, _ in here)
+        least = min(float(size[s]) for s, _ in here)
         for at in here:
             if size[at[0]] > JUMP * least:
-                needed = round(math.log(least / size[at[0]]) / math.log(grading.ratio))
+                needed = round(math.log(least / float(size[at[0]])) / math.log(grading.ratio))
                 layers[at] = max(layers[at], needed) if grading.target is None else layers[at] + needed
     return layers
 
 
-def _straight_through(cracks: Cracks, heading: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """(n_nodes,) bool: nodes at which a crack of elements of like ``size`` (n_segments,) goes on without a kink, or
-    nearly so."""
-    out = np.zeros(len(cracks.nodes), bool)
-    flat = cracks.segments.ravel()
-    order = np.argsort(flat, kind="stable")
-    first = np.flatnonzero((cracks.valence[flat[order]] == 2) & ~cracks.surface[flat[order]])[::2]
-    one, two = order[first], order[first + 1]
-    s, r = one // 2, two // 2
-    turn = heading[s] - heading[r] + np.where(one % 2 == two % 2, np.pi, 0.0)
-    turn = np.abs(turn - 2 * np.pi * np.rint(turn / (2 * np.pi)))
-    # Well below what counts, which round-off does not decide here.
-    alike = np.maximum(size[s], size[r]) < 0.9 * JUMP * np.minimum(size[s], size[r])
-    closed = _closed(cracks)
-    out[flat[one]] = (turn < 0.9 * KINK) & alike & (cracks.crack[s] == cracks.crack[r]) & ~(closed[s] & closed[r])
-    return out
+def _heading(cracks: Cracks, segment: int) -> float:
+    """The direction of a segment, rad."""
+    (ax, ay), (bx, by) = cracks.nodes[cracks.segments[segment]].tolist()
+    return math.atan2(by - ay, bx - ax)
 
 
 def _closed(cracks: Cracks) -> np.ndarray:
@@ -400,16 +369,17 @@ def wedges(cracks: Cracks, node: int, edges: np.ndarray) -> np.ndarray:
     return np.diff(np.sort(np.r_[0.0, turn, np.mod(last - first, 2 * np.pi)]))
 
 
-def _forgotten(cracks: Cracks, ends, here) -> bool:
-    """Whether the chain that grew from a kink has left it ``FORGOTTEN`` increments behind."""
+def _forgotten(cracks: Cracks, first: np.ndarray, ends: np.ndarray, here) -> bool:
+    """Whether the chain that grew from a kink has left it ``FORGOTTEN`` increments behind; ``first`` and ``ends`` as of
+    `ends_at`."""
     s, e = max(here, key=lambda at: cracks.birth_cycle[at[0]])
     if cracks.birth_cycle[s] == 0:
         return False
     for _ in range(FORGOTTEN - 1):
         node = cracks.segments[s, 1 - e]
-        if len(ends[node]) != 2:
+        if first[node + 1] - first[node] != 2:
             return False
-        s, e = next(at for at in ends[node] if at[0] != s)
+        s, e = next(divmod(int(at), 2) for at in ends[first[node] : first[node + 1]] if at // 2 != s)
     return True
 
 
@@ -429,23 +399,15 @@ def _straight_on(loops: list[np.ndarray]) -> np.ndarray | None:
     return np.concatenate([np.cumsum(bend) % max(bend.sum(), 1) + n_edges * k for k, bend in enumerate(bends)])
 
 
-def _touching(side: np.ndarray | None, edges: np.ndarray, cracks: Cracks, extent: float) -> np.ndarray:
-    """(m, m) which edges and segments meet in a node; edges of one ``side`` (`_straight_on`) count as one."""
-    n_edges, n = len(edges), len(edges) + cracks.n_segments
-    out = np.eye(n, dtype=bool)
-    ends = np.concatenate([edges, cracks.nodes[cracks.segments]]) if n else np.empty((0, 2, 2))
+def _touching(side: np.ndarray | None, pieces: np.ndarray, n_edges: int, cracks: Cracks, extent: float) -> np.ndarray:
+    """(m, m) which of ``pieces`` (m, 2, 2), edges and segments, meet in a node; edges of one ``side`` (`_straight_on`)
+    count as one."""
     # Nodes by coordinates, so that corners, junctions and drawn end points that coincide count alike.
-    flat = np.ascontiguousarray(ends.reshape(-1, 2)) + 0.0
-    _, number = np.unique(flat.view(complex).ravel(), return_inverse=True)
-    at_node = np.argsort(number, kind="stable")
-    for step in range(1, int(np.bincount(number).max()) if n else 0):
-        one, other = at_node[:-step], at_node[step:]
-        meet = number[one] == number[other]
-        out[one[meet] // 2, other[meet] // 2] = out[other[meet] // 2, one[meet] // 2] = True
+    out = share_ends(pieces)
     if side is not None:
         out[:n_edges, :n_edges] |= side[:, None] == side
-    if n_edges and cracks.n_segments:
-        a, d = edges[:, 0], edges[:, 1] - edges[:, 0]
+    if n_edges and cracks.surface.any():
+        a, d = pieces[:n_edges, 0], pieces[:n_edges, 1] - pieces[:n_edges, 0]
         length = np.hypot(*d.T)
         for s, at in zip(*np.nonzero(cracks.surface[cracks.segments])):
             rel = cracks.nodes[cracks.segments[s, at]] - a

@@ -157,7 +157,7 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
     if ratio >= FINE:  # acute angles then ask for nothing besides
         beside, meeting = np.inf, touching.astype(float)
     else:
-        beside, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges)
+        beside, meeting = LOW if unknowns <= 6 else 1.0, _meeting(pieces, touching, n_edges, np.cos(ACUTE))
     span = np.hypot(*(pieces[:, 1] - pieces[:, 0]).T)
     images = len(pieces) if images is None else images
     most = max(4 * len(start), MOST_UNKNOWNS // unknowns)
@@ -180,17 +180,29 @@ def keep_apart(start, end, kind, source, pieces, touching, n_edges, ratio, exten
     return start, end, kind, source
 
 
-def _meeting(pieces: np.ndarray, touching: np.ndarray, n_edges: int) -> np.ndarray:
-    """What `crowding` has to know of sources that meet."""
-    out = touching.astype(float)
-    i, j = (k + n_edges for k in np.nonzero(np.triu(touching[n_edges:, n_edges:], 1)))
-    for p in (0, 1):
-        for q in (0, 1):
-            a, b = pieces[i, 1 - p] - pieces[i, p], pieces[j, 1 - q] - pieces[j, q]
-            size, dot = np.hypot(*a.T) * np.hypot(*b.T), np.sum(a * b, axis=1)
-            at = (dot > np.cos(ACUTE) * size) & (pieces[i, p] == pieces[j, q]).all(axis=1)
-            sine = np.abs(a[at, 0] * b[at, 1] - a[at, 1] * b[at, 0]) / size[at]
-            out[i[at], j[at]] = out[j[at], i[at]] = -np.maximum(sine, 1e-300)
+@_jit
+def _meeting(pieces, touching, n_edges, acute):
+    """What `crowding` has to know of sources that meet; ``acute`` is the cosine of the angle below which two cracks
+    do at an acute one."""
+    n = len(pieces)
+    out = np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            if touching[i, j]:
+                out[i, j] = 1.0
+    for i in range(n_edges, n):
+        for j in range(i + 1, n):
+            if not touching[i, j]:
+                continue
+            for p in range(2):
+                for q in range(2):
+                    if pieces[i, p, 0] != pieces[j, q, 0] or pieces[i, p, 1] != pieces[j, q, 1]:
+                        continue
+                    ax, ay = pieces[i, 1 - p, 0] - pieces[i, p, 0], pieces[i, 1 - p, 1] - pieces[i, p, 1]
+                    bx, by = pieces[j, 1 - q, 0] - pieces[j, q, 0], pieces[j, 1 - q, 1] - pieces[j, q, 1]
+                    size = np.hypot(ax, ay) * np.hypot(bx, by)
+                    if ax * bx + ay * by > acute * size:
+                        out[i, j] = out[j, i] = -max(abs(ax * by - ay * bx) / size, 1e-300)
     return out
 
 

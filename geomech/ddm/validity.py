@@ -8,7 +8,8 @@ import numpy as np
 
 from ..model import Cracks
 from ..model.polygon import signed_area
-from .rock import inside
+from .plainly_well import plainly_well
+from .rock import inside, outlined
 
 #: Coordinates must resolve a segment to this part of its length: K is off by some fifty times that (its elements are
 #: shorter).
@@ -20,6 +21,8 @@ _SMALL = 1e-9
 SHARPEST_FOLD, SHARPEST_MOUTH = np.radians(10.0), np.radians(3.0)
 #: How points that coincide come to be one node.
 JOIN = "make one node of points that coincide: Cracks.from_polylines(…, join=True)"
+#: More pairs of segments than this, new ones with all, are compared by their boxes first.
+_EACH_WITH_ALL = 1_000_000
 #: Pairs of boxes compared at a time: a few bits each, and no more memory for ten thousand segments than for two
 #: thousand.
 _PAIRS_AT_ONCE = 4_000_000
@@ -86,6 +89,18 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
     n = cracks.n_segments
     if n == 0:
         return
+    fresh = np.ones(n, bool) if fresh is None else fresh
+    if np.count_nonzero(fresh) * (n + len(edges)) <= _EACH_WITH_ALL and plainly_well(
+        np.ascontiguousarray(cracks.nodes, dtype=float),
+        np.ascontiguousarray(cracks.segments, dtype=np.int64),
+        np.ascontiguousarray(cracks.surface, dtype=bool),
+        np.ascontiguousarray(cracks.aperture, dtype=float),
+        np.ascontiguousarray(fresh),
+        np.ascontiguousarray(edges),
+        sum(len(loop) for loop in loops),
+        outlined(loops),
+    ):
+        return
 
     def name(s):
         k = int(cracks.crack[s])
@@ -108,7 +123,6 @@ def check_cracks(cracks: Cracks, edges: np.ndarray, loops: list[np.ndarray], fre
             f"{name(s)}: its segment of {cracks.lengths[s]:.3g} m at ({x:g}, {y:g}) is too short for coordinates that "
             f"large, which have steps of {digits[s] * cracks.lengths[s]:.1g} m: count them from an origin near the rock"
         )
-    fresh = np.ones(n, bool) if fresh is None else fresh
     new = np.flatnonzero(fresh)
     if not len(new):
         return
