@@ -14,6 +14,7 @@ from ..model import TIP, Motion, State
 from .bodies import boundary_loads, threads_for, tip_rows
 from .compliance import crack_responses, passive, stress_rotations, times
 from .cracked_blocks import CrackedBlocks
+from .foretold import Answer
 from .settling import Settling
 from .side_by_side import side_by_side
 
@@ -29,8 +30,8 @@ DYNAMIC_TOLERANCE = 1e-4
 #: in free flight has hardly any.
 STILL = 1e-3
 
-#: Passes at one geometry; they agree after two to eight, or some more where faces open and close. A lag that is left is
-#: corrected by the next step.
+#: Passes at one geometry; they agree after one or two, three where cracks have grown, some more where contacts and faces
+#: open and close. A lag that is left is corrected by the next step.
 COMPLIANCE_PASSES = 20
 
 #: At rest, after so many of them blocks whose forces and strain still chase each other take their mean stress alone.
@@ -80,11 +81,15 @@ def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
 def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_hang: bool) -> tuple[Balance, np.ndarray]:
     """Passes of a step of at most ``dt`` s, and by how much every cracked block still differs from its cracks (relative
     strain)."""
-    settling = Settling()
-    static = now.system.scheme.static
+    static, settling = now.system.scheme.static, now.settling
+    if static:
+        settling.begin(tuple(now.bodies))
+    else:
+        settling.forget()  # what contacts did a step ago, in motion they need not do again
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
-    asked, response = dt, now.response
-    result, iterations, tried_whole = None, 0, False
+    asked = dt
+    response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
+    result, iterations, tried_whole, chased = None, 0, False, set()
     for attempt in range(COMPLIANCE_PASSES):
         with now.timed("dda"):
             result = now.system.step(now.state, now.problem.loads, dt, response, load_time, result)
@@ -105,19 +110,27 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
         solved = not all(block in now.by_mean_stress for block in now.bodies)
         if solved:
             _solve_bodies(now, result)
-        response, differences = _take_response(now, result.state, settling, tolerance)
+        response, differences, answer = _take_response(now, result.state, settling, tolerance)
         mismatch = float(differences.max())
         if mismatch < tolerance:
-            if not static or dt == asked or tried_whole:
+            if static:
+                _remember(now, answer)
+            # In a step that has been cut short by a chase blocks agree as their inertia holds them: that is no rest.
+            give_way = chased if static and dt != asked and tried_whole else set()
+            if not static or dt == asked or (tried_whole and not give_way):
                 break
             # What cut a static step short may have been a strain that the first passes assumed.
-            dt, tried_whole = asked, True
-        chasing = np.array(list(now.bodies), int)[differences > NO_ANSWER]
-        if attempt + 1 == PATIENCE and len(chasing):
-            for block in chasing.tolist():
-                now.by_mean_stress.add(block)
+            dt, tried_whole, chased = asked, True, set()
+        else:
+            chasing = set(np.array(list(now.bodies), int)[differences > NO_ANSWER].tolist())
+            chased |= chasing
+            give_way = chasing if attempt + 1 == PATIENCE else set()
+        for block in sorted(give_way):
+            now.by_mean_stress.add(block)
+        if give_way:
             # What has cut the step short may have been the chase.
-            dt, settling = asked, Settling()
+            dt = asked
+            settling.forget()
     if not solved:
         _solve_bodies(now, result)
     imbalance = max(load.imbalance for load in now.loads.values())
@@ -129,6 +142,77 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
     }
     tips = tip_rows(now.problem, now.blocks, now.solutions, now.nodes_of)
     return Balance(result, now.solutions, tips, statistics), differences
+
+
+def _systems(now: CrackedBlocks) -> tuple:
+    return tuple(body.crack_system for body in now.bodies.values())
+
+
+def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
+    """What the first static pass at the loads of ``time`` should assume: what the answers at other loads foretell. What
+    cracks that have grown answer to the last forces, by which the blocks were strained as before, is a pass already."""
+    if not now.bodies:
+        return now.response
+    blocks = tuple(now.bodies)
+    numbers = np.array(blocks)
+    known, beyond, s = now.foretold.at(time, blocks, _systems(now))
+    last, grown = now.foretold.last(blocks), np.zeros_like(beyond)
+    if last is not None:
+        for b, solution in _answers_to_the_last_forces(now, numbers[~known].tolist()).items():
+            k = blocks.index(b)
+            known[k], s[k] = True, now.compliances[b][2]
+            beyond[k] = last.strain[k] - s[k] @ last.stress[k]
+            grown[k] = solution.crack_strain - last.strain[k]
+    response = dda.CrackResponse(now.response.compliance.copy(), now.response.offset.copy())
+    own, began = numbers[known], now.state.rotation[numbers]
+    response.compliance[own], response.offset[own] = crack_responses(
+        s[known], beyond[known], np.zeros_like(beyond[known]), began[known]
+    )
+    if grown.any():
+        grown = times(stress_rotations(-began).transpose(0, 2, 1), grown)
+        size = _strained(now.system.compliance[numbers], last.stress, last.strain + grown)
+        if known.all():
+            offset, s = response.offset[numbers], response.compliance[numbers]
+            response.offset[numbers] = now.settling.next(offset, grown, s, size)
+        else:
+            response.offset[numbers] += grown
+    return response
+
+
+def _strained(elastic: np.ndarray, stress: np.ndarray, strain: np.ndarray) -> np.ndarray:
+    """(n,) how much blocks of ``elastic`` compliance (n, 3, 3) are strained by ``stress`` (n, 3) and by the ``strain``
+    (n, 3) of their cracks."""
+    size = np.abs(times(elastic, stress)).max(axis=1) + np.abs(strain).max(axis=1)
+    return np.maximum(size, STILL * size.max())
+
+
+def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
+    """Of the ``grown`` blocks those of which that can be told: block → solution under the forces of the last pass. Sets
+    their compliances."""
+    asked = {b: now.bodies[b] for b in grown if b in now.loads and b not in now.by_mean_stress}
+    if not asked:
+        return {}
+    from .. import ddm
+
+    try:
+        told = now.solve(asked, now.loads, now.solutions)
+    except ddm.NotConverged:
+        # Faces may find a state under the forces of the next pass.
+        return {}
+    now.solutions |= told
+    now.solved_from |= {b: now.history[b] for b in told if b in now.history}
+    with now.timed("compliance"):
+        now.compliances |= {b: _compliance(now, b, solution) for b, solution in told.items()}
+    return told
+
+
+def _remember(now: CrackedBlocks, answer: Answer) -> None:
+    """Passes agree on ``answer``. Unloaded rock had none, and the faces of its cracks their first states."""
+    blocks, state = tuple(now.bodies), now.state
+    if now.foretold.last(blocks) is None and not state.stress.any() and not state.crack_strain.any():
+        nothing = np.zeros_like(answer.strain)
+        now.foretold.take(blocks, replace(answer, time=state.time, strain=nothing, stress=nothing))
+    now.foretold.take(blocks, answer)
 
 
 def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
@@ -147,9 +231,9 @@ def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
 
 def _take_response(
     now: CrackedBlocks, state: State, settling: Settling, tolerance: float
-) -> tuple[dda.CrackResponse, np.ndarray]:
-    """What the next pass should assume, and how far off the last assumption was in each cracked block (relative
-    strain). Sets what the next step should begin with."""
+) -> tuple[dda.CrackResponse, np.ndarray, Answer]:
+    """What the next pass should assume, how far off the last assumption was in each cracked block (relative strain),
+    and what was found. Sets what the next step should begin with."""
     blocks = np.array(list(now.bodies), int)
     with now.timed("ddm solve"):
         answers = _answers(now, state)
@@ -175,9 +259,7 @@ def _take_response(
         after.compliance[blocks], after.offset[blocks] = crack_responses(known, strain, state.stress[blocks], ends)
         found = again.offset[blocks] + times(again.compliance[blocks], stress)
         residual = found - assumed
-        elastic = times(now.system.compliance[blocks], stress)
-        size = np.abs(elastic).max(axis=1) + np.abs(found).max(axis=1)
-        size = np.maximum(size, STILL * size.max())
+        size = _strained(now.system.compliance[blocks], stress, found)
         if not size.any():
             differences = np.zeros(len(blocks))
         else:
@@ -186,7 +268,8 @@ def _take_response(
                 before = again.offset[blocks] - residual
                 again.offset[blocks] = settling.next(before, residual, again.compliance[blocks], size)
     now.response = after
-    return again, differences
+    own_stress = times(stress_rotations(-state.rotation[blocks]), state.stress[blocks])
+    return again, differences, Answer(state.time, _systems(now), strain, own_stress, known)
 
 
 def _answers(now: CrackedBlocks, state: State) -> dict:

@@ -14,8 +14,10 @@ from ..model.polygon import winding_number
 from .bodies import elastic_bodies, inherited, solve_bodies
 from .by_mean_stress import ByMeanStress
 from .crack_energy import CrackEnergy
+from .foretold import Foretold
 from .inherited_loads import on_children, on_moved
 from .phases import Phases
+from .settling import Settling
 from .tractions import BoundaryLoad
 
 if TYPE_CHECKING:
@@ -49,6 +51,7 @@ class CrackedBlocks:
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self.by_mean_stress = ByMeanStress()
+        self.settling, self.foretold = Settling(), Foretold()
         #: What the last steps of the tips have told of their paths.
         self.chords: Memory = {}
         # What crack faces with friction remember of the load step before: its passes all begin there.
@@ -128,6 +131,7 @@ class CrackedBlocks:
             for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
         )
         self.by_mean_stress = self.by_mean_stress.inherited(parent, whole) if len(whole) else ByMeanStress()
+        self.settling, self.foretold = Settling(), Foretold()
         self._take_bodies()
 
     def take_step(self, state: State, budget: dda.EnergyBudget) -> None:

@@ -65,6 +65,34 @@ def test_acceleration_solves_a_linear_agreement_in_as_many_passes_as_it_has_unkn
     assert offset[0] == pytest.approx(exact, rel=1e-9)
 
 
+def test_what_one_solution_has_learnt_another_need_not():
+    """The same matrix, another b, as at another load: after one pass the next one is exact. Beside it, as at cracks that
+    have grown, what was learnt is nearly true: each pass gains as much as the matrix is alike. Of other blocks, or once
+    it has led astray, nothing is kept."""
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    matrix = turn @ np.diag([0.8, -0.5, 0.3]) @ turn.T
+    settling = Settling()
+
+    def passes(matrix, given, most, blocks=(7,)) -> list[float]:
+        """Largest differences of the passes of one solution."""
+        settling.begin(blocks)
+        offset, left = np.zeros((1, 3)), []
+        for _ in range(most):
+            residual = (offset @ matrix.T + given) - offset
+            left.append(float(np.abs(residual).max()))
+            offset = settling.next(offset, residual, np.ones((1, 3, 3)), np.ones(1))
+        return left
+
+    passes(matrix, np.array([1.0, 2.0, 3.0]), 5)
+    assert passes(matrix, np.array([3.0, -1.0, 2.0]), 2)[1] < 1e-12
+    near = passes(1.02 * matrix, np.array([1.0, 1.0, -4.0]), 3)
+    assert near[1] < 0.2 * near[0] and near[2] < 0.1 * near[1]
+    assert passes(-matrix, np.array([1.0, 2.0, 3.0]), 6)[5] < 1e-9
+    passes(matrix, np.array([1.0, 2.0, 3.0]), 5)
+    others = passes(matrix, np.array([3.0, -1.0, 2.0]), 5, blocks=(8,))
+    assert others[1] > 0.1 and others[4] < 1e-9
+
+
 def test_answers_that_turn_about_with_the_states_of_faces_are_relaxed():
     """x = c − 1.3 x of a block whose S is another one in every pass: handing back what was found goes away from the
     answer for ever; relaxed, it is there to 1e-6 after a few passes. A second block, at peace, is not held back."""
