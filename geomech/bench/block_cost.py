@@ -16,7 +16,7 @@ import statistics
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -39,10 +39,9 @@ ITERATED = 100, 1000
 #: stepped, and only when asked for: the first step of 100 000 bricks takes 31 iterations, 150 s of CPU and 3.3 GiB, of
 #: so many blocks of a slope it is not known to end.
 LONGEST, WALLS = (0.5, 6.0), 10_000
-#: Static steps of so many seconds, so many of them, bring blocks to rest; of so many settled steps the first, which
-#: factors, is not counted. Up to so many blocks, in a quick run and else: the static steps take as long as those from
-#: rest.
-STATIC, REST, SETTLED, SETTLES = 1.0, 3, 6, (150, 1100)
+#: Of so many settled steps the first, which factors, is not counted. Up to so many blocks in a quick run: the static
+#: steps that bring blocks to rest take as long as those from rest.
+SETTLED, SETTLES = 6, 150
 SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
 
 #: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours →
@@ -143,7 +142,7 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
         for name, make in SCENES.items():
             if n > WALLS and name != "wall":
                 continue
-            rests = n <= SETTLES[not quick]
+            rests = not quick or n <= SETTLES
             cost, others = _measured(name, make(n), LONGEST[not quick], n <= ITERATED[not quick], rests)
             costs.append(cost)
             for other in others:
@@ -205,11 +204,7 @@ def settled(blocks: Blocks) -> tuple[float, float]:
     """Median seconds of a step of blocks at rest under their weight, and its mean iterations."""
     from .. import dda
 
-    still = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(STATIC, dynamic=False))
-    state = State.at_rest(blocks)
-    for _ in range(REST):
-        state = still.step(state, WEIGHT).state
-    state = replace(state, velocity=np.zeros_like(state.velocity))
+    state = block_scenes.at_rest(blocks)
     system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(TIME_STEP))
     seconds, iterations = [], []
     for _ in range(SETTLED):

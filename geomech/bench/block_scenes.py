@@ -4,17 +4,22 @@ incline."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from ..model import Blocks, DdaSettings, History, JointLaw, Loads, Material
+from ..model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 ROCK = Material("rock", 20e9, 0.25, density=2600.0)
 FRICTION = math.radians(35)
 JOINT = JointLaw("joint", friction_angle=FRICTION)
 GRAVITY = 9.81
 WEIGHT = Loads(gravity=History.constant((0.0, -GRAVITY)))
+#: Static steps (s) that bring blocks to rest: first short ones, in which inertia bounds how far contacts answer to one
+#: another. (A wall of 10 000 bricks takes 25 iterations in them, and hundreds, with steps cut, in one of 1 s from
+#: nothing.)
+CALMING = (3e-3, 0.03, 0.3, 1.0, 1.0)
 
 
 def wall(n: int) -> Blocks:
@@ -63,6 +68,23 @@ def incline(angle: float) -> Blocks:
 
 def settings(dt: float, dynamic: bool = True) -> DdaSettings:
     return DdaSettings(time_step=dt, dynamic_factor=1.0 if dynamic else 0.0)
+
+
+def at_rest(blocks: Blocks) -> State:
+    """The blocks at rest under their weight: they begin with the vertical stress of what lies above them and relax in
+    static steps."""
+    from .. import dda
+
+    state = State.at_rest(blocks)
+    height = np.array([blocks.area_moments(b)[1][1] for b in range(blocks.n_blocks)])
+    stress = np.zeros((blocks.n_blocks, 3))
+    stress[:, 1] = -ROCK.density * GRAVITY * (blocks.vertices[:, 1].max() - height)
+    stress[np.asarray(blocks.fixed, bool)] = 0.0
+    state = replace(state, stress=stress)
+    for seconds in CALMING:
+        system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=settings(seconds, dynamic=False))
+        state = system.step(state, WEIGHT).state
+    return replace(state, velocity=np.zeros_like(state.velocity))
 
 
 def _rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:

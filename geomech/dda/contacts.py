@@ -219,7 +219,10 @@ class ContactFinder:
                 bonded[fresh & (geometry[:, 4] > 0)] = 1
             contact_state[fresh & (partner < 0).all(axis=1)] = STICK
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
-        direction = np.where(contact_state == SLIP, np.sign(shear), 0.0)
+        # Friction on a normal force that pulls by its round-off acts the other way: taken for the sense of the sliding
+        # it would turn that about in every step, and with it the matrix of blocks at rest.
+        pulls = springs.friction * normal + springs.sliding < 0.0
+        direction = np.where(contact_state == SLIP, np.sign(shear), 0.0) * np.where(pulls, -1.0, 1.0)
         # Bonds of blocks that bend are there from the start, or never.
         inset = of("inset")
         if len(old) == 0 and time == 0.0 and self._bends.any():

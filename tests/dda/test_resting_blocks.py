@@ -1,0 +1,27 @@
+"""What steps of blocks at rest cost: nothing moves, so the equations of the last step serve the next."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.bench import block_scenes
+from geomech.bench.block_scenes import JOINT, ROCK, WEIGHT
+from geomech.model import SLIP
+
+
+@pytest.mark.parametrize("make", [block_scenes.wall, block_scenes.slope])
+def test_blocks_at_rest_are_not_factored_again(make):
+    # Joints that carry nothing slide by round-off, this way or that: the matrix knows of the way by their friction.
+    blocks = make(150)
+    state = block_scenes.at_rest(blocks)
+    system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(0.01))
+    state = system.step(state, WEIGHT).state
+    begun = system.work.factorisations
+    assert begun >= 1 and (state.contacts["state"] == SLIP).any()
+    before = state.vertices.copy()
+    for _ in range(8):
+        state = system.step(state, WEIGHT).state
+    assert system.work.factorisations <= begun + 1
+    assert np.abs(state.vertices - before).max() < 1e-12
