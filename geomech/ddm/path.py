@@ -16,9 +16,9 @@ the next with the other sign, κ/(2 + κ) of it, and stiff paths zigzag for long
 (1 − s) κ/(1 + s κ): s = 1 − 1/κ from κ = 2 on leaves 1/κ, and in the limit no shear at the end of a step (backward
 Euler). κ falls with √Δa, so that fine steps have half the turn, and second order.
 
-From step to step neither κ nor the share by which chords turn less and less changes much. So the first trial turns as
-the last two chords say, and the κ found then says how far to correct it: mostly one or two looks ahead are enough
-(`Remembered`), and often what was tried is the step.
+From step to step neither κ nor the share by which chords turn less and less changes much. So where κ is known
+the first trial turns as the last two chords say, and the κ found then says how far to correct it: mostly one or two
+looks ahead are enough (`Remembered`), and often what was tried is the step.
 """
 
 from __future__ import annotations
@@ -112,7 +112,9 @@ class Chords:
             last, start = memory.get(tuple(point)), float(self.start[row])
             if last is not None and abs(start) <= KINK:
                 self.kappa[row] = last.kappa_at(start)
-                if abs(last.angle) <= KINK and abs(last.onward - start) <= NEAR:
+                # Without κ a first look is judged as one along the tangent: no other trial can be.
+                onward = np.isfinite(self.kappa[row]) and abs(last.angle) <= KINK
+                if onward and abs(last.onward - start) <= NEAR:
                     self.first[row] = last.onward
         self.share = np.where(np.abs(self.start) > KINK, KINK_SHARE, SMOOTH_SHARE)
         self.looks = 0

@@ -69,9 +69,18 @@ def test_compression_along_the_crack_does_not_throw_the_path_about(start, stiffn
 
 def test_an_arc_goes_on_as_it_went():
     """Of an arc that turned by 8 degrees from chord to chord the first trial is the next chord itself."""
-    angle, looks = chosen(lambda theta: 12.0 - theta, 4.0, Remembered(np.nan, *np.radians([8.0, 8.0, 4.0])))
+    angle, looks = chosen(lambda theta: 12.0 - theta, 4.0, Remembered(0.0, *np.radians([8.0, 8.0, 4.0])))
     assert angle == pytest.approx(8.0, abs=1e-12)
     assert looks == 1
+
+
+def test_a_small_kink_is_not_gone_on_with():
+    """A path leaves a straight crack at 6.5 degrees and goes on straight; nothing has told κ yet. What the second step
+    leaves is within the tolerance (a trial with the kink's turn, judged as one along the tangent, left three times
+    as much)."""
+    memory = Remembered(np.nan, *np.radians([-6.4, -6.5, 0.2]))
+    angle, looks = chosen(lambda theta: 0.1 - 1.1 * theta, 0.1, memory)
+    assert abs(0.1 - 1.1 * angle) < np.degrees(TOLERANCE) and looks == 1
 
 
 @pytest.mark.parametrize(
