@@ -132,10 +132,11 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
             orders = [blocks[at] for at in np.argsort(points[blocks] @ directions, axis=0, kind="stable").T]
             cuts = [_best_cut(order, pointer, neighbour, place, least) for order in orders]
             best = min(range(len(cuts)), key=lambda k: cuts[k][0])
-            order, (_, at, mine) = orders[best], cuts[best]
+            order, (_, at, mine), (x, y) = orders[best], cuts[best], directions[:, best]
             cut = _meets(order, at, mine, pointer, neighbour, place)
             halves = [half for half in (order[:at][~cut[:at]], order[at:][~cut[at:]]) if len(half)]
-            work.append((order[cut], len(halves)))
+            row = order[cut]
+            work.append((row[np.argsort(points[row] @ (-y, x), kind="stable")], len(halves)))
             work += [(half, None) for half in halves]
             continue
         for _ in range(children or 0):

@@ -1,7 +1,7 @@
 """Elimination of dense fronts of 6×6 blocks, and substitution through them, in double or single precision.
 
 A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel
-of three blocks at a time,
+of two blocks at a time,
 
     Z = F_kk⁻¹,   U = Z F_k·,   F_ij ← F_ij − F_ik U_j,
 
@@ -18,7 +18,7 @@ from numba import njit, types
 _jit = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 
 #: Unknowns eliminated at a time; twelve to thirty keep BLAS as busy.
-PANEL = 18
+PANEL = 12
 
 #: BLAS's general products, as Numba itself binds them for np.dot: here with strides, and added in place.
 _gemm = types.ExternalFunction(
@@ -88,6 +88,40 @@ def _invert(a, swapped):
 
 
 @_jit
+def _clear(array):
+    """Fill the flat ``array`` with zeros."""
+    for k in range(len(array)):
+        array[k] = 0
+
+
+@_jit
+def _runs(met, own, begins):
+    """Where runs of blocks that stand side by side begin among the seats ``met`` (n,) in a front with ``own`` blocks:
+    in ``begins``, n behind the last; how many there are, and how many of them among its own."""
+    runs = mine = 0
+    for v in range(len(met)):
+        if v == 0 or met[v] != met[v - 1] + 1 or met[v] == own:
+            begins[runs] = v
+            runs += 1
+            mine += met[v] < own
+    begins[runs] = len(met)
+    return runs, mine
+
+
+@_jit
+def _add_runs(here, added, met, begins, first, last, beside):
+    """Add to the row ``here`` of a front the runs from ``first`` to before ``last`` of a child's row ``added``; ``here``
+    begins with block ``beside``."""
+    for r in range(first, last):
+        v, w = 6 * begins[r], 6 * begins[r + 1]
+        j = 6 * (met[begins[r]] - beside)
+        # Slices, for their indices need no check for a negative sign, which would keep loops from vectors.
+        into, what = here[j : j + w - v], added[v:w]
+        for c in range(w - v):
+            into[c] += what[c]
+
+
+@_jit
 def longest(pivots, reach, first, last):
     """The most unknowns of any front from ``first`` to before ``last``, and the most beyond its own."""
     most, far = 0, 0
@@ -133,16 +167,8 @@ def eliminate(
         m = p + b
         upper = factors[at[f] : at[f] + p * m].reshape((p, m))
         lower = factors[at[f] + p * m : at[f + 1]].reshape((b, p))
-        if kept:
-            rest = room[stack[f] : stack[f] + b * b].reshape((b, b))
-        else:
-            rest = spare[: b * b].reshape((b, b))
-        # A leaf's rest is its own product alone: not cleared, for clearing takes as long as adding.
-        leaf = child[f] < 0 and p > 0
-        if not leaf:
-            rest[:] = 0
-        upper[:] = 0
-        lower[:] = 0
+        rest = (room[stack[f] : stack[f] + b * b] if kept else spare[: b * b]).reshape((b, b))
+        _clear(factors[at[f] : at[f + 1]])
         for k in range(entries[f], entries[f + 1]):
             i, j = row[k], column[k]
             block = data[36 * entry[k] : 36 * entry[k] + 36]
@@ -150,34 +176,19 @@ def eliminate(
                 here = (upper[6 * i + a] if i < own else lower[6 * (i - own) + a])[6 * j : 6 * j + 6]
                 for c in range(6):
                     here[c] = block[6 * a + c]
+        # What children leave in the rows and columns that are eliminated here; the rest of it below.
         g = child[f]
         while g >= 0:
-            met, n = reach[g], reach[g + 1] - reach[g]
-            # Neighbours in the child's boundary mostly stand side by side in the parent too: long rows are added at
-            # once.
-            runs = 0
-            for v in range(n):
-                j = seat[met + v]
-                if v == 0 or j != seat[met + v - 1] + 1 or j == own:
-                    begins[runs] = v
-                    runs += 1
-            begins[runs] = n
-            for u in range(n):
-                i = seat[met + u]
+            met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+            left = room[stack[g] : stack[g] + n * n].reshape((n, n))
+            runs, mine = _runs(met, own, begins)
+            for u in range(len(met)):
+                i = met[u]
                 for a in range(6):
-                    line = room[stack[g] + (6 * u + a) * 6 * n : stack[g] + (6 * u + a + 1) * 6 * n]
                     if i < own:
-                        own_row, far_row = upper[6 * i + a, :p], upper[6 * i + a, p:]
+                        _add_runs(upper[6 * i + a], left[6 * u + a], met, begins, 0, runs, 0)
                     else:
-                        own_row, far_row = lower[6 * (i - own) + a], rest[6 * (i - own) + a]
-                    for r in range(runs):
-                        j, v, w = 6 * seat[met + begins[r]], 6 * begins[r], 6 * begins[r + 1]
-                        # Slices, for their indices need no check for a negative sign, which would keep loops from
-                        # vectors.
-                        here = own_row[j : j + w - v] if j < p else far_row[j - p : j - p + w - v]
-                        added = line[v:w]
-                        for c in range(w - v):
-                            here[c] += added[c]
+                        _add_runs(lower[6 * (i - own) + a], left[6 * u + a], met, begins, 0, mine, 0)
             g = sibling[g]
         for start in range(0, p, PANEL):
             end = min(start + PANEL, p)
@@ -185,14 +196,30 @@ def eliminate(
                 return False
             right = panel[: (end - start) * (m - end)].reshape((end - start, m - end))
             scaled = upper[start:end, end:]
-            right[:] = scaled
+            for i in range(end - start):
+                copied, given = right[i], scaled[i]
+                for j in range(m - end):
+                    copied[j] = given[j]
             _add_product(one, upper[start:end, start:end], right, none, scaled)
             _add_product(minus, upper[end:, start:end], scaled, one, upper[end:, end:])
             _add_product(minus, lower[:, start:end], scaled[:, : p - end], one, lower[:, end:])
         if p > 0:
-            _add_product(minus, lower, upper[:, p:], none if leaf else one, rest)
+            _add_product(minus, lower, upper[:, p:], none, rest)
+        else:
+            _clear(rest.reshape(b * b))
+        g = child[f]
+        while g >= 0:
+            met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+            left = room[stack[g] : stack[g] + n * n].reshape((n, n))
+            runs, mine = _runs(met, own, begins)
+            for u in range(begins[mine], len(met)):
+                for a in range(6):
+                    _add_runs(rest[6 * (met[u] - own) + a], left[6 * u + a], met, begins, mine, runs, own)
+            g = sibling[g]
         if not kept:
-            room[stack[f] : stack[f] + b * b] = rest.ravel()
+            whole, copied = rest.reshape(b * b), room[stack[f] : stack[f] + b * b]
+            for k in range(b * b):
+                copied[k] = whole[k]
     return True
 
 
