@@ -172,23 +172,20 @@ def sides_of(n, order, block, other):
     return start[: n + 1], side
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True, inline="always")
+@njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
 def _add_block(data, first, stride, push, drag, pull, across):
     """Add the 6 × 6 of ``push`` ⊗ ``pull`` + ``drag`` ⊗ ``across`` (6,) to the block that begins at ``first``. (Written
-    out and inlined: two thirds of the time of loops.)"""
+    out and inlined, a row summed before it is stored: half of the time of loops.)"""
     u0, u1, u2, u3, u4, u5 = pull[0], pull[1], pull[2], pull[3], pull[4], pull[5]
     t0, t1, t2, t3, t4, t5 = across[0], across[1], across[2], across[3], across[4], across[5]
     for a in range(6):
         here, p, d = data[first + a * stride : first + a * stride + 6], push[a], drag[a]
-        here[0] += p * u0 + d * t0
-        here[1] += p * u1 + d * t1
-        here[2] += p * u2 + d * t2
-        here[3] += p * u3 + d * t3
-        here[4] += p * u4 + d * t4
-        here[5] += p * u5 + d * t5
+        h0, h1, h2 = here[0] + p * u0 + d * t0, here[1] + p * u1 + d * t1, here[2] + p * u2 + d * t2
+        h3, h4, h5 = here[3] + p * u3 + d * t3, here[4] + p * u4 + d * t4, here[5] + p * u5 + d * t5
+        here[0], here[1], here[2], here[3], here[4], here[5] = h0, h1, h2, h3, h4, h5
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)
 def _fill_rows(
     first, last, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
     normal, shear, slope, lift,

@@ -24,9 +24,21 @@ import numpy as np
 from numba import njit
 
 from ..model import OPEN, SLIP, STICK
-from . import assembly, contact_states
+from . import assembly
 from .contact_springs import Springs
+from .contact_states import moved
 from .contacts import ContactSet
+from .path_contacts import (
+    LEAST_LEFT,
+    SHORT_OF,
+    changes,
+    linearised,
+    nearer,
+    products,
+    pulls,
+    second_order,
+    undecided,
+)
 
 #: The bond of a contact that has slipped and not lost all cohesion: it may slide.
 SLIPPED = 2
@@ -52,34 +64,33 @@ _PASSED_ON = 3
 #: blocks that slides, steps for which all contacts were centred again, in vain, took 250 iterations and now take 40;
 #: with ε 100 times larger one in three still does.)
 _ALONE, _ALONE_FEW, _ALONE_FAR, _ALONE_LARGER, _ALONE_AGAIN = 0.005, 8, 0.3, 1000.0, 40
-#: No step goes farther than this part of the way to where a force or a gap vanishes.
-_SHORT_OF = 0.99
 #: A contact is undecided while its force and its gap, in units of its stiffness, differ by less than this factor.
 _CLEAR = 3.0
 #: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere, …
 _END, _STUCK = 1e-14, 1e-3
 #: … and so many in a row that are shorter than this, hardly.
 _BLOCKED, _SHORT = 5, 0.05
-#: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their
-#: difference.
-_LEAST_LEFT = 1e-14
 #: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. Walls of
 #: 1 000 bricks take as many steps as with 1e-12, of 10 000 as with 1e-6. The predictor, which only says how far to aim,
 #: needs less, and correctors begin with it.
 WITHIN, _GUESSED = 1e-4, 1e-2
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)
 def add_forces(right, block, other, order, vectors, normal, shear):
     """Add to ``right`` (6 n,) the forces ``normal`` and ``shear`` (n_contacts,) on the blocks."""
     for c in range(block.shape[0]):
+        push, drag, n, t = normal[c], shear[c], vectors[c, 0], vectors[c, 1]
         for side in range(2):
-            i = order[block[c]] if side == 0 else order[other[c]]
+            i, k = order[block[c]] if side == 0 else order[other[c]], 6 * side
             if i < 0:
                 continue
-            for a in range(6):
-                at = 6 * side + a
-                right[6 * i + a] += normal[c] * vectors[c, 0, at] + shear[c] * vectors[c, 1, at]
+            here = right[6 * i : 6 * i + 6]
+            # All six before any is stored: only so they become vectors.
+            r0, r1 = here[0] + push * n[k] + drag * t[k], here[1] + push * n[k + 1] + drag * t[k + 1]
+            r2, r3 = here[2] + push * n[k + 2] + drag * t[k + 2], here[3] + push * n[k + 3] + drag * t[k + 3]
+            r4, r5 = here[4] + push * n[k + 4] + drag * t[k + 4], here[5] + push * n[k + 5] + drag * t[k + 5]
+            here[0], here[1], here[2], here[3], here[4], here[5] = r0, r1, r2, r3, r4, r5
 
 
 def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
@@ -94,46 +105,6 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
     if info != 0:
         raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
     return lambda right, within=WITHIN, start=None: dgetrs(factors, pivots, right)[0]
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _pulls(goals, numbers, missed, soft, stiff_along, slope, rise, climb):
-    """(3, n) N of a Newton step where blocks stand still: normal forces, shear forces without what answers these, and
-    with it. ``goals`` (3, n) J for the products, ``numbers`` (6, n) N, w, α, β and the strengths left above and below
-    S, ``missed`` (2, n) m of gap and slip; slip lifts by ``rise``, motion along the edge by ``climb``."""
-    out = np.empty((3, len(soft)))
-    for c in range(len(soft)):
-        normal, width, back, ahead, above, below = numbers[:, c]
-        more, less = goals[2, c] / below - ahead, goals[1, c] / above - back
-        slid = more - less - missed[1, c]
-        risen = climb[c] * slid + (rise[c] * (more + less) if rise[c] > 0.0 else 0.0)
-        given = (goals[0, c] - normal * (width + missed[0, c] - risen)) / soft[c]
-        along = stiff_along[c] * slid
-        out[0, c], out[1, c], out[2, c] = given, along, along + slope[c] * given
-    return out
-
-
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _changes(goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, rise, climb, kn, mu, rough):
-    """Changes (6, n) of the ``numbers``, (n,) of S, and how far along them positive numbers stay so, at most 1:
-    ``motion`` (n, 2) m of the blocks, the rest as for `_pulls`."""
-    n = len(stiff)
-    out, shear, far = np.empty((6, n)), np.empty(n), 1.0
-    for c in range(n):
-        _, _, back, ahead, above, below = numbers[:, c]
-        pushed = pulls[0, c] - stiff[c] * (motion[c, 0] + climb[c] * motion[c, 1])
-        sheared = pulls[1, c] - stiff_along[c] * motion[c, 1] + slope[c] * pushed
-        more, less = mu[c] * pushed - sheared, mu[c] * pushed + sheared
-        out[0, c], out[1, c] = pushed, motion[c, 0] + pushed / kn[c] + missed[0, c]
-        out[2, c] = goals[1, c] / above - back - back / above * more
-        out[3, c] = goals[2, c] / below - ahead - ahead / below * less
-        if rise[c] > 0.0:
-            out[1, c] -= rise[c] * (out[2, c] + out[3, c])
-        out[4, c], out[5, c], shear[c] = more, less, sheared
-        for k in range(6 if rough[c] else 2):
-            if out[k, c] < 0.0:
-                far = min(far, -_SHORT_OF * numbers[k, c] / out[k, c])
-    return out, shear, far
 
 
 def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
@@ -246,7 +217,7 @@ class CentralPath:
         strength = self._mu * self._normal + self._base
         low, high = -strength, strength
         # Nearer to the strength than its round-off S is not known, and nothing would be left to divide by.
-        least = _LEAST_LEFT * strength
+        least = LEAST_LEFT * strength
         for _ in range(50):
             shear = 0.5 * (low + high)
             below, above = np.maximum(strength + shear, least), np.maximum(strength - shear, least)
@@ -258,80 +229,68 @@ class CentralPath:
     def _left(self) -> tuple[np.ndarray, np.ndarray]:
         """The strength left against sliding either way, N: above and below S."""
         strength = self._mu * self._normal + self._base
-        least = _LEAST_LEFT * strength
+        least = LEAST_LEFT * strength
         return np.maximum(strength - self._shear, least), np.maximum(strength + self._shear, least)
 
     def advance(self) -> int:
         """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
         if self.ended:
             return 0
-        pattern, kn, ks, mu, rough, unit = self._pattern, self._kn, self._ks, self._mu, self._rough, self._unit
-        normal, width, (back, ahead), (above, below) = self._normal, self._width, self._slip, self._left()
-        epsilon = float(self._products(normal, width, back, ahead, above, below).sum()) / float((1 + 2 * rough).sum())
+        pattern, kn, mu, rough, unit = self._pattern, self._kn, self._mu, self._rough, self._unit
+        numbers, missed, laws = linearised(
+            self._normal, self._width, self._slip, self._shear, self._g, self._s, kn, self._ks, mu, self._base, rough,
+            self._rise,
+        )  # fmt: skip
+        total = products(numbers, numbers, 0.0, rough, unit)
+        epsilon = total / float((1 + 2 * rough).sum())
         residual = (self._right - pattern.without_contacts(self._matrix, self._unknowns)).ravel()
-        add_forces(residual, *self._at, normal, self._shear)
+        add_forces(residual, *self._at, self._normal, self._shear)
         kn_held, ks_held, gap_held, before_held = self._bonds
-        moved_held = contact_states.moved(self._unknowns, *self._held_at)
-        moved_held[:, 0] -= self._all_lift[len(kn) :] * moved_held[:, 1]
-        pulled, sheared = -kn_held * (gap_held + moved_held[:, 0]), before_held - ks_held * moved_held[:, 1]
-        add_forces(residual, *self._held_at, pulled, sheared)
-        gap_missed = self._g + normal / kn - width - self._rise * (back + ahead)
-        slip_missed = self._s + self._shear / ks - (ahead - back)
-        either, apart = back / above + ahead / below, back / above - ahead / below
-        stiff_along = rough / (1.0 / ks + either)
-        slope, climb = stiff_along * mu * apart, self._rise * stiff_along * apart
-        soft = width + normal / kn + normal * self._rise * (mu * either - slope * apart)
-        stiff = normal / soft
+        springs = [laws[1], laws[2], laws[3], laws[4]]
+        if len(kn_held):
+            held = moved(self._unknowns, *self._held_at, self._all_lift[len(kn) :])
+            pulled, sheared = -kn_held * (gap_held + held[:, 0]), before_held - ks_held * held[:, 1]
+            add_forces(residual, *self._held_at, pulled, sheared)
+            none = np.zeros(len(kn_held))
+            springs = [np.concatenate(pair) for pair in zip(springs, (kn_held, ks_held, none, none), strict=True)]
+        stiff, stiff_along, slope, climb = springs
         assembly.assemble(
-            pattern, self._data, self._matrix, self._upper, self._lower, *self._all_at,
-            np.concatenate([stiff, kn_held]), np.concatenate([stiff_along, ks_held]),
-            np.concatenate([slope, np.zeros(len(kn_held))]),
-            self._all_lift - np.concatenate([climb, np.zeros(len(kn_held))]),
+            pattern, self._data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
+            self._all_lift - climb,
         )  # fmt: skip
         solve = solution_of(pattern, self._data)
 
-        numbers, missed = np.stack([normal, width, back, ahead, above, below]), np.stack([gap_missed, slip_missed])
-
         def newton(goals, within=WITHIN, start=None):
-            """Changes of the unknowns, of gap and motion along, of the six positive numbers and of S, and how far they
-            may go."""
-            pulls = _pulls(goals, numbers, missed, soft, stiff_along, slope, self._rise, climb)
+            """Changes of the unknowns, motions (n, 2) of contacts, changes of the six positive numbers and of S, and
+            how far they may go."""
+            pulled = pulls(goals, numbers, missed, laws, self._rise)
             side = residual.copy()
-            add_forces(side, *self._at, pulls[0], pulls[2])
+            add_forces(side, *self._at, pulled[0], pulled[2])
             step = solve(side, within, start)
-            motion = contact_states.moved(step, *self._at)
-            motion[:, 0] -= self._lift * motion[:, 1]
-            changed = _changes(
-                goals, numbers, missed, pulls, motion, stiff, stiff_along, slope, self._rise, climb, kn, mu, rough
-            )  # fmt: skip
-            return step, motion, *changed
+            motion = moved(step, *self._at, self._lift)
+            return step, motion, *changes(goals, numbers, missed, pulled, motion, laws, kn, mu, rough, self._rise)
 
-        guess, _, changes, _, far = newton(np.zeros((3, len(kn))), _GUESSED)
-        left = float(self._products(*(numbers + far * changes)).sum()) / float(self._products(*numbers).sum())
+        guess, _, changed, _, far = newton(np.zeros((3, len(kn))), _GUESSED)
+        left = products(numbers, changed, far, rough, unit) / total
         target = epsilon * left**3 * unit
-        goals = target - changes[[0, 2, 3]] * changes[[1, 4, 5]]
-        step, moved, changes, d_shear, far = newton(goals, start=guess)
+        goals = second_order(target, changed)
+        step, motion, changed, d_shear, far = newton(goals, start=guess)
         for _ in range(_CORRECTORS):
             if far > _FAR:
                 break
             wanted = min(1.0, _FARTHER * far + _FURTHER)
-            there = numbers + wanted * changes
-            product = there[[0, 2, 3]] * there[[1, 4, 5]]
-            nearer = goals + np.maximum(
-                np.clip(product, target / _SPREAD, target * _SPREAD) - product, -target * _SPREAD
-            )
-            tried = newton(nearer, start=step)
+            tried_goals = nearer(goals, numbers, changed, wanted, target, _SPREAD)
+            tried = newton(tried_goals, start=step)
             if tried[-1] < far + _GAIN * (wanted - far):
                 break
-            goals, (step, moved, changes, d_shear, far) = nearer, tried
+            goals, (step, motion, changed, d_shear, far) = tried_goals, tried
         alone = None
         if far < _SHORT and self._lone < _ALONE_AGAIN:
-            far, alone = self._without_few(numbers, changes, far)
+            far, alone = self._without_few(numbers, changed, far)
         self._unknowns += far * step
-        self._g, self._s = self._g + far * moved[:, 0], self._s + far * moved[:, 1]
-        self._normal, self._width = normal + far * changes[0], width + far * changes[1]
-        self._shear = self._shear + far * d_shear
-        self._slip = np.stack([back + far * changes[2], ahead + far * changes[3]])
+        self._g, self._s = self._g + far * motion[:, 0], self._s + far * motion[:, 1]
+        self._normal, self._width, *slip = (numbers + far * changed)[:4]
+        self._shear, self._slip = self._shear + far * d_shear, np.stack(slip)
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
         if alone is not None:
             self._lone += 1
@@ -344,18 +303,18 @@ class CentralPath:
             self._centre(self.epsilon * unit)
             return len(self._g)
         self.ended = not (epsilon > _END and far > _STUCK)
-        return int(self._undecided().sum())
+        return undecided(self._normal, self._width, self._slip, *self._left(), kn, self._ks, rough, _CLEAR)
 
-    def _without_few(self, numbers: np.ndarray, changes: np.ndarray, far: float) -> tuple[float, np.ndarray | None]:
-        """How far the ``changes`` (6, n) may go but for few contacts, and these, (n,) True; ``far`` and None where they
+    def _without_few(self, numbers: np.ndarray, changed: np.ndarray, far: float) -> tuple[float, np.ndarray | None]:
+        """How far the changes (6, n) may go but for few contacts, and these, (n,) True; ``far`` and None where they
         are many."""
-        falling = changes < 0.0
+        falling = changed < 0.0
         falling[2:] &= self._rough
-        reach = np.where(falling, -numbers / np.where(falling, changes, -1.0), np.inf).min(axis=0)
+        reach = np.where(falling, -numbers / np.where(falling, changed, -1.0), np.inf).min(axis=0)
         few = reach < _ALONE_FAR
         if few.sum() > max(_ALONE_FEW, _ALONE * len(few)):
             return far, None
-        return min(1.0, _SHORT_OF * float(reach[~few].min(initial=np.inf))), few
+        return min(1.0, SHORT_OF * float(reach[~few].min(initial=np.inf))), few
 
     def _centre_alone(self, which: np.ndarray, epsilon: float) -> None:
         """`_centre` those contacts only. What that leaves out of balance is for the next step to find."""
@@ -366,15 +325,6 @@ class CentralPath:
             np.where(which, new, old) for new, old in zip(again, known, strict=True)
         )
         self.missed = 1.0
-
-    def _products(self, normal, width, back, ahead, above, below) -> np.ndarray:
-        """(n,) sum of a contact's products, in its unit."""
-        return (normal * width + self._rough * (back * above + ahead * below)) / self._unit
-
-    def _undecided(self) -> np.ndarray:
-        ratio = np.stack([self._kn * self._width / self._normal, *(self._ks * self._slip / self._left())])
-        vague = (ratio < _CLEAR) & (ratio > 1.0 / _CLEAR)
-        return vague[0] | (vague[1:].any(axis=0) & self._rough & (ratio[0] < 1.0))
 
     def states(self) -> tuple[np.ndarray, np.ndarray]:
         """States and directions (n,) that the contacts approach."""
