@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import dda
+from ..ddm.face_laws import Released
 from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Motion, Problem, State
 from .side_by_side import side_by_side
@@ -233,7 +234,7 @@ def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
     for child in np.unique(cracks.block).tolist():
         block = int(parent[child])
         if block in history:
-            found[child] = replace(history[block], work=0.0) if block in told else history[block]
+            found[child] = replace(history[block], work=0.0, released=Released()) if block in told else history[block]
             told.add(block)
     return found
 

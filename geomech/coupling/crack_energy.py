@@ -1,5 +1,5 @@
 """Where the energy goes that blocks spend on their cracks: it is stored around them, rubbed off between their faces,
-released at their tips as they grow, and set free where blocks part.
+released by cement that breaks and at tips as they grow, and set free where blocks part.
 
 The block solver knows the work of its mean stress on the strain of its cracks, A σ : dε_c. By Clapeyron's theorem a
 body with jumps [u] whose faces bear t where the same loads would bring t₀ without them stores ½ ∫ (t₀ − t)·[u] more;
@@ -9,8 +9,8 @@ begin. So four quantities found apart from each other have to add up; what is le
 whose strain the blocks feel: where that is their mean stress alone (`by_mean_stress`), that stress brings it.
 
 At rest forces have to be passed on as they are spread, and open cracks by more than their mean stress does. There the
-work of all of them counts (`work_on_cracks`); what it is beyond A σ : dε_c has a column of its own, for the blocks have
-not counted it. Where G is above what rock takes, at rest the surplus is lost (in motion it moves the rock).
+work of all of them counts (`work_on_cracks`), also where faces hold until these have come to their strength (`Released`);
+what it is beyond A σ : dε_c has a column of its own, for the blocks have not counted it. Where G is above what rock takes, at rest the surplus is lost (in motion it moves the rock).
 
 Cracks that run through at rest do so under forces that are held up until the block parts: G and the work of the forces
 grow without bound as the last ligament goes, though no such work is ever done. So what is counted of a step in which a
@@ -105,8 +105,9 @@ class CrackEnergy:
 
     work       of the blocks' mean stress (that of the middle of each step) on the strain of their cracks
     uneven     at rest: of the forces on them, beyond that of their mean stress
-    stored     around cracks, now
+    stored     around cracks and in what fills them, now
     friction   rubbed off between crack faces
+    bond       released by the cement of their faces as it breaks
     fracture   released at tips that grew, of what the blocks spend: of those that feel no more than their mean stress
                (`by_mean_stress`) by the K of that stress; at rest no more than rock takes
     runaway    released there at rest beyond what rock takes: lost
@@ -116,7 +117,8 @@ class CrackEnergy:
                walls now, and what the blocks stored less their parts (and the contacts between them); and where cracks are cut into
                stressed rock
     set_free   by the blocks themselves as they parted
-    residual   work + uneven + set_free − stored − friction − fracture − runaway − parting: of increments and steps
+    residual   work + uneven + set_free − stored − friction − bond − fracture − runaway − parting: of increments and
+               steps
     """
 
     static: bool = False
@@ -124,6 +126,7 @@ class CrackEnergy:
     uneven: float = 0.0
     stored: float = 0.0
     friction: float = 0.0
+    bond: float = 0.0
     fracture: float = 0.0
     runaway: float = 0.0
     toughness: float = 0.0
@@ -266,19 +269,23 @@ class CrackEnergy:
         )
         self._growing = {key: replace(of, block=now[of.block]) for key, of in self._growing.items() if of.block in now}
 
-    def _runs_through(self, block: int, rubbed: float = 0.0) -> None:
-        """At rest ``block`` is cut by tips that have grown in the present step or are about to; ``rubbed`` J/m have been
-        rubbed off in it since the step began. What was released in it until then was not paid for."""
+    def _runs_through(self, block: int, rubbed: float = 0.0, bond: float = 0.0) -> None:
+        """At rest ``block`` is cut by tips that have grown in the present step or are about to; ``rubbed`` J/m
+        have been rubbed off in it and ``bond`` released by cement since the step began. What was released in it until then was
+        not paid for."""
         own = [key for key, of in self._growing.items() if of.block == block]
         taken = self._taken.pop(block, 0.0) + sum(of.way * of.cost for of in map(self._growing.pop, own))
         for sums in (self._released, self._lost):
             sums.pop(block, None)
-        stored = self._rested.pop(block).crack_energy if block in self._rested else 0.0
+        rested = self._rested.pop(block, None)
+        stored = 0.0 if rested is None else rested.crack_energy + rested.filling_energy
         self.stored -= stored
         self.friction += rubbed
+        self.bond += bond
         self.fracture += taken
-        self.uneven += max(0.0, taken + rubbed - stored)
-        self.runaway += max(0.0, stored - taken - rubbed)
+        spent = taken + rubbed + bond
+        self.uneven += max(0.0, spent - stored)
+        self.runaway += max(0.0, stored - spent)
 
     @property
     def under_way(self) -> bool:
@@ -307,15 +314,19 @@ class CrackEnergy:
             gone = {block: felt[block] for block in cut if block in felt}
             felt = {block: of for block, of in felt.items() if block not in gone}
             for block, of in gone.items():
-                rubbed = of.frictional_work - _rubbed(self._rested.get(block))
-                self._runs_through(block, rubbed)
+                rubbed, of_cement = of.given_way
+                self._runs_through(block, rubbed, of_cement.bond)
                 each[block] = 0.0
         hangs = {block: block in by_mean_stress for block in felt}
         done = sum(self._work_at_rest(before, felt, hangs, each)) if self.static else work
-        stored = sum(solution.crack_energy for solution in felt.values())
-        friction = sum(solution.frictional_work for solution in felt.values())
+        stored = sum(solution.crack_energy + solution.filling_energy for solution in felt.values())
+        rubbed, released_there = zip(*(of.given_way for of in felt.values())) if felt else ((), ())
+        friction, bond = sum(rubbed), sum(of.bond for of in released_there)
         if self.static:
-            friction += sum(of.frictional_work for of in gone.values())
+            done += sum(of.slip_onset + of.break_onset for of in released_there)
+        else:
+            # Blocks in motion have spent on their cracks what they have.
+            bond -= sum(of.break_onset for of in released_there)
         # What a block stored that begins to hang, or is whole no more, was of another kind.
         self._parted |= any(hangs.get(block) != hung for block, hung in self._hangs.items() if block not in cut)
         # Cracks that are cut into stressed rock open against less than bears them: what is left over is set free.
@@ -323,7 +334,7 @@ class CrackEnergy:
         self._parted |= bool(np.any(before.stress[new]))
         self._hangs = hangs
         released, lost = sum(self._released.values()), sum(self._lost.values())
-        rest = done + set_free - (stored - self.stored) - (friction - self.friction) - released
+        rest = done + set_free - (stored - self.stored) - friction - bond - released
         self.work += work
         self.uneven += done - work
         self.set_free += set_free
@@ -334,7 +345,7 @@ class CrackEnergy:
             self.parting += rest
         else:
             self.residual += rest
-        self.stored, self.friction = stored, friction
+        self.stored, self.friction, self.bond = stored, self.friction + friction, self.bond + bond
         self._released, self._lost, self._taken = {}, {}, {}
         self._asked, self._parted = 0.0, False
         self._began, self._first, self._strain_began = self._last, None, self._strain_last
@@ -364,13 +375,10 @@ class CrackEnergy:
         return {
             "crack_elastic": self.stored,
             "crack_friction": self.friction,
+            "crack_bond_loss": self.bond,
             "fracture_energy": self.fracture,
             "toughness_energy": self.toughness,
             "parting_energy": self.parting,
             **at_rest,
             "crack_residual": self.residual,
         }
-
-
-def _rubbed(solution: Solution | None) -> float:
-    return 0.0 if solution is None else solution.frictional_work

@@ -166,5 +166,5 @@ def _memory(of: Solution | FaceMemory, body: Body) -> FaceMemory:
     if memory is None:
         c = of.body.faces
         slip = of.jumps.reshape(c.n, 2, c.per)[:, 0].ravel()
-        memory = FaceMemory(c, slip, np.zeros(slip.size, bool), 0.0, of.face_states, np.zeros(slip.size))
+        memory = FaceMemory(c, slip, np.zeros(slip.size, bool), 0.0, of.face_states, *np.zeros((2, slip.size)))
     return carried_over(memory, body.faces)

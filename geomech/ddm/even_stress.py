@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .face_laws import FaceStates
+from .face_laws import FaceStates, Released
 from .unit_loads import on_elements
 
 if TYPE_CHECKING:
@@ -52,7 +52,8 @@ class EvenSolution:
 
     memory = None
     began = None
-    frictional_work = 0.0
+    frictional_work = filling_energy = 0.0
+    given_way = 0.0, Released()
 
     def __init__(self, body: Body, response: EvenResponse, stress: np.ndarray) -> None:
         self.body, self.closed, self._response = body, response.closed, response

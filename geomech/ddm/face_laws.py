@@ -12,9 +12,9 @@ filling.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -48,11 +48,22 @@ class FaceStates:
         return self.closed.tobytes() + self.way.tobytes() + self.pulled.tobytes()
 
 
+class Released(NamedTuple):
+    """J/m since the beginning. Of cement that broke, ``bond``: the mean of its strength and of what its faces bear
+    afterwards, on the way they part. Faces give way only once what they bear has come to their strength, while the
+    mean of a step's loads begins with the first of them: by so much more the loads did that were there when faces
+    slipped, ``slip_onset``, and parted, ``break_onset``."""
+
+    bond: float = 0.0
+    slip_onset: float = 0.0
+    break_onset: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class FaceMemory:
     """What the faces of crack ``elements`` keep from load to load: ``rest`` (n,) the slip (times 2μ) at which they are
     without shear, ``broken`` (n,) lost cement, ``work`` J/m done against friction since the beginning, ``states`` as
-    they were, ``pressure`` (n,) Pa between them."""
+    they were, ``pressure`` and ``shear`` (n,) Pa between them, ``released`` what giving way has come to."""
 
     elements: ElementSet
     rest: np.ndarray
@@ -60,11 +71,13 @@ class FaceMemory:
     work: float
     states: FaceStates
     pressure: np.ndarray
+    shear: np.ndarray
+    released: Released = field(default_factory=Released)
 
     @classmethod
     def none(cls, elements: ElementSet) -> FaceMemory:
         n = elements.n * elements.per
-        return cls(elements, np.zeros(n), np.zeros(n, bool), 0.0, FaceStates.open(n), np.zeros(n))
+        return cls(elements, np.zeros(n), np.zeros(n, bool), 0.0, FaceStates.open(n), np.zeros(n), np.zeros(n))
 
 
 def all_smooth(laws: Sequence[JointLaw]) -> bool:
@@ -177,4 +190,5 @@ def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
 
     states = memory.states
     moved = FaceStates(taken(states.closed), taken(states.way), taken(states.pulled))
-    return FaceMemory(now, rest.ravel(), taken(memory.broken), memory.work, moved, taken(memory.pressure))
+    pressure, shear = taken(memory.pressure), taken(memory.shear)
+    return FaceMemory(now, rest.ravel(), taken(memory.broken), memory.work, moved, pressure, shear, memory.released)

@@ -25,7 +25,7 @@ from dataclasses import replace
 import numpy as np
 
 from .crack_system import CrackSystem, Rows
-from .face_laws import FaceLaws, FaceMemory, FaceStates
+from .face_laws import FaceLaws, FaceMemory, FaceStates, Released
 from .faces import NotConverged
 from .factor import Factor
 from .iterative import Iterated, IterativeCrackSystem
@@ -302,5 +302,44 @@ def settle_rough(
     slides = states.way != 0  # what cannot has an infinite limit
     before = np.where(slides, laws.limit(memory.pressure, contact.broken), 0.0)
     lost = np.where(slides, 0.5 * (states.way * before - reaction[laws.along]) * (rest - memory.rest), 0.0)
-    work = memory.work + float(laws.elements.quadrature.ravel() @ lost) / laws.twice_mu
-    return w, reaction, FaceMemory(laws.elements, rest, contact.broken, work, states, pressure), contact.solves
+    shear = np.where(states.closed, -reaction[laws.along], 0.0)
+    weights = laws.elements.quadrature.ravel() / laws.twice_mu
+    work = memory.work + float(weights @ lost)
+    # Faces that held as the step began, and slip at its end, bore less than their limit before it.
+    untouched = not memory.states.closed.any() and not memory.rest.any()
+    held = memory.states.closed & (memory.states.way == 0) | laws.cemented(memory.broken)
+    held |= untouched & laws.closes & (laws.aperture == 0)
+    slips = np.where(held & slides, lost - 0.5 * (memory.shear - reaction[laws.along]) * (rest - memory.rest), 0.0)
+    breaks = contact.broken & ~memory.broken
+    bond, ahead = _breaking(laws, memory, w, pressure, shear, lost) if breaks.any() else np.zeros((2, len(lost)))
+    new = float(weights[breaks] @ bond[breaks]), float(weights @ np.where(breaks, 0.0, slips))
+    released = Released(*(a + b for a, b in zip(memory.released, (*new, float(weights[breaks] @ ahead[breaks])))))
+    now = FaceMemory(laws.elements, rest, contact.broken, work, states, pressure, shear, released)
+    return w, reaction, now, contact.solves
+
+
+def _breaking(
+    laws: FaceLaws, memory: FaceMemory, w: np.ndarray, pressure: np.ndarray, shear: np.ndarray, lost: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n_nodes,) what cement releases that breaks at its strength since the load of ``memory``, and how much more that
+    and what is ``lost`` to friction come to than the mean of what acts at both loads (times 2μ, J/m²)."""
+    pull_a, pull_b = -memory.pressure, -pressure
+    strength = np.maximum(laws.strength, pull_a)
+    parted = w[laws.across] + laws.aperture
+    wide_a, wide_s = pull_a / laws.normal, strength / laws.normal
+    slid_a = memory.shear / laws.shear
+    moved = w[laws.along] - memory.rest - slid_a
+    stored_a, stored_s = 0.5 * pull_a * wide_a, 0.5 * strength * wide_s
+    stored_b = stored_by_fillings(laws, pressure, np.zeros_like(shear))
+    released = 0.5 * (strength + pull_b) * (parted - wide_s)
+    by_pull = released + stored_s - stored_b
+    sheared = 0.5 * (memory.shear + shear) * moved + 0.5 * memory.shear * slid_a - 0.5 * shear * shear / laws.shear
+    by_shear = np.maximum(sheared - lost, 0.0)
+    ahead = released + stored_s - stored_a - 0.5 * (pull_a + pull_b) * (parted - wide_a)
+    return by_pull + by_shear, ahead + lost + by_shear - sheared
+
+
+def stored_by_fillings(laws: FaceLaws, pressure: np.ndarray, shear: np.ndarray) -> np.ndarray:
+    """(n_nodes,) energy (times 2μ, J/m²) of what is between faces under ``pressure`` and ``shear``, Pa; 0 of open
+    ones, between which nothing acts."""
+    return 0.5 * (shear * shear / laws.shear + pressure * pressure / laws.normal)

@@ -14,7 +14,8 @@ from . import shapes
 from .applied import Applied
 from .beside_ends import ElementEnds
 from .boundary import middle_of
-from .face_laws import FaceStates
+from .face_laws import FaceStates, Released
+from .friction import stored_by_fillings
 from .influence import add_fields
 from .placing import OFF, onto_boundary, sides_for
 from .reactions import Reactions, reactions
@@ -100,6 +101,22 @@ class Solution:
     def frictional_work(self) -> float:
         """J/m turned into heat by friction between crack faces, from the first solution of the history to this one."""
         return 0.0 if self.memory is None else self.memory.work
+
+    @property
+    def given_way(self) -> tuple[float, Released]:
+        """J/m of this step of the history alone: rubbed off between crack faces, and what they released."""
+        if self.memory is None:
+            return 0.0, Released()
+        released = (now - before for now, before in zip(self.memory.released, self.began.released))
+        return self.memory.work - self.began.work, Released(*released)
+
+    @cached_property
+    def filling_energy(self) -> float:
+        """J/m stored in what is between crack faces."""
+        if self.memory is None:
+            return 0.0
+        stored = stored_by_fillings(self.body.laws, self.memory.pressure, self.memory.shear)
+        return float(self.body.faces.quadrature.ravel() @ stored) / (2 * self.body.material.shear_modulus)
 
     @cached_property
     def tips(self) -> np.ndarray:
