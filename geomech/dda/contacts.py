@@ -16,6 +16,7 @@ from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
+from .nodes_in_faces import flat_nodes, nodes_in_faces
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -64,6 +65,7 @@ class ContactFinder:
         self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
+        self._flat = flat_nodes(blocks.vertices, self._next, self._previous)
         self._rigid = rigid
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
@@ -114,19 +116,35 @@ class ContactFinder:
             keep = law != _NEVER
             table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
             partner = _among(keep, partner)
+        nodes, own = None, parent
+        by_length = self._stiff & self._stiff_along
+        if by_length.any():
+            nodes = nodes_in_faces(
+                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, by_length[law], partner
+            )
+        if nodes is not None:
+            geometry[:, 4] = nodes.lengths(geometry[:, 4])
+            parent = nodes.heirs(own, old["state"])
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
         remembered = self._remembered(old, parent, state.time, geometry, partner, springs, self._stiff[law])
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
         vertex, edge = table[:, 0].copy(), table[:, 1].copy()
+        keep = np.ones(len(vertex), bool)
+        if nodes is not None:
+            for name in ("normal", "shear") if len(old) else ():
+                borne = np.where(own >= 0, old[name + "_force"][own], 0.0)
+                remembered[name] = nodes.left(borne)
+            keep[nodes.node] = False
         glued = None
         if glue_holds and remembered["bonded"].any():
             along = vertices[self._next[edge]] - vertices[edge]
             share = geometry[:, 4] / np.hypot(along[:, 0], along[:, 1])
             glued = held_by_glue(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
-        if glued is not None:
-            keep = ~glued
+            if glued is not None:
+                keep &= ~glued
+        if not keep.all():
             vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
             partner, geometry = _among(keep, partner), geometry[keep]
             springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
