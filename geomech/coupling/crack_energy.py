@@ -379,6 +379,7 @@ class CrackEnergy:
             "fracture_energy": self.fracture,
             "toughness_energy": self.toughness,
             "parting_energy": self.parting,
+            "set_free_energy": self.set_free,
             **at_rest,
             "crack_residual": self.residual,
         }

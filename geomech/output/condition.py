@@ -61,11 +61,14 @@ def motion_summary(cycle: Cycle) -> dict[str, Any]:
 
 
 def energy_summary(cycle: Cycle) -> dict[str, float]:
-    """The energy budget of the run, J/m: for ``summary.json``. Empty without one."""
+    """The energy budget of the run, J/m, ``budget_residual`` as a part of all energy turned over: for ``summary.json``.
+    Empty without one."""
     names = (
         "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",
         "friction_loss",
         "damping_loss", "bond_loss", "scheme_loss", "carried_loss", "overlap_energy", "energy_residual",
+        "uneven_work", "set_free_energy", "crack_elastic", "crack_friction", "crack_bond_loss", "fracture_energy",
+        "runaway_loss", "parting_energy", "toughness_energy", "crack_residual", "budget_residual",
     )  # fmt: skip
     return {name: float(cycle.statistics[name]) for name in names if name in cycle.statistics}
 

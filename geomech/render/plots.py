@@ -25,7 +25,12 @@ _ENERGIES = {
     "elastic_energy": "elastic",
     "contact_energy": "contacts",
     "kinetic_energy": "kinetic",
-    "crack_work": "cracks",
+    "crack_elastic": "around cracks",
+    "fracture_energy": "new crack",
+    "crack_friction": "crack faces",
+    "crack_bond_loss": "cement of cracks",
+    "runaway_loss": "cracks run away",
+    "parting_energy": "blocks parted",
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "broken bonds",
@@ -64,7 +69,9 @@ def energies(axes: Axes, run: Run) -> None:
 
 def _energy_curves(run: Run) -> dict[str, np.ndarray]:
     history = to_the_end(run)
-    work = [history[name] for name in ("load_work", "gravity_work") if name in history.dtype.names]
+    # At rest forces do more on cracks than blocks of one strain know.
+    done = ("load_work", "gravity_work", "uneven_work")
+    work = [history[name] for name in done if name in history.dtype.names]
     curves = {"work done": np.nansum(work, axis=0)} if work else {}
     curves |= {told: history[name] for name, told in _ENERGIES.items() if name in history.dtype.names}
     largest = max((float(np.nanmax(np.abs(curve), initial=0.0)) for curve in curves.values()), default=0.0)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..output.reading import Run
 from ..output.units import largest_of, length_text, length_unit, stress_text, stress_unit
+from .energy_tables import add_energy
 from .page import Page, written
 
 #: A record of the log, which may run over several lines, up to the next.
@@ -33,21 +34,6 @@ _JOINT = {
     "friction_angle_deg": ("friction, °", 1.0),
     "cohesion_pa": ("cohesion, MPa", 1e-6),
     "tensile_strength_pa": ("tensile strength, MPa", 1e-6),
-}
-#: Parts of the energy budget → what they are called.
-_ENERGY = {
-    "load_work": "work of loads",
-    "gravity_work": "work of gravity",
-    "elastic_energy": "elastic, in blocks",
-    "contact_energy": "elastic, in contacts",
-    "kinetic_energy": "kinetic",
-    "crack_work": "cracks: opening, growth",
-    "friction_loss": "friction",
-    "damping_loss": "damping",
-    "bond_loss": "broken bonds",
-    "scheme_loss": "time scheme",
-    "overlap_energy": "overlaps",
-    "energy_residual": "unexplained",
 }
 
 
@@ -276,12 +262,7 @@ def _add_blocks(page: Page, summary: Mapping[str, Any]) -> None:
             "The blocks that have moved farthest",
         )
     if energy:
-        done = abs(energy.get("load_work", 0.0) + energy.get("gravity_work", 0.0))
-        rows = [(told, energy[name]) for name, told in _ENERGY.items() if energy.get(name)]
-        page.table(
-            ["energy", "J/m", "% of the work done"],
-            [[told, value, f"{100 * value / done:.2f}" if done else None] for told, value in rows],
-        )
+        add_energy(page, energy)
 
 
 def add_time(page: Page, summary: Mapping[str, Any]) -> None:
