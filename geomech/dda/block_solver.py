@@ -33,12 +33,14 @@ ROUND_OFF = 2e-15
 COARSE = 1e-6
 #: Refinements of a solution at most.
 REFINEMENTS = 3
-#: A 6×6 diagonal block has changed when one of its entries has by more than this part of the largest: what stiff
+#: A 6×6 diagonal block has changed when one of its entries has by more than this part of the largest diagonal one: what stiff
 #: springs lose so stays below the inertia that holds a block against them (measured: 1e-3 takes twice the time at dt =
 #: 1 ms).
 CHANGED = 1e-6
 #: Solutions in a cycle of GMRES at most.
 TRIES = 16
+#: Where so many have changed, it is taken that as many will have the next time.
+MOSTLY = 0.9
 #: Where fronts cannot be eliminated one by one, factors that differ in so few blocks are not made anew.
 FEW = 12
 #: Free blocks from which factors are in single precision: half the memory, and on walls of 10 000 bricks three quarters
@@ -109,17 +111,19 @@ def largest_terms(data, pointer, columns, x):
 
 @_jit
 def _changed(data, diagonal, factored, tolerance):
-    """(n,) whether a diagonal block of ``data`` differs from the one ``factored`` (n, 36) by more than this part of its
-    largest entry."""
+    """(n,) whether a diagonal block of ``data`` differs from the one ``factored`` (n, 36) by more than this part of the
+    largest entry on its diagonal."""
     n = len(diagonal)
-    out = np.empty(n, np.bool_)
+    out = np.zeros(n, np.bool_)
     for b in range(n):
-        change, size = 0.0, 0.0
+        here, size = data[36 * diagonal[b] : 36 * diagonal[b] + 36], 0.0
+        for k in range(0, 36, 7):
+            size = max(size, abs(here[k]))
         for k in range(36):
-            now = data[36 * diagonal[b] + k]
-            change, size = max(change, abs(now - factored[b, k])), max(size, abs(now))
-        # Not a number has changed.
-        out[b] = not change <= tolerance * size
+            # Not a number has changed.
+            if not abs(here[k] - factored[b, k]) <= tolerance * size:
+                out[b] = True
+                break
     return out
 
 
@@ -130,6 +134,10 @@ def _take(data, diagonal, changed, factored):
         if changed[b]:
             for k in range(36):
                 factored[b, k] = data[36 * diagonal[b] + k]
+
+
+#: A solution (6n,) and its product with the matrix.
+_Known = tuple[np.ndarray, np.ndarray]
 
 
 class BlockSolver:
@@ -198,7 +206,7 @@ class BlockSolver:
             return exactly
         try:
             if factors is self._factors:
-                self._bring(data, 0)
+                self._bring(data, 0, rough=True)
             else:
                 factors.factor(data)
                 self._count(1.0)
@@ -206,11 +214,17 @@ class BlockSolver:
             self._rough_serves = False
             return exactly
 
+        known: _Known | None = None
+
         def solution(right: np.ndarray, within: float, start: np.ndarray | None = None) -> np.ndarray:
+            nonlocal known
             if self._rough_serves:
-                x = self._iterate(data, right, within, factors, start)
-                if x is not None:
-                    return x
+                # What is begun from is mostly the last answer, whose product with the matrix is known.
+                same = known is not None and known[0] is start
+                begun = None if start is None else (start, known[1] if same else self.multiply(data, start))
+                known = self._iterate(data, right, within, factors, begun)
+                if known is not None:
+                    return known[0]
                 self._rough_serves = False
             if self._factors.single:
                 self._hold(np.float64)
@@ -228,57 +242,56 @@ class BlockSolver:
                 self._hold(np.float32)
             return self._factors
         if self._rough is None:
-            self._rough = Factors(*self._pattern, np.float32, self._factors.tree)
+            self._rough = Factors(*self._pattern, np.float32, self._factors.tree, again=False)
         return self._rough
 
     def _solved(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
         """`solve` with the factors as they are; None where single precision does not do."""
         if self._has_factors:
             fresh = self._bring(data, 0 if self._factors.tree.kept else FEW)
-            x = self._iterate(data, right, within, self._factors)
+            found = self._iterate(data, right, within, self._factors)
             # Single precision knows no more of this matrix than that, in full or in part.
-            if x is not None or (fresh and self._factors.single):
-                return x
+            if found is not None or (fresh and self._factors.single):
+                return None if found is None else found[0]
         self.factor(data)
         if self._factors.single:
-            return self._iterate(data, right, within, self._factors)
-        x = self.substitute(right)
+            found = self._iterate(data, right, within, self._factors)
+            return None if found is None else found[0]
+        x, target, told = self.substitute(right), within * float(np.abs(right).max(initial=0.0)), False
         for _ in range(REFINEMENTS):
-            rest, target = self._residual(data, right, x, within)
-            if not np.abs(rest).max() > target:
+            rest = right - self.multiply(data, x)
+            largest = float(np.abs(rest).max())
+            if largest > target and not told:
+                target, told = max(target, self._round_off(data, x)), True
+            if not largest > target:
                 break
             x += self.substitute(rest)
         return x
 
-    def _residual(
-        self, data: np.ndarray, right: np.ndarray, x: np.ndarray, within: float, first: bool = False
-    ) -> tuple[np.ndarray, float]:
-        """b − A x, and how large its largest entry may be; of the ``first`` x, coarse ones need not know round-off."""
-        rest = right - multiply(data, self.pointer, self.columns, x)
-        target = within * float(np.abs(right).max(initial=0.0))
-        # Round-off is asked for only where it may decide.
-        if not (first and within > COARSE) and np.abs(rest).max(initial=0.0) > target:
-            target = max(target, ROUND_OFF * largest_terms(data, self.pointer, self.columns, x))
-        return rest, target
+    def _round_off(self, data: np.ndarray, x: np.ndarray) -> float:
+        """The largest entry of a residual that is round-off."""
+        return ROUND_OFF * largest_terms(data, self.pointer, self.columns, x)
 
-    def _bring(self, data: np.ndarray, few: int) -> bool:
-        """Factor what has changed in the matrix of ``data`` where more than ``few`` blocks have; whether any was."""
+    def _bring(self, data: np.ndarray, few: int, rough: bool = False) -> bool:
+        """Factor what has changed in the matrix of ``data`` where more than ``few`` blocks have; whether any was. Of
+        ``rough`` solutions' matrices mostly all has, and will have in the next one."""
         changed = _changed(data, self._diagonal, self._factored, CHANGED) if self._has_factors else None
-        if changed is not None and np.count_nonzero(changed) <= few:
+        number = self.n if changed is None else np.count_nonzero(changed)
+        if number <= few:
             self.work.factorisations_kept += 1
             return False
-        self.factor(data, changed)
+        self.factor(data, changed, not rough or changed is None or number < MOSTLY * self.n)
         return True
 
     def _count(self, share: float) -> None:
         self.counts["factorisations"] += 1
         self.counts["shares"] += share
 
-    def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> None:
-        """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only.
-        Raises numpy.linalg.LinAlgError when it is singular."""
+    def factor(self, data: np.ndarray, changed: np.ndarray | None = None, again: bool = True) -> None:
+        """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only;
+        ``again``: see `Factors.factor`. Raises numpy.linalg.LinAlgError when it is singular."""
         self._has_factors, began = False, time.perf_counter()
-        share = self._factors.factor(data, changed)
+        share = self._factors.factor(data, changed, again)
         _take(data, self._diagonal, np.ones(self.n, np.bool_) if changed is None else changed, self._factored)
         self._has_factors = True
         self._count(share)
@@ -295,21 +308,27 @@ class BlockSolver:
         return multiply(data, self.pointer, self.columns, x)
 
     def _iterate(
-        self, data: np.ndarray, right: np.ndarray, within: float, factors: Factors, start: np.ndarray | None = None
-    ) -> np.ndarray | None:
-        """GMRES with ``factors`` on the right, from ``start`` (6n,) on; None when it takes too long."""
-        if start is None:
+        self, data: np.ndarray, right: np.ndarray, within: float, factors: Factors, begun: _Known | None = None
+    ) -> _Known | None:
+        """GMRES with ``factors`` on the right, from what is ``begun`` with; None when it takes too long."""
+        target, told = within * float(np.abs(right).max(initial=0.0)), False
+        if begun is None:
             x = self.substitute(right, factors)
         else:
-            rest, target = self._residual(data, right, start, within, True)
+            x, product = begun
+            rest = right - product
             if np.abs(rest).max(initial=0.0) <= target:
-                return start
-            x = start + self.substitute(rest, factors)
+                return begun
+            x = x + self.substitute(rest, factors)
         for cycle in range(3):
-            rest, target = self._residual(data, right, x, within, cycle == 0)
+            product = self.multiply(data, x)
+            rest = right - product
             largest = float(np.abs(rest).max(initial=0.0))
+            # Round-off is asked for only where it may decide, once: the first x of a coarse solution need not know it.
+            if largest > target and not told and (cycle or within <= COARSE):
+                target, told = max(target, self._round_off(data, x)), True
             if largest <= target:
-                return x
+                return x, product
             if not np.isfinite(largest):
                 return None
             step = self._krylov(data, rest, target, factors)

@@ -35,8 +35,10 @@ class Tree:
     seat          (…,)            where each of them stands in the parent's front
     entries       (n_fronts + 1,) first matrix block of every front in ``entry``
     entry, row, column            the matrix block, and where it stands in the front
-    stack         (n_fronts,)     where the front leaves its S, in a room of ``stack_size``
-    kept          whether every S has a room of its own, so that fronts can be eliminated again one by one
+    kept          whether every S may have a room of its own, so that fronts can be eliminated again one by one
+    own_room      (n_fronts,)     where the front leaves its S then, in a room of ``own_room_size``
+    stack         (n_fronts,)     where it leaves it in a room of ``stack_size`` that others use after it: what is used
+                                  again soon is still at hand, and need not come from memory
     at            (n_fronts + 1,) first entry of every front's factor
     tasks         (k, 2)          ranges of fronts that are one thread's work at a time, each behind those it needs
     above         (k,)            the task that needs what each task passes on, −1 without
@@ -52,9 +54,11 @@ class Tree:
     entry: np.ndarray
     row: np.ndarray
     column: np.ndarray
+    kept: bool
+    own_room: np.ndarray
+    own_room_size: int
     stack: np.ndarray
     stack_size: int
-    kept: bool
     at: np.ndarray
     tasks: np.ndarray
     above: np.ndarray
@@ -195,11 +199,8 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
         here = entry[entries[f] : entries[f + 1]]
         row[here], column[here] = seats(f, row[here]), seats(f, column[here])
     tasks, above = _tasks(parent, own, far)
-    kept = 36 * int((far**2).sum()) <= KEPT
-    if kept:
-        stack, stack_size = 36 * np.cumsum(far**2) - 36 * far**2, 36 * int((far**2).sum())
-    else:
-        stack, stack_size = _stacked(children, far, tasks)
+    size = 36 * far**2
+    stack, stack_size = _stacked(parent, children, size, tasks)
     return Tree(
         rank=rank,
         pivots=pivots,
@@ -211,9 +212,11 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
         entry=entry,
         row=row[entry],
         column=column[entry],
+        kept=int(size.sum()) <= KEPT,
+        own_room=np.cumsum(size) - size,
+        own_room_size=int(size.sum()),
         stack=stack,
         stack_size=stack_size,
-        kept=kept,
         at=36 * np.concatenate([[0], np.cumsum(own * (own + 2 * far))]),
         tasks=tasks,
         above=above,
@@ -242,17 +245,25 @@ def _tasks(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.nda
     return np.stack([first[order], order + 1], axis=1), number[parent[order]]
 
 
-def _stacked(children: list[list[int]], far: np.ndarray, tasks: np.ndarray) -> tuple[np.ndarray, int]:
-    """Where each front leaves its S, and the room that takes: children's are cleared as they are used, except by fronts
-    of another task."""
-    at = np.zeros(len(far), np.int64)
+def _stacked(
+    parent: np.ndarray, children: list[list[int]], size: np.ndarray, tasks: np.ndarray
+) -> tuple[np.ndarray, int]:
+    """Where each front leaves its S of ``size`` (n_fronts,), and the room that takes. Each task has two stacks, for
+    fronts an even and an odd number of levels from the root: a front's goes onto one while those of its children, the
+    last on the other, are used up."""
+    at, level = np.zeros(len(parent), np.int64), np.zeros(len(parent), np.int64)
+    for f in range(len(parent) - 1, -1, -1):
+        if parent[f] >= 0:
+            level[f] = level[parent[f]] + 1
     base = 0
     for a, b in tasks:
-        top, used = base, base
+        top, most = [0, 0], [0, 0]
         for f in range(a, b):
-            top = min([top, *(at[c] for c in children[f] if c >= a)])
-            at[f] = top
-            top += 36 * far[f] ** 2
-            used = max(used, top)
-        base = used
+            mine = level[f] % 2
+            top[1 - mine] = min([top[1 - mine], *(at[c] for c in children[f] if c >= a)])
+            at[f] = top[mine]
+            top[mine] += size[f]
+            most[mine] = max(most[mine], top[mine])
+        at[a:b] += np.where(level[a:b] % 2 == 1, base + most[0], base)
+        base += sum(most)
     return at, int(base)

@@ -145,7 +145,6 @@ def eliminate(
     row,
     column,
     stack,
-    kept,
     at,
     child,
     sibling,
@@ -155,10 +154,10 @@ def eliminate(
     space,
 ):
     """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
-    ``units`` are 1, −1, 0; ``space``: room for a panel, for a front's rest where these are not ``kept``, and for
-    numbers, as from `working_space`."""
+    ``stack`` (n_fronts,): where S are left in the ``room``; ``units`` are 1, −1, 0; ``space`` as from
+    `working_space`."""
     one, minus, none = units[0:1], units[1:2], units[2:3]
-    panel, spare, begins, swapped = space
+    panel, begins, swapped = space
     for f in range(first, last):
         if not touched[f]:
             continue
@@ -167,7 +166,7 @@ def eliminate(
         m = p + b
         upper = factors[at[f] : at[f] + p * m].reshape((p, m))
         lower = factors[at[f] + p * m : at[f + 1]].reshape((b, p))
-        rest = (room[stack[f] : stack[f] + b * b] if kept else spare[: b * b]).reshape((b, b))
+        rest = room[stack[f] : stack[f] + b * b].reshape((b, b))
         _clear(factors[at[f] : at[f + 1]])
         for k in range(entries[f], entries[f + 1]):
             i, j = row[k], column[k]
@@ -216,19 +215,14 @@ def eliminate(
                 for a in range(6):
                     _add_runs(rest[6 * (met[u] - own) + a], left[6 * u + a], met, begins, mine, runs, own)
             g = sibling[g]
-        if not kept:
-            whole, copied = rest.reshape(b * b), room[stack[f] : stack[f] + b * b]
-            for k in range(b * b):
-                copied[k] = whole[k]
     return True
 
 
 @_jit
-def working_space(pivots, reach, kept, factors):
-    """What `eliminate` works in."""
+def working_space(pivots, reach, factors):
+    """What `eliminate` works in: room for a panel, and for numbers."""
     most, far = longest(pivots, reach, 0, len(reach) - 1)
-    panel, spare = np.empty(PANEL * most, factors.dtype), np.empty(0 if kept else far * far, factors.dtype)
-    return panel, spare, np.empty(far // 6 + 1, np.int64), np.empty(PANEL, np.int64)
+    return np.empty(PANEL * most, factors.dtype), np.empty(far // 6 + 1, np.int64), np.empty(PANEL, np.int64)
 
 
 @_jit

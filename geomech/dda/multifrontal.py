@@ -42,7 +42,6 @@ def _eliminate_shared(
     row,
     column,
     stack,
-    kept,
     at,
     child,
     sibling,
@@ -58,11 +57,11 @@ def _eliminate_shared(
         if q >= len(tasks):
             break
         if space is None:
-            space = working_space(pivots, reach, kept, factors)
+            space = working_space(pivots, reach, factors)
         await_value(awaited, q, 0)
         if not eliminate(
-            tasks[q, 0], tasks[q, 1], touched, data, pivots, reach, seat, entries, entry, row, column, stack, kept, at,
-            child, sibling, room, factors, units, space,
+            tasks[q, 0], tasks[q, 1], touched, data, pivots, reach, seat, entries, entry, row, column, stack, at, child,
+            sibling, room, factors, units, space,
         ):  # fmt: skip
             add_at_once(told, 1, 1)
         if above[q] >= 0:
@@ -129,7 +128,7 @@ class Factors:
 
     ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
     triangles and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree``
-    already planned for the same pattern.
+    already planned for the same pattern. ``again``: whether fronts may be eliminated again one by one.
     """
 
     def __init__(
@@ -139,6 +138,7 @@ class Factors:
         columns: np.ndarray,
         dtype: type = np.float64,
         tree: Tree | None = None,
+        again: bool = True,
     ):
         self.tree: Tree = plan(points, rows, columns) if tree is None else tree
         parent = self.tree.parent
@@ -152,7 +152,10 @@ class Factors:
         above = self.tree.above
         self._awaited = np.bincount(above[above >= 0], minlength=len(above))
         self._factors = np.empty(self.tree.at[-1], dtype)
-        self._room = np.empty(self.tree.stack_size, dtype)
+        # Whether factors may be made anew in part, and whether those at hand may: every S is where it was left.
+        again = again and self.tree.kept
+        self._room = np.empty(self.tree.own_room_size if again else self.tree.stack_size, dtype)
+        self._again, self._left = again, False
         self._passed = np.empty(6 * self.tree.reach[-1], dtype)
         self._units = np.array([1.0, -1.0, 0.0], dtype)
 
@@ -161,21 +164,24 @@ class Factors:
         """Whether the factors are in single precision."""
         return self._factors.dtype == np.float32
 
-    def factor(self, data: np.ndarray, changed: np.ndarray | None = None) -> float:
+    def factor(self, data: np.ndarray, changed: np.ndarray | None = None, again: bool = True) -> float:
         """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row; the share of it that was done.
 
         Where only rows and columns of the blocks ``changed`` (n,) differ from the matrix factored before, only their
-        fronts and those above are eliminated again. Raises numpy.linalg.LinAlgError when the matrix is singular.
+        fronts and those above are eliminated again, unless it was not to be done ``again``. Raises
+        numpy.linalg.LinAlgError when the matrix is singular.
         """
         t = self.tree
         touched = np.ones(len(t.parent), np.bool_)
-        if changed is not None and t.kept:
+        if changed is not None and self._left:
             touched[:] = False
             touched[self._front[changed]] = True
             _mark_above(touched, t.parent)
+        self._left = self._again and (again or not touched.all())
         told = self._shared(
             _eliminate_shared, THREADED, touched, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row, t.column,
-            t.stack, t.kept, t.at, self._child, self._sibling, self._room, self._factors, self._units,
+            t.own_room if self._left else t.stack, t.at, self._child, self._sibling, self._room, self._factors,
+            self._units,
         )  # fmt: skip
         if told[1]:
             raise np.linalg.LinAlgError("the block system is singular")

@@ -82,6 +82,27 @@ def test_only_fronts_of_changed_springs_are_factored_again():
     assert solver.counts["shares"] == before + 1.0
 
 
+def test_factors_are_the_same_where_fronts_share_room_and_then_made_anew_in_full():
+    points, rows, columns, data = springs_between(700, seed=12, islands=True)
+    shared = multifrontal.Factors(points, rows, columns, again=False)
+    own = multifrontal.Factors(points, rows, columns)
+    assert own.tree.stack_size < 0.6 * own.tree.own_room_size
+    for factors in (shared, own):
+        assert factors.factor(data.ravel()) == 1.0
+    assert np.array_equal(shared._factors, own._factors)
+    few = np.zeros(700, bool)
+    few[[3, 400]] = True
+    data[few[rows] & (rows == columns)] *= 1.5
+    # Rooms that others have used hold nothing to go on from.
+    shared.factor(data.ravel(), few)
+    own.factor(data.ravel(), again=False)
+    assert own.factor(data.ravel(), few) == 1.0
+    data[few[rows] & (rows == columns)] *= 1.5
+    assert own.factor(data.ravel(), few) < 0.5
+    assert shared.factor(data.ravel(), few) == 1.0
+    assert np.array_equal(shared._factors, own._factors)
+
+
 def test_single_precision_is_refined_to_the_same_residual(monkeypatch):
     points, rows, columns, data = springs_between(600, seed=8)
     # As much inertia as a short step brings: with less, these springs at random are beyond single precision.
