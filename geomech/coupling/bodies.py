@@ -12,8 +12,9 @@ from .. import dda
 from ..ddm.face_laws import Released
 from ..ddm.work import Work
 from ..model import TIP, Blocks, Cracks, Motion, Problem, State
+from . import tractions
 from .side_by_side import side_by_side
-from .tractions import BoundaryLoad, boundary_load
+from .tractions import BoundaryLoad
 
 if TYPE_CHECKING:
     from ..ddm import Body
@@ -113,44 +114,31 @@ def boundary_loads(
     """block → load of every one of ``bodies``, from the step ``result`` that began at ``state``; ``motion`` leads to
     its vertices: on that geometry the forces are in equilibrium."""
     forces, numbers = result.forces, np.array(list(bodies), int)
-    strengths = [joint.tensile_strength for joint in problem.joints]
     rigid = np.array([material.rigid for material in problem.materials], bool)
     keep_straight = blocks.fixed | rigid[blocks.material]
     if blocks.held is not None:
         keep_straight = keep_straight | blocks.held.any(axis=1)
-    acting = beside_acting(result.contacts, blocks.n_blocks)
-    touching = zip(_rows_of(acting["block"], numbers), _rows_of(acting["other"], numbers))
-    contacts, edges, points = (
-        dict(zip(bodies, rows))
-        for rows in (
-            # In the order of the contacts, a block's own and its neighbours' alike.
-            [acting[np.union1d(own, others)] for own, others in touching],
-            [forces.edges[rows] for rows in _rows_of(forces.edges["block"], numbers)],
-            [forces.points[rows] for rows in _rows_of(forces.points["block"], numbers)],
-        )
+    density = np.array([material.density for material in problem.materials])
+    loads = tractions.boundary_loads(
+        numbers,
+        blocks,
+        result.vertices,
+        motion,
+        state.rotation[numbers] + result.turn[numbers],
+        beside_acting(result.contacts, blocks.n_blocks),
+        forces.edges,
+        forces.points,
+        density[blocks.material[numbers]],
+        forces.inertia.gravity,
+        result.acceleration[numbers],
+        problem.dda.dynamic_factor * state.velocity[numbers, 2],
+        None if forces.reaction is None else forces.reaction[numbers],
+        problem.run.boundary_stress,
+        [joint.tensile_strength for joint in problem.joints],
+        None if forces.overstress is None else forces.overstress[numbers],
+        keep_straight,
     )
-    return {
-        b: boundary_load(
-            b,
-            blocks,
-            result.vertices,
-            motion,
-            float(state.rotation[b] + result.turn[b]),
-            contacts[b],
-            edges[b],
-            points[b],
-            problem.materials[blocks.material[b]].density,
-            forces.inertia.gravity,
-            result.acceleration[b],
-            problem.dda.dynamic_factor * float(state.velocity[b, 2]),
-            None if forces.reaction is None else forces.reaction[b],
-            problem.run.boundary_stress,
-            strengths,
-            None if forces.overstress is None else forces.overstress[b],
-            keep_straight,
-        )
-        for b in bodies
-    }
+    return dict(zip(bodies, loads))
 
 
 def beside_acting(contacts: np.ndarray, n_blocks: int) -> np.ndarray:

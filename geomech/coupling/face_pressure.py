@@ -9,48 +9,51 @@ blocks and cracks no state to settle in.
 
 from __future__ import annotations
 
+from numba import njit
+
+from .load_pieces import jit
+
 #: Triangles are on 1/n, 2/n … of a face's length.
 TRIANGLES = 8
 
-Piece = tuple[float, float, float, float]
+#: A piece without length.
+NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
-def no_pull(length: float, force: float, moment: float) -> tuple[list[Piece], float, float]:
-    """Pieces (start, end, p_start, p_end) of a pressure on [0, length], linear on each (they add up), and lone forces
-    at its start and at its end, all together with resultant ``force`` and ``moment`` about 0.
+@njit(error_model="numpy", nogil=True)
+def no_pull(length, force, moment):
+    """Two pieces (start, end, p_start, p_end) of a pressure on [0, length], linear on each (they add up; one may have no
+    length), and lone forces at its start and at its end, all together with resultant ``force`` and ``moment`` about 0.
 
     None of it is negative where the force is positive and its line of action meets the face; a resultant outside cannot
     be carried without pull and stays linear, pull and all, since force and moment come first.
     """
     arm = moment / force if force > 0 else -1.0
     if 0 <= arm < length / 3:
-        pieces, lone = _near_end(length, force, arm)
-        return [(0.0, reach, peak, 0.0) for reach, peak in pieces], lone, 0.0
+        near, peak, far, high, lone = _near_end(length, force, arm)
+        return ((0.0, near, peak, 0.0), (0.0, far, high, 0.0)), lone, 0.0
     if 0 <= length - arm < length / 3:
-        pieces, lone = _near_end(length, force, length - arm)
-        return [(length - reach, length, 0.0, peak) for reach, peak in pieces], 0.0, lone
-    return [linear(length, force, moment)], 0.0, 0.0
+        near, peak, far, high, lone = _near_end(length, force, length - arm)
+        return ((length - near, length, 0.0, peak), (length - far, length, 0.0, high)), 0.0, lone
+    return (linear(length, force, moment), NOTHING), 0.0, 0.0
 
 
-def linear(length: float, force: float, moment: float) -> Piece:
+@jit
+def linear(length, force, moment):
     """The pressure linear on [0, length] with resultant ``force`` and ``moment`` about 0."""
     return 0.0, length, (4 * force * length - 6 * moment) / length**2, (6 * moment - 2 * force * length) / length**2
 
 
-def _near_end(length: float, force: float, arm: float) -> tuple[list[tuple[float, float]], float]:
-    """(reach, peak) of the triangles from the near end that have their resultant at ``arm`` from it, and the lone force
-    at that end."""
+@jit
+def _near_end(length, force, arm):
+    """Reach and peak of the two triangles from the near end that have their resultant at ``arm`` from it, and the lone
+    force at that end."""
     # A triangle's resultant is a third of its reach from its peak.
     place = 3 * arm / length * TRIANGLES
     below = min(int(place), TRIANGLES - 1)
     more = place - below
-    pieces, lone = [], 0.0
-    for n, share in ((below, 1 - more), (below + 1, more)):
-        if share <= 0:
-            continue
-        if n == 0:
-            lone = share * force
-        else:
-            reach = length * n / TRIANGLES
-            pieces.append((reach, 2 * share * force / reach))
-    return pieces, lone
+    near, far = length * below / TRIANGLES, length * (below + 1) / TRIANGLES
+    high = 2 * more * force / far
+    if below == 0:
+        return 0.0, 0.0, far, high, (1 - more) * force
+    return near, 2 * (1 - more) * force / near, far, high, 0.0

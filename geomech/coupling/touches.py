@@ -1,110 +1,135 @@
-"""What touches a block: contacts as it feels them, gathered into joint faces and those that stand alone."""
+"""What touches a block: contacts as it feels them, gathered into joint faces and those that stand alone. Compiled
+(`tractions` has the kernel)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ..model import Blocks, Motion
-from .load_pieces import FACE_ANGLE, SAME, line_of, place_along
+from .load_pieces import FACE_ANGLE, SAME, jit, line_of, place_along
 
 
-class Touch(NamedTuple):
-    """A contact as one of its blocks feels it. There are few, so they are plain numbers.
+class Touches(NamedTuple):
+    """Contacts as one of their blocks feels them, one after the other (n,).
 
-    ``own``: the block owns the vertex, not the edge; ``normal`` of the edge, current axes; ``point`` and the ``force``
-    on the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``: it may pull; ``against``: the
-    other block.
+    ``own``: the block owns the ``vertex``, not the ``edge``; (nx, ny) outward normal of the edge, current axes; the point
+    (px, py) and the force (fx, fy) on the block in its reference frame; ``acts``: it carries force; ``gap`` m; ``holds``:
+    it may pull; ``against``: the other block.
     """
 
-    own: bool
-    vertex: int
-    edge: int
-    normal: list[float]
-    point: list[float]
-    force: tuple[float, float]
-    acts: bool
-    gap: float
-    holds: bool
-    against: int
+    own: np.ndarray
+    vertex: np.ndarray
+    edge: np.ndarray
+    nx: np.ndarray
+    ny: np.ndarray
+    px: np.ndarray
+    py: np.ndarray
+    fx: np.ndarray
+    fy: np.ndarray
+    acts: np.ndarray
+    gap: np.ndarray
+    holds: np.ndarray
+    against: np.ndarray
 
 
-def touches_of(
-    block: int, motion: Motion, contacts: np.ndarray, c: float, s: float, tensile_strength: Sequence[float] | None
-) -> list[Touch]:
-    """What touches ``block``, which has turned by the angle of cosine ``c`` and sine ``s``."""
-    rows = contacts[(contacts["block"] == block) | (contacts["other"] == block)]
-    holding = np.zeros(len(rows), bool)
-    if tensile_strength is not None:
-        holding = (rows["bonded"] == 1) & (np.asarray(tensile_strength)[rows["law"]] > 0)
-    names = ("block", "other", "vertex", "edge", "normal", "normal_force", "shear_force", "gap")
-    columns = (rows[name].tolist() for name in names)
-    touches = []
-    for owner, other, vertex, edge, normal, push, shear, gap, point, holds in zip(
-        *columns, motion.reference(block, rows["point"]).tolist(), holding.tolist(), strict=True
-    ):
-        own = owner == block
-        if not own:
+@jit
+def touches_of(block, contacts, rows, holding, centre, reference_centre, gradient, c, s):
+    """What touches ``block``, which has moved as `Motion` has it and turned by the angle of cosine ``c`` and sine ``s``;
+    of the CONTACT ``rows`` (n,) of ``contacts`` those that are ``holding`` may pull."""
+    n = len(rows)
+    own, acts, holds = np.empty(n, np.bool_), np.empty(n, np.bool_), np.empty(n, np.bool_)
+    vertex, edge, against = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
+    nx, ny, px, py, fx, fy, gap = (
+        np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
+    )  # fmt: skip
+    det = gradient[0, 0] * gradient[1, 1] - gradient[0, 1] * gradient[1, 0]
+    for k in range(n):
+        row = contacts[rows[k]]
+        own[k] = row.block == block
+        against[k] = row.other if own[k] else row.block
+        vertex[k], edge[k], gap[k], holds[k] = row.vertex, row.edge, row.gap, holding[rows[k]]
+        nx[k], ny[k] = row.normal[0], row.normal[1]
+        x, y = row.point[0] - centre[0], row.point[1] - centre[1]
+        px[k] = reference_centre[0] + (gradient[1, 1] * x - gradient[0, 1] * y) / det
+        py[k] = reference_centre[1] + (gradient[0, 0] * y - gradient[1, 0] * x) / det
+        push, shear = row.normal_force, row.shear_force
+        acts[k] = push != 0 or shear != 0
+        if not own[k]:
             push, shear = -push, -shear
         # Shear acts along the edge's direction: its outward normal turned by +90°.
-        x, y = push * normal[0] - shear * normal[1], push * normal[1] + shear * normal[0]
-        acts = push != 0 or shear != 0
-        force, against = (c * x + s * y, c * y - s * x), other if own else owner
-        touches.append(Touch(own, vertex, edge, normal, point, force, acts, gap, holds, against))
-    return touches
+        x, y = push * nx[k] - shear * ny[k], push * ny[k] + shear * nx[k]
+        fx[k], fy[k] = c * x + s * y, c * y - s * x
+    return Touches(own, vertex, edge, nx, ny, px, py, fx, fy, acts, gap, holds, against)
 
 
-def on_outline(blocks: Blocks, touch: Touch) -> np.ndarray:
+@jit
+def on_outline(of, touches, k):
     """Where a contact's spring stands on the block, reference frame: its vertex, or the foot of the other's on its
     edge."""
-    start = blocks.vertices[touch.edge]
-    if touch.own:
-        return blocks.vertices[touch.vertex]
-    side = blocks.vertices[blocks.next_vertex[touch.edge]] - start
-    return start + float(np.clip((np.array(touch.point) - start) @ side / (side @ side), 0.0, 1.0)) * side
+    if touches.own[k]:
+        return of.vertices[touches.vertex[k], 0], of.vertices[touches.vertex[k], 1]
+    edge = touches.edge[k]
+    x, y = of.vertices[edge, 0], of.vertices[edge, 1]
+    ax, ay = of.vertices[of.following[edge], 0] - x, of.vertices[of.following[edge], 1] - y
+    place = ((touches.px[k] - x) * ax + (touches.py[k] - y) * ay) / (ax * ax + ay * ay)
+    place = min(max(place, 0.0), 1.0)
+    return x + place * ax, y + place * ay
 
 
-def _touching_edge(blocks: Blocks, vertices: np.ndarray, vertex: int, normal: list[float]) -> tuple[int, float]:
-    """Which of the two edges at ``vertex`` lies against an edge with outward ``normal``, and the angle between."""
-    best = (-1, math.inf)
-    nx, ny = normal
-    for edge in (vertex, int(blocks.previous_vertex[vertex])):
-        (x0, y0), (x1, y1) = vertices[edge].tolist(), vertices[blocks.next_vertex[edge]].tolist()
-        x, y = x1 - x0, y1 - y0
+@jit
+def _touching_edge(of, vertex, nx, ny):
+    """Which of the two edges at ``vertex`` lies against an edge with outward normal (nx, ny), and the angle between."""
+    best, least = -1, math.inf
+    for edge in (vertex, of.before[vertex]):
+        following = of.following[edge]
+        x, y = of.now[following, 0] - of.now[edge, 0], of.now[following, 1] - of.now[edge, 1]
         # The outward normal of the edge is (y, −x) over its length.
         angle = math.atan2(abs(y * ny + x * nx), x * ny - y * nx)
-        if angle < best[1]:
-            best = (edge, angle)
-    return best
+        if angle < least:
+            best, least = edge, angle
+    return best, least
 
 
-def faces_and_lone(
-    blocks: Blocks, vertices: np.ndarray, touches: list[Touch]
-) -> tuple[dict[tuple[int, int], list[Touch]], list[Touch]]:
-    """What touches a block as joint faces with at least two distinct points, (first edge of the own straight side,
-    first edge of the other's) → contacts, and the contacts left alone. A vertex in a straight side, as the end of a
-    named piece, does not part what touches it into faces of their own."""
-    found: dict[tuple[int, int], list[Touch]] = {}
-    lone = []
-    for touch in touches:
-        touching, angle = _touching_edge(blocks, vertices, touch.vertex, touch.normal)
+@jit
+def faces_and_lone(of, touches):
+    """What touches a block as joint faces with at least two distinct points: the first edges (k, 2) of the straight sides
+    of each, the own one first, the number of the face that each of the ``touches`` (n,) belongs to, −1 for none; and
+    the contacts left alone. A vertex in a straight side, as the end of a named piece, does not part what touches it into
+    faces of their own."""
+    n = len(touches.own)
+    face, lone, sides = np.full(n, -1), np.empty(n, np.int64), np.empty((n, 2), np.int64)
+    alone = many = 0
+    for k in range(n):
+        touching, angle = _touching_edge(of, touches.vertex[k], touches.nx[k], touches.ny[k])
         if angle <= FACE_ANGLE:
-            own, facing = (touching, touch.edge) if touch.own else (touch.edge, touching)
-            found.setdefault((blocks.side_start[own], blocks.side_start[facing]), []).append(touch)
-        elif touch.acts:
-            lone.append(touch)
-    faces = {}
-    for face, members in found.items():
-        start, _, along, length = line_of(blocks, blocks.sides[face[0]])
-        acting = [touch for touch in members if touch.acts]
-        # A corner that has slid past an end of the side presses on that end.
-        places = [min(max(place_along(touch.point, start, along), 0.0), length) for touch in acting]
+            own, facing = (touching, touches.edge[k]) if touches.own[k] else (touches.edge[k], touching)
+            own, facing = of.side_start[own], of.side_start[facing]
+            for number in range(many):
+                if sides[number, 0] == own and sides[number, 1] == facing:
+                    face[k] = number
+            if face[k] < 0:
+                face[k] = many
+                sides[many, 0], sides[many, 1] = own, facing
+                many += 1
+        elif touches.acts[k]:
+            lone[alone] = k
+            alone += 1
+    for number in range(many):
+        sx, sy, ax, ay, length = line_of(of, sides[number, 0])
+        near, far = math.inf, -math.inf
+        for k in range(n):
+            if face[k] == number and touches.acts[k]:
+                # A corner that has slid past an end of the side presses on that end.
+                place = min(max(place_along(touches.px[k], touches.py[k], sx, sy, ax, ay), 0.0), length)
+                near, far = min(near, place), max(far, place)
         # Points apart by no more than round-off are one.
-        if acting and max(places) - min(places) > SAME * length:
-            faces[face] = members
-        else:
-            lone += acting
-    return faces, lone
+        if not far - near > SAME * length:
+            for k in range(n):
+                if face[k] == number:
+                    face[k] = -1
+                    if touches.acts[k]:
+                        lone[alone] = k
+                        alone += 1
+    return sides[:many], face, lone[:alone]

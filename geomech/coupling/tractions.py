@@ -29,17 +29,17 @@ work, and viscous stress that opened them took as much.)
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..ddm.loads import first_moments, resultants
-from ..model import Blocks, Motion
-from .compliance import stress_rotation
+from ..compiled import kept
+from ..model import CONTACT, Blocks, Motion
+from .compliance import stress_rotations, times
 from .face_load import add_face, add_lone
-from .load_pieces import Pieces, add_couple, add_edge_piece, add_point_load
+from .inertia import balanced
+from .load_pieces import Found, add_couple, add_edge_piece, add_point_load, add_row, line_of, outlines
 from .touches import faces_and_lone, on_outline, touches_of
 
 
@@ -90,97 +90,155 @@ def boundary_load(
     overstress: np.ndarray | None = None,
     keep_straight: np.ndarray | None = None,
 ) -> BoundaryLoad:
-    """The load of ``block``.
+    """The load of one ``block``, as of `boundary_loads`."""
+    one = (None if of is None else np.asarray(of, dtype=float)[None] for of in (acceleration, reaction, overstress))
+    return boundary_loads(
+        np.array([block]), blocks, vertices, motion, np.array([rotation]), contacts, edge_forces, point_forces,
+        np.array([density]), gravity, next(one), np.array([spin]), next(one), route, tensile_strength, next(one),
+        keep_straight,
+    )[0]  # fmt: skip
+
+
+def boundary_loads(
+    numbers: np.ndarray,
+    blocks: Blocks,
+    vertices: np.ndarray,
+    motion: Motion,
+    rotation: np.ndarray,
+    contacts: np.ndarray,
+    edge_forces: np.ndarray,
+    point_forces: np.ndarray,
+    density: np.ndarray,
+    gravity: np.ndarray | None,
+    acceleration: np.ndarray | None,
+    spin: np.ndarray,
+    reaction: np.ndarray | None = None,
+    route: str = "contacts",
+    tensile_strength: Sequence[float] | None = None,
+    overstress: np.ndarray | None = None,
+    keep_straight: np.ndarray | None = None,
+) -> list[BoundaryLoad]:
+    """The loads of the blocks with these ``numbers`` (n,).
 
     ``vertices`` and ``motion`` are the geometry on which the forces are in equilibrium; ``contacts`` CONTACT rows on
-    that geometry (any block's); ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows of this block;
-    ``acceleration`` (6,) and ``spin`` (rad/s) the block's own; ``reaction`` (6,) N, N m, what imposes its motion, which
-    is spread over the block as its inertia is; ``route``: "contacts", "bases", "springs" or "kelvin-springs";
-    ``keep_straight`` (n_blocks,) bool which blocks are bases;
-    ``tensile_strength`` of the joint laws, Pa (None: none has any); ``overstress`` (3,) what the forces balance beyond
-    the stress of the block, Pa, current axes (None: at rest).
+    that geometry, ``edge_forces`` and ``point_forces`` EDGE_FORCE and POINT_FORCE rows (any block's); ``rotation`` (n,)
+    rad, ``density`` (n,), ``acceleration`` (n, 6) and ``spin`` (n,) rad/s the blocks' own; ``reaction`` (n, 6) N, N m, what
+    imposes their motion, which is spread over a block as its inertia is; ``route``: "contacts", "bases", "springs" or
+    "kelvin-springs"; ``keep_straight`` (n_blocks,) bool which blocks are bases; ``tensile_strength`` of the joint laws,
+    Pa (None: none has any); ``overstress`` (n, 3) what the forces balance beyond the stress of a block, Pa, current axes
+    (None: at rest).
     """
-    c, s = math.cos(rotation), math.sin(rotation)
-    pieces = Pieces()
-    touches = touches_of(block, motion, contacts, c, s, tensile_strength)
-    pointed = route in ("springs", "kelvin-springs")
-    if pointed:
-        pieces.points += [(on_outline(blocks, touch), np.array(touch.force)) for touch in touches]
-    faces, lone = ({}, []) if pointed else faces_and_lone(blocks, vertices, touches)
-    for (edge, _), touches in faces.items():
-        based = route == "bases" and keep_straight is not None and bool(keep_straight[touches[0].against])
-        add_face(pieces, blocks, blocks.sides[edge], touches, based)
-    for touch in lone:
-        add_lone(pieces, blocks, touch, touch.force)
-    turn_back = np.array([[c, s], [-s, c]])
-    for row in edge_forces:
-        add_edge_piece(pieces, blocks, vertices, row, turn_back)
-    for row in point_forces:
-        add_point_load(pieces, blocks, block, row["at"].copy(), turn_back @ row["force"])
-    add_couple(pieces, blocks, block)
-    segments, tractions = pieces.arrays()
-    inside = pieces.inside()
-    load = _balanced(
-        block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
-        pieces.stretch(), route == "kelvin-springs", overstress,
+    numbers, n = np.asarray(numbers), len(numbers)
+    moments = [blocks.area_moments(b) for b in numbers.tolist()]
+    area, centroid, second = (np.array(each, dtype=float) for each in zip(*moments))
+    holding = np.zeros(len(contacts), bool)
+    if tensile_strength is not None:
+        holding = (contacts["bonded"] == 1) & (np.asarray(tensile_strength, dtype=float)[contacts["law"]] > 0)
+    based = np.zeros(blocks.n_blocks, bool)
+    if route == "bases" and keep_straight is not None:
+        based = np.asarray(keep_straight, dtype=bool)
+    pair = np.stack([contacts["block"], contacts["other"]])
+    turn = np.stack([np.cos(rotation), np.sin(rotation)], axis=1)
+    given = (
+        numbers, outlines(blocks, vertices), blocks.vertex_start, area, motion.centre, motion.reference_centre,
+        motion.gradient, turn, np.ascontiguousarray(contacts).astype(CONTACT, copy=False), holding,
+        *_rows_of(pair, numbers), edge_forces, *_rows_of(edge_forces["block"][None], numbers), point_forces,
+        *_rows_of(point_forces["block"][None], numbers), based, route in ("springs", "kelvin-springs"),
     )  # fmt: skip
-    return replace(load, bases=tuple((np.array(rows), np.array(way)) for rows, way in pieces.bases))
+    pieces, inside, bases, ends, stretch = _with_room(given, 16 * len(contacts) + 16 * n + len(edge_forces))
+    zeros = np.zeros((n, 6))
+    body_force, gradient, even, imbalance = balanced(
+        pieces, inside, ends, area, centroid, second, np.asarray(density, dtype=float),
+        np.zeros(2) if gravity is None else np.asarray(gravity, dtype=float),
+        zeros if acceleration is None else acceleration, np.asarray(spin, dtype=float), turn,
+        zeros if reaction is None else reaction, stretch, motion.gradient[numbers], overstress is not None,
+    )  # fmt: skip
+    remote = None if overstress is None else even - times(stress_rotations(-np.asarray(rotation)), overstress)
+    segments, tractions = pieces.reshape(-1, 4, 2)[:, :2], pieces.reshape(-1, 4, 2)[:, 2:]
+    found = []
+    for k, ((a, i, j), (b, to_i, to_j)) in enumerate(zip(ends[:-1].tolist(), ends[1:].tolist())):
+        rows = tuple((np.arange(int(m) - a, int(o) - a), np.array([x, y])) for m, o, x, y in bases[j:to_j].tolist())
+        points, forces = (inside[i:to_i, :2], inside[i:to_i, 2:]) if to_i > i else (None, None)
+        found.append(
+            BoundaryLoad(
+                np.ascontiguousarray(segments[a:b]), np.ascontiguousarray(tractions[a:b]), body_force[k], gradient[k],
+                centroid[k], float(imbalance[k]), None if remote is None else remote[k], points, forces,
+                route == "kelvin-springs", rows,
+            )
+        )  # fmt: skip
+    return found
 
 
-def _balanced(
-    block, blocks, motion, segments, tractions, inside, density, gravity, acceleration, spin, turn_back, reaction,
-    left_out, kelvin, overstress,
-) -> BoundaryLoad:  # fmt: skip
-    area, centroid, second = blocks.area_moments(block)
-    (c, s), _ = turn_back.tolist()
-    bxx = bxy = byy = 0.0  # the body force's gradient, still symmetric
-    carried, turned = np.zeros(2), 0.0
-    if density:
-        g = np.zeros(2) if gravity is None else np.asarray(gravity, dtype=float)
-        ax, ay, angular, exx, eyy, shear = (0.0,) * 6 if acceleration is None else acceleration.tolist()
-        bxx = density * (spin**2 - c * c * exx - s * s * eyy - s * c * shear)
-        byy = density * (spin**2 - s * s * exx - c * c * eyy + s * c * shear)
-        bxy = -density * (s * c * (eyy - exx) + 0.5 * (c * c - s * s) * shear)
-        carried, turned = turn_back @ (density * (g - (ax, ay))), density * angular
-    held = 0.0
-    if reaction is not None:
-        carried, held = carried + turn_back @ reaction[:2] / area, float(reaction[2])
-    force, _, size = resultants(segments, tractions, centroid)
-    spread = first_moments(segments, tractions, centroid)
-    if inside is not None:
-        force = force + inside[1].sum(axis=0)
-        spread = spread + (inside[0] - centroid).T @ inside[1]
-        size += float(np.abs(inside[1]).sum())
-    symmetric = np.array([[bxx, bxy], [bxy, byy]])
-    whole = _with_torque(symmetric, spread, second)
-    gradient, remote = whole, None
-    if overstress is not None:
-        gradient = _with_torque(density * spin**2 * np.eye(2), spread, second)
-        even = second @ (whole - gradient).T / area
-        remote = np.array([even[0, 0], even[1, 1], 0.5 * (even[0, 1] + even[1, 0])])
-        remote -= stress_rotation(-math.atan2(s, c)) @ overstress
-    body_force = -force / area
-    imbalance = 0.0
-    if size > 0:
-        # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as
-        # much.
-        strain = turn_back @ motion.gradient[block]
-        strained = strain @ second @ strain.T
-        missed = (
-            _turning(strain @ (spread + left_out) + strained @ symmetric) + held - turned * float(np.trace(strained))
+def _with_room(given: tuple, room: int) -> tuple[np.ndarray, ...]:
+    """What is ``found`` of the ``given``, and of each block, where there is ``room`` for so many pieces, or as much as is
+    needed."""
+    while True:
+        found = Found(np.zeros(3, np.int64), np.empty((room, 8)), np.empty((room, 4)), np.empty((room, 4)))
+        ends, stretch = _pieces(found, *given)
+        count = found.count.tolist()
+        if max(count) <= room:
+            rows = (each[:many] for each, many in zip((found.pieces, found.inside, found.bases), count))
+            return (*rows, ends, stretch)
+        room = 2 * max(count)
+
+
+def _rows_of(owners: np.ndarray, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The columns of ``owners`` (k, m) that each of the ``numbers`` (n,) is in, in order, one after the other, and where
+    those of each begin and end, (n, 2)."""
+    column = np.broadcast_to(np.arange(owners.shape[1]), owners.shape).ravel()
+    owner = owners.ravel()
+    order = np.lexsort((column, owner))
+    ends = np.stack([np.searchsorted(owner[order], numbers, side) for side in ("left", "right")], axis=1)
+    return column[order], ends
+
+
+@kept(error_model="numpy", nogil=True)
+def _pieces(
+    found, numbers, of, vertex_start, area, centre, reference_centre, gradient, turn, contacts, holding, contact_rows,
+    contact_ends, edge_forces, edge_rows, edge_ends, point_forces, point_rows, point_ends, based, pointed,
+):  # fmt: skip
+    """Add to what is ``found`` the loads of the blocks with these ``numbers`` (n,), one after the other. Returned is how
+    much of each kind there is before each block, (n + 1, 3), and Σ r ⊗ f (n, 2, 2) of what shears stretch a block by
+    beyond what the pieces do."""
+    n = len(numbers)
+    ends, stretch = np.zeros((n + 1, 3), np.int64), np.zeros((n, 2, 2))
+    for b in range(n):
+        block, couple = numbers[b], 0.0
+        c, s = turn[b, 0], turn[b, 1]
+        rows = contact_rows[contact_ends[b, 0] : contact_ends[b, 1]]
+        touches = touches_of(
+            block, contacts, rows, holding, centre[block], reference_centre[block], gradient[block], c, s
         )
-        imbalance = (math.hypot(*(body_force - carried)) * area + abs(missed) / math.sqrt(area)) / size
-    points, forces = inside or (None, None)
-    return BoundaryLoad(segments, tractions, body_force, gradient, centroid, imbalance, remote, points, forces, kelvin)
-
-
-def _with_torque(symmetric: np.ndarray, spread: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The gradient of a body force, ``symmetric`` but for the angular inertia that leaves no moment beside forces of
-    ``spread``."""
-    torque = _turning(spread + second @ symmetric) / float(np.trace(second))
-    return symmetric + np.array([[0.0, torque], [-torque, 0.0]])
-
-
-def _turning(spread: np.ndarray) -> float:
-    """The moment of forces f at arms r, of which ``spread`` is Σ r ⊗ f."""
-    return float(spread[0, 1] - spread[1, 0])
+        if pointed:
+            for k in range(len(rows)):
+                x, y = on_outline(of, touches, k)
+                add_row(found.count, found.inside, 1, x, y, touches.fx[k], touches.fy[k])
+        else:
+            sides, face, lone = faces_and_lone(of, touches)
+            for number in range(len(sides)):
+                first = 0
+                while first < len(rows) and face[first] != number:
+                    first += 1
+                if first == len(rows):
+                    continue  # all of it stands alone
+                start = sides[number, 0]
+                amount, lost = add_face(found, of, start, touches, face, number, based[touches.against[first]])
+                couple += lost
+                _, _, ax, ay, _ = line_of(of, start)
+                stretch[b, 0, 0] += amount * ax * ax
+                stretch[b, 0, 1] += amount * ax * ay
+                stretch[b, 1, 0] += amount * ax * ay
+                stretch[b, 1, 1] += amount * ay * ay
+            for k in lone:
+                couple += add_lone(found, of, touches, k)
+        for k in range(edge_ends[b, 0], edge_ends[b, 1]):
+            add_edge_piece(found, of, edge_forces[edge_rows[k]], c, s)
+        first, last = vertex_start[block], vertex_start[block + 1]
+        for k in range(point_ends[b, 0], point_ends[b, 1]):
+            row = point_forces[point_rows[k]]
+            fx, fy = c * row.force[0] + s * row.force[1], c * row.force[1] - s * row.force[0]
+            couple += add_point_load(found, of, first, last, row.at[0], row.at[1], fx, fy)
+        add_couple(found, of, first, last, area[b], couple)
+        for k in range(3):
+            ends[b + 1, k] = found.count[k]
+    return ends, stretch

@@ -212,6 +212,16 @@ class Blocks:
         return sides
 
     @cached_property
+    def side_chains(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """`side_start` and `sides` as arrays: (n_vertices,) the first edge of each edge's side; of each such edge, where
+        the vertices along its side begin, and where they end, in the last array."""
+        lengths = {start: len(side) for start, side in self.sides.items()}
+        counts = np.array([lengths.get(edge, 0) for edge in range(self.n_vertices)], dtype=np.int64)
+        last = np.cumsum(counts)
+        chain = np.array([vertex for start in sorted(self.sides) for vertex in self.sides[start]], dtype=np.int64)
+        return np.array(self.side_start, dtype=np.int64), last - counts, last, chain
+
+    @cached_property
     def _area_moments(self) -> dict[int, tuple[float, np.ndarray, np.ndarray]]:
         return {}
 

@@ -73,8 +73,8 @@ def test_pressure_keeps_force_and_moment_and_does_not_pull(moment):
 def test_end_forces_become_the_linear_pressure_of_their_resultant():
     """Two end forces F0, F1 on a length ℓ: p0 = (4F0 − 2F1)/ℓ, p1 = (4F1 − 2F0)/ℓ (statics of a linear pressure)."""
     f0, f1, length = 3.0, 2.0, 0.5
-    [(_, _, p_start, p_end)], at_start, at_end = no_pull(length, f0 + f1, f1 * length)
-    assert at_start == at_end == 0.0
+    [(_, _, p_start, p_end), (begin, end, *_)], at_start, at_end = no_pull(length, f0 + f1, f1 * length)
+    assert at_start == at_end == 0.0 and begin == end
     assert p_start == pytest.approx((4 * f0 - 2 * f1) / length, rel=1e-14)
     assert p_end == pytest.approx((4 * f1 - 2 * f0) / length, rel=1e-14)
 

@@ -1,0 +1,107 @@
+"""The inertia of blocks that their boundary loads leave, as body forces linear in x, so that all of it is in equilibrium
+(d'Alembert)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def balanced(
+    pieces: np.ndarray,
+    inside: np.ndarray,
+    ends: np.ndarray,
+    area: np.ndarray,
+    centroid: np.ndarray,
+    second: np.ndarray,
+    density: np.ndarray,
+    gravity: np.ndarray,
+    acceleration: np.ndarray,
+    spin: np.ndarray,
+    turn: np.ndarray,
+    reaction: np.ndarray,
+    left_out: np.ndarray,
+    strained: np.ndarray,
+    moves: bool,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Body force (n, 2) of blocks at their ``centroid`` (n, 2), its gradient (n, 2, 2), the even stress (n, 3) that the
+    strain's inertia is where the blocks are in motion (``moves``), and what the solver's own inertia does not balance,
+    relative to the forces' size (n,).
+
+    ``pieces`` (m, 8) and ``inside`` (k, 4) as of `load_pieces.Found`, ``ends`` (n + 1, 3) how many of them there are before
+    each block; ``second`` (n, 2, 2) moments of area about the centroid; ``gravity`` (2,), ``acceleration`` (n, 6), ``turn``
+    (n, 2) cosine and sine of the blocks' rotation, ``reaction`` (n, 6) what imposes their motion, ``left_out`` (n, 2, 2)
+    Σ r ⊗ f of what the pieces miss, ``strained`` (n, 2, 2) the gradient of the blocks' motion."""
+    c, s = turn.T
+    a_x, a_y, angular, e_xx, e_yy, shear = acceleration.T
+    b_xx = density * (spin**2 - c * c * e_xx - s * s * e_yy - s * c * shear)
+    b_yy = density * (spin**2 - s * s * e_xx - c * c * e_yy + s * c * shear)
+    b_xy = -density * (s * c * (e_yy - e_xx) + 0.5 * (c * c - s * s) * shear)
+    symmetric = _matrices(b_xx, b_xy, b_xy, b_yy)  # the body force's gradient, but for what turns
+    turn_back = _matrices(c, s, -s, c)
+    carried = density[:, None] * (gravity - np.stack([a_x, a_y], axis=1)) + reaction[:, :2] / area[:, None]
+    carried = (turn_back @ carried[..., None])[..., 0]
+    force, size, spread = _resultants(pieces, inside, ends, centroid)
+    gradient = whole = _with_torque(symmetric, spread, second)
+    even = np.zeros((len(area), 3))
+    if moves:
+        centrifugal = (density * spin**2)[:, None, None] * np.eye(2)
+        gradient = _with_torque(centrifugal, spread, second)
+        left = second @ (whole - gradient).transpose(0, 2, 1) / area[:, None, None]
+        even = np.stack([left[:, 0, 0], left[:, 1, 1], 0.5 * (left[:, 0, 1] + left[:, 1, 0])], axis=1)
+    body_force = -force / area[:, None]
+    # The solver's forces balance on the block as it is strained, where their arms and its inertia are others by as much.
+    strain = turn_back @ strained
+    moments = strain @ second @ strain.transpose(0, 2, 1)
+    missed = _turning(strain @ (spread + left_out) + moments @ symmetric) + reaction[:, 2]
+    missed -= density * angular * _trace(moments)
+    off = np.hypot(*(body_force - carried).T) * area + np.abs(missed) / np.sqrt(area)
+    return body_force, gradient, even, np.where(size > 0, off / np.where(size > 0, size, 1.0), 0.0)
+
+
+def _resultants(
+    pieces: np.ndarray, inside: np.ndarray, ends: np.ndarray, about: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Forces (n, 2) on blocks, the sums of their sizes (n,) and ∫ r ⊗ t ds (n, 2, 2), with the arms r from ``about``
+    (n, 2)."""
+    n = len(about)
+    owner, at = (np.repeat(np.arange(n), np.diff(ends[:, k])) for k in (0, 1))
+    a, b, p, q = pieces.reshape(-1, 4, 2).transpose(1, 0, 2)
+    a, b = a - about[owner], b - about[owner]
+    length = np.hypot(*(b - a).T)[:, None]
+    sizes = 0.5 * length[:, 0] * (np.hypot(*p.T) + np.hypot(*q.T))
+    # ∫ x t of two functions linear along a length L is L/6 Σ x_i t_j, those of the same end counted twice.
+    ends_of = (2 * a + b)[:, :, None] * p[:, None] + (a + 2 * b)[:, :, None] * q[:, None]
+    points, forces = inside[:, :2] - about[at], inside[:, 2:]
+    force = _sums(0.5 * length * (p + q), owner, n) + _sums(forces, at, n)
+    size = _sums(sizes[:, None], owner, n) + _sums(np.abs(forces).sum(axis=1)[:, None], at, n)
+    spread = _sums((length[:, :, None] / 6 * ends_of).reshape(-1, 4), owner, n)
+    spread += _sums((points[:, :, None] * forces[:, None]).reshape(-1, 4), at, n)
+    return force, size[:, 0], spread.reshape(n, 2, 2)
+
+
+def _sums(rows: np.ndarray, owner: np.ndarray, n: int) -> np.ndarray:
+    """(n, k) sums of the ``rows`` (m, k) of each ``owner`` (m,)."""
+    # (Sums of nothing are integers.)
+    return np.stack([np.bincount(owner, weights=column, minlength=n).astype(float) for column in rows.T], axis=1)
+
+
+def _with_torque(symmetric: np.ndarray, spread: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """The gradients of body forces, ``symmetric`` but for the angular inertia that leaves no moment beside forces of
+    ``spread``."""
+    torque = _turning(spread + second @ symmetric) / _trace(second)
+    none = np.zeros_like(torque)
+    return symmetric + _matrices(none, torque, -torque, none)
+
+
+def _turning(spread: np.ndarray) -> np.ndarray:
+    """The moments of forces f at arms r, of which ``spread`` (n, 2, 2) is Σ r ⊗ f."""
+    return spread[:, 0, 1] - spread[:, 1, 0]
+
+
+def _trace(matrices: np.ndarray) -> np.ndarray:
+    return matrices[:, 0, 0] + matrices[:, 1, 1]
+
+
+def _matrices(xx: np.ndarray, xy: np.ndarray, yx: np.ndarray, yy: np.ndarray) -> np.ndarray:
+    """(n, 2, 2) of their components (n,)."""
+    return np.stack([np.stack([xx, xy], axis=-1), np.stack([yx, yy], axis=-1)], axis=-2)
