@@ -11,7 +11,7 @@ from typing import Any
 from ..output.reading import Run
 from .of_run import LISTED
 from .page import Page
-from .table import COLUMNS, table
+from .table import shown, table
 
 #: Keys of a scene that say where it lies, not what it is.
 _NOT_TOLD = ("title", "geometry.model")
@@ -56,13 +56,8 @@ def _add_times(page: Page, runs: Sequence[Run]) -> None:
 
 def add_table(page: Page, runs: Sequence[Run]) -> None:
     """The table that the terminal shows, columns that no run fills left out."""
-    rows = table(runs)
-    headers = [name for name in COLUMNS if any(row[name] is not None for row in rows)]
-    page.table(headers, [[_cell(row[name], COLUMNS[name]) for name in headers] for row in rows])
-
-
-def _cell(value: Any, form: str) -> Any:
-    return value if value is None or isinstance(value, str) else form.format(value)
+    headers, *rows = shown(table(runs))
+    page.table(headers, rows)
 
 
 def differences(runs: Sequence[Run]) -> dict[str, list[Any]]:

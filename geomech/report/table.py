@@ -8,8 +8,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..output.reading import Run
+from ..output.units import stress_unit
 
 _LOWERED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+_MPA = " MPa"
 
 #: Header → how a number is written.
 COLUMNS = {
@@ -61,13 +64,25 @@ def _row(run: Run) -> dict[str, Any]:
     }
 
 
-def as_text(rows: Sequence[dict[str, Any]]) -> str:
-    """The rows as an aligned table, columns that no run fills left out."""
+def shown(rows: Sequence[dict[str, Any]]) -> list[list[str | None]]:
+    """Headers and cells of the rows as they are read: columns that no run fills left out, loads in the unit that the
+    largest of them is told in."""
     headers = [name for name in COLUMNS if any(row[name] is not None for row in rows)]
-    return aligned(
-        [headers]
-        + [["-" if row[name] is None else COLUMNS[name].format(row[name]) for name in headers] for row in rows]
-    )
+    loads = [name for name in headers if name.endswith(_MPA)]
+    largest = max((abs(row[name]) for row in rows for name in loads if row[name] is not None), default=0.0)
+    unit, size = stress_unit(1e6 * largest)
+
+    def cell(row: dict[str, Any], name: str) -> str | None:
+        value = row[name]
+        return None if value is None else COLUMNS[name].format(value * (1e6 / size) if name in loads else value)
+
+    told = [f"{name.removesuffix(_MPA)} {unit}" if name in loads else name for name in headers]
+    return [told, *([cell(row, name) for name in headers] for row in rows)]
+
+
+def as_text(rows: Sequence[dict[str, Any]]) -> str:
+    """The rows as an aligned table, as they are `shown`."""
+    return aligned([["-" if cell is None else cell for cell in line] for line in shown(rows)])
 
 
 def aligned(lines: Sequence[Sequence[str]]) -> str:

@@ -22,7 +22,7 @@ from geomech.scene import load_scene
 FOLDER = Path(__file__).parents[2] / "pipelines" / "two_cracks"
 sys.path.insert(0, str(FOLDER))
 from compare_settings import FAMILIES, LADDERS, apart, family
-from compare_two_cracks import Watch, coalescence_angle_deg
+from compare_two_cracks import COALESCENCE_LIMIT_MPA, Watch, coalescence_angle_deg
 from first_step import KELVIN, QUADRATIC, first_step
 
 
@@ -89,14 +89,12 @@ def test_initiation_at_the_load_that_the_factors_give(specimens, phi):
     assert load == pytest.approx(expected_initiation(phi), rel=2e-4)
 
 
-#: Loads of coalescence, MPa, by increments of 0.25 mm that shorten to 0.1 mm near the other crack.
-LIMITS = {0: 218.68, 30: 354.54, 60: 341.0, 90: 227.85}
-
-
 @pytest.mark.parametrize("phi", [0, 90])
 def test_coalescence_at_the_load_that_finer_increments_tend_to(specimens, phi):
     """By increments of 1 mm that shorten as cracks near one another; plain ones are 3.6 and 5 % low."""
-    assert specimens[f"phi_{phi}"].watch.load("coalescence") / 1e6 == pytest.approx(LIMITS[phi], rel=0.01)
+    assert specimens[f"phi_{phi}"].watch.load("coalescence") / 1e6 == pytest.approx(
+        COALESCENCE_LIMIT_MPA[phi], rel=0.01
+    )
 
 
 def test_coalescence_line_of_phi_90_is_vertical(specimens):
@@ -245,7 +243,7 @@ def test_all_four_as_published(tmp_path):
     assert coalesced(runs["phi_90"])
     loads = {phi: runs[f"phi_{phi}"].watch.load("coalescence") for phi in published.PHI_DEG}
     assert min(loads[30], loads[60]) > max(loads[0], loads[90])
-    assert {phi: load / 1e6 for phi, load in loads.items()} == pytest.approx(LIMITS, rel=0.01)
+    assert {phi: load / 1e6 for phi, load in loads.items()} == pytest.approx(COALESCENCE_LIMIT_MPA, rel=0.01)
     for phi in (0, 90):
         assert runs[f"phi_{phi}"].watch.load("initiation") == pytest.approx(expected_initiation(phi), rel=2e-4)
     assert abs(abs(coalescence_angle_deg(runs["phi_90"].watch.cracks)) - 90) < 1.0
