@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from geomech import dda
+from geomech.bench import block_scenes
 from geomech.dda import attempt
 from geomech.dda.central_path import CentralPath
-from geomech.dda.open_close import settle
-from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.dda.open_close import _proposed, settle
+from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 STIFFNESS, FRICTION = 4e11, 0.7
 
@@ -78,3 +81,45 @@ def test_few_contacts_that_stop_the_path_are_centred_alone():
     assert products[alone] == pytest.approx(1e-6) and products[~alone] == pytest.approx(1e-9)
     changes[1, :50] = -1e4 * numbers[1, :50]
     assert path._without_few(numbers, changes, 1e-4)[1] is None
+
+
+class Following:
+    """A path of a thousand contacts whose ε falls tenfold an iteration and that is decided at its end, 1e-14, alone."""
+
+    missed, blocked, arrived, ended = 0.0, False, False, False
+
+    def __init__(self, epsilon: float) -> None:
+        self.epsilon = epsilon
+
+    def advance(self) -> int:
+        self.epsilon *= 0.1
+        self.ended = self.arrived = self.epsilon < 1e-14
+        return 0 if self.ended else 500
+
+    def states(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(1000), np.zeros(1000)
+
+
+@pytest.mark.parametrize(("epsilon", "proposes"), [(1e-7, True), (1e-2, False)])
+def test_a_path_near_its_end_is_followed_to_it_whatever_it_took(epsilon, proposes):
+    proposal, spent = _proposed(Following(epsilon), np.zeros(1000, int), set(), 0, patient=False)
+    assert (proposal is not None) == proposes
+    assert spent == (8 if proposes else 0)
+
+
+@pytest.mark.slow
+def test_a_wall_of_ten_thousand_bricks_settles_in_one_static_step():
+    """States that hang by a hair come right at the very end of the path; before, the step was cut."""
+    blocks = block_scenes.wall(10_010)
+    settings = dataclasses.replace(block_scenes.settings(1.0, dynamic=False), max_step_cuts=0)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+    result = system.step(State.at_rest(blocks), block_scenes.WEIGHT)
+    told = result.statistics
+    print(f"{told['open_close_iterations']} iterations, {told['unbalanced_ratio']:.1e} of the weight left")
+    assert result.dt == 1.0 and told["unbalanced_ratio"] < 1e-3
+    # The base bears the weight, less what a step of a second still sets in motion: 4e-4 of it.
+    rows = result.contacts[result.contacts["state"] != OPEN]
+    on_base = rows[rows["other"] == 0]
+    weight, moved = block_scenes.GRAVITY * system.mass[1:], system.mass[1:] * result.acceleration[1:, 1]
+    assert abs(moved.sum()) < 1e-3 * weight.sum()
+    assert float(on_base["normal_force"].sum()) == pytest.approx(float((weight + moved).sum()), rel=1e-8)
