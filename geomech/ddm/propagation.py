@@ -113,6 +113,8 @@ class _Run:
         self.solution: Solution | None = None
         self.number = 0
         self.chords: Memory = {}
+        #: What was solved last: factor, solution with its history, and tips.
+        self._last: tuple[float, Solution, Solution | None, np.ndarray] | None = None
 
     def steps(self, cracks: Cracks, max_steps: int) -> Iterator[Step]:
         from . import NotConverged
@@ -154,9 +156,30 @@ class _Run:
         return self.load if factor == 1.0 else self.load.scaled(factor)
 
     def _solve(self, body: Body, factor: float) -> tuple[Solution, np.ndarray]:
+        """Solution and tips of a body at a load factor."""
         # Rough faces go on from what they had slipped by in the last step; smooth ones forget.
         history = self.solution if body.rough else None
-        solution = body.solve(self._load_at(factor, body.cracks), warm=self.solution, history=history)
+        known = self._known(body, factor, history)
+        if known is not None:
+            solution, tips = known
+        else:
+            load = self._load_at(factor, body.cracks)
+            solution = body.solve(load, warm=self.solution, history=history)
+            tips = solution.tips.copy()
+            tips["angle"], tips["k_eq"] = judged(solution, self.growth, self.material)
+        self._last = factor, solution, history, tips
+        return solution, tips.copy()
+
+    def _known(self, body: Body, factor: float, history: Solution | None) -> tuple[Solution, np.ndarray] | None:
+        """The same where it is what was solved last, or so many times that."""
+        if self._last is None or self._last[1].body is not body:
+            return None
+        before, solution, began, tips = self._last
+        if factor == before:
+            return (solution, tips) if began is history else None
+        if callable(self.load) or not before > 0 or not factor > 0 or self.growth.trial_kink or not solution.scales:
+            return None
+        solution = solution.scaled(self.load if factor == 1.0 else self.load.scaled(factor), factor / before)
         tips = solution.tips.copy()
         tips["angle"], tips["k_eq"] = judged(solution, self.growth, self.material)
         return solution, tips

@@ -11,9 +11,10 @@ import numpy as np
 from ..conventions import normal_of
 from ..model import OPEN, SLIP, STICK, CrackFaces
 from . import shapes
-from .applied import Applied
+from .applied import Applied, apply
 from .beside_ends import ElementEnds
 from .boundary import middle_of
+from .contact import FaceAnswer
 from .face_laws import FaceStates, Released
 from .friction import stored_by_fillings
 from .influence import add_fields
@@ -23,7 +24,7 @@ from .rock import onto_rock
 
 if TYPE_CHECKING:
     from .body import Body
-    from .contact import FaceAnswer
+    from .loads import BodyLoad
 
 
 #: A residual above this is told to the log.
@@ -56,6 +57,19 @@ class Solution:
         self.jumps, self._traction = answer.jumps, answer.traction
         self._boundary_load, self._face_load, self._imposed = boundary_load, face_load, imposed
         self._edge_density = edge_density
+
+    @property
+    def scales(self) -> bool:
+        """Whether so many times the load brings so many times everything: with smooth faces that touch unloaded or
+        never close."""
+        return not self.body.rough and not np.any(self.body.closing[0])
+
+    def scaled(self, load: BodyLoad, factor: float) -> Solution:
+        """What the body answers to the ``load``, which is ``factor`` (positive) times this one, where it `scales`."""
+        answer = FaceAnswer(factor * self.jumps, factor * self._traction, self.closed, 0)
+        parts = (factor * x for x in (self._boundary_load, self._face_load, self._imposed))
+        edge_density = None if self._edge_density is None else factor * self._edge_density
+        return Solution(self.body, apply(load, self.body), factor * self._eliminated, answer, *parts, edge_density)
 
     @cached_property
     def _x(self) -> np.ndarray:

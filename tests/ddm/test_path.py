@@ -69,7 +69,7 @@ def test_compression_along_the_crack_does_not_throw_the_path_about(start, stiffn
 
 def test_an_arc_goes_on_as_it_went():
     """Of an arc that turned by 8 degrees from chord to chord the first trial is the next chord itself."""
-    angle, looks = chosen(lambda theta: 12.0 - theta, 4.0, Remembered(0.0, *np.radians([8.0, 8.0, 4.0])))
+    angle, looks = chosen(lambda theta: 12.0 - theta, 4.0, Remembered(0.0, *np.radians([8.0, 8.0, 4.0, 4.0])))
     assert angle == pytest.approx(8.0, abs=1e-12)
     assert looks == 1
 
@@ -78,29 +78,32 @@ def test_a_small_kink_is_not_gone_on_with():
     """A path leaves a straight crack at 6.5 degrees and goes on straight; nothing has told κ yet. What the second step
     leaves is within the tolerance (a trial with the kink's turn, judged as one along the tangent, left three times
     as much)."""
-    memory = Remembered(np.nan, *np.radians([-6.4, -6.5, 0.2]))
+    memory = Remembered(np.nan, *np.radians([-6.4, -6.5, 0.2, -6.5]))
     angle, looks = chosen(lambda theta: 0.1 - 1.1 * theta, 0.1, memory)
     assert abs(0.1 - 1.1 * angle) < np.degrees(TOLERANCE) and looks == 1
 
 
-@pytest.mark.parametrize(
-    ("before", "last", "next"), [(8.0, 4.0, 2.0), (2.0, 2.0, 2.0), (4.0, -2.0, 1.0), (1.0, 9.0, 13.5)]
-)
-def test_the_first_trial_goes_on_as_chords_have_turned(before, last, next):
-    """A stiff path turns back by a share a step; what grows is not believed at once. A trial that no look would correct
-    is the step, as it was tried."""
-    memory = Remembered(5.0, *np.radians([last, last, 0.0, before]))
-    tried = []
+@pytest.mark.parametrize(("began", "last", "start"), [(2.0, 4.0, 2.0), (-1.0, 2.0, 1.5), (4.0, -2.0, 1.0)])
+def test_the_first_trial_turns_as_the_last_step_did(began, last, start):
+    """The last chord left the tangent at its start, at ``began``, by ``last`` - began, and the tangent at its end turned
+    on by ``start``; half of that again. A trial that a look would correct by less than a quarter of a degree is the
+    step, as it was tried."""
+    memory = Remembered(5.0, *np.radians([last, last, 0.0, began]))
+    tried, turn = [], start - began + last
+    off = 0.2  # by which the condition holds beside the trial
 
     def ask(theta):
         tried.append(theta)
-        return 1.0 - 6.0 * (theta - next)
+        share = 1 - 1 / 5.0
+        best = start + turn / 2 + off
+        return (best - start) * (1 - share) / share - 6.0 * (theta - best)
 
-    share = 1 - 1 / 5.0
-    start = next - 1.0 * share / (1 - share)  # so that the condition holds at the trial
     angle, looks = chosen(ask, start, memory)
-    assert tried == [pytest.approx(next)] and looks == 1
+    assert tried == [pytest.approx(start + turn / 2)] and looks == 1
     assert angle == tried[0]
+    off = 0.3
+    angle, looks = chosen(ask, start, memory)
+    assert looks == 1 and angle == pytest.approx(start + turn / 2 + off)
 
 
 @pytest.mark.parametrize("stiffness", [0.5, 2.0, 5.0, 20.0])
@@ -116,9 +119,9 @@ def test_a_remembered_slope_spares_looks(stiffness, curve):
     share = max(1 / 2, 1 - 1 / before)
     solution = (start + share * curve) / (1 + share * stiffness)
     last = solution + 1.0 / (1 + stiffness)
-    trial = last - 1.0
-    told = Remembered(0.0, *np.radians([last, trial, start + (1 + before) * (last - trial)]))
-    found = Remembered(before, *np.radians([last, last, start]))
+    trial, began = last - 1.0, 3 * start - last  # so that the first trial is as the last chord
+    told = Remembered(0.0, *np.radians([last, trial, start + (1 + before) * (last - trial), began]))
+    found = Remembered(before, *np.radians([last, last, start, began]))
     for memory in (told, found):
         angle, looks = chosen(ask, start, memory)
         assert looks == 1
@@ -128,7 +131,7 @@ def test_a_remembered_slope_spares_looks(stiffness, curve):
 
 def test_what_has_changed_is_looked_at_again():
     """Faces close: the last step's slope would leave several degrees."""
-    memory = Remembered(1.0, *np.radians([1.0, 1.0, 2.0]))
+    memory = Remembered(1.0, *np.radians([1.0, 1.0, 2.0, 4.0]))
     angle, looks = chosen(lambda theta: -40.0 - 6.0 * theta, 2.0, memory)
     assert looks > 1
     assert chosen(lambda theta: -40.0 - 6.0 * theta, 2.0)[0] == pytest.approx(angle, abs=0.3)

@@ -142,3 +142,44 @@ def test_steps_can_be_taken_one_at_a_time():
     first, second = islice(ddm.propagate([], straight(), ROCK, load, GrowthSettings(), settings=None), 2)
     assert second.cracks is first.growth.cracks
     assert second.solution.body.counts["elements_new"] < second.solution.body.counts["elements"]
+
+
+def test_a_solution_is_scaled_instead_of_solved_again():
+    """Where faces touch unloaded or never close, so many times the load brings so many times everything; where they
+    have a gap to close it does not."""
+    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    lines = [np.array([[-0.4, -0.1], [0.2, 0.2]]), np.array([[0.0, -0.5], [0.3, -0.4], [0.5, -0.5]])]
+    load = ddm.BodyLoad(sides={0: (-2e5, 1e6), 1: (-1e6, 2e5), 2: (2e5, -1e6), 3: (1e6, -2e5)}, crack_pressure=4e5)
+    for aperture, scales in (((0.0, np.inf), True), ((0.0, 1e-5), False)):
+        body = ddm.Body([square], Cracks.from_polylines(lines, aperture=aperture), ROCK)
+        one, other = body.solve(load), body.solve(load.scaled(2.5))
+        assert one.scales is scales
+        if not scales:
+            continue
+        assert one.closed.any() and not one.closed.all()
+        scaled = one.scaled(load.scaled(2.5), 2.5)
+        points = np.array([[0.6, 0.1], [-0.3, 0.7]])
+        for name in ("k_i", "k_ii"):
+            np.testing.assert_allclose(scaled.tips[name], other.tips[name], atol=1e-12 * np.abs(other.tips["k_ii"]).max())
+        for mine, solved in zip(scaled.fields(points), other.fields(points)):
+            np.testing.assert_allclose(mine, solved, rtol=1e-11)
+        assert scaled.residual == pytest.approx(other.residual, rel=1e-3, abs=1e-12)
+        np.testing.assert_array_equal(scaled.states, other.states)
+
+
+def test_a_step_of_a_smooth_path_takes_little_more_than_one_body(monkeypatch):
+    """In tension, along a curved path, most trials are the step: 15 steps after the kink take fewer than 23 bodies. And
+    a load that only changes in size is not solved for again."""
+    made, solved = [], []
+    make, solve = ddm.Body.__init__, ddm.Body.solve
+    monkeypatch.setattr(ddm.Body, "__init__", lambda self, *a, **k: made.append(0) or make(self, *a, **k))
+    monkeypatch.setattr(ddm.Body, "solve", lambda self, *a, **k: solved.append(0) or solve(self, *a, **k))
+    plate = np.array([[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]])
+    lines = [np.array([[-0.01, -0.006], [0.0, 0.0]]), np.array([[0.012, 0.006], [0.025, 0.008]])]
+    load = ddm.BodyLoad(sides={0: (0.0, -1e6), 2: (0.0, 1e6)})
+    growth = GrowthSettings(increment=5e-4, min_increment=1.25e-4)
+    cracks = Cracks.from_polylines(lines, aperture=np.inf)
+    steps = list(ddm.propagate([plate], cracks, ROCK, load, growth, control="toughness", max_steps=16))
+    assert len(steps) == 16 and all((step.tips["k_ii"][step.tips["grown"] > 0] != 0).all() for step in steps)
+    assert len(made) <= 23
+    assert len(solved) == len(made)
