@@ -1,20 +1,41 @@
-"""What is compared with: finite elements (scikit-fem) and a domain integral for K.
+"""What is compared with: finite elements (scikit-fem), with quarter points at the tips and K by interaction integrals
+(`quarter_point`).
 
-The edge crack in the strip on its upper half (the symmetry is free of charge): biquadratic elements on a grid that is
-graded geometrically to the tip, direct sparse solution, K = √(E'J) from the domain form of the J-integral (Li, Shih &
-Needleman 1985). The specimen on triangles of second degree, graded to the tips and torn along the cracks, K_I and K_II
-from the interaction integral (Yau, Wang & Corten 1980). Times are of assembly, solution and the integrals; what
-the triangles' mesh takes comes on top and is not counted.
+Bodies are meshed whole. Cracks in the plane are meshed in a window that is made to move at its rim as the plane does
+there: by the closed form (Griffith crack, arc; the arc is meshed straight, by angle and logarithm of the radius, and
+carried over), or by this solver's reference (many cracks). Nothing is left to truncation then, which is in the finite
+elements' favour, as is that SuperLU is told that the matrix is symmetric. Times are of mesh, assembly, solution and
+integrals.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .crack_problems import ROCK, CrackProblem
+from ..model import Cracks
+from ..model.polygon import distance_to_edges
+from ..reference import crack_fields
+from .crack_problems import ROCK, CrackProblem, rectangle
 from .figures import stopwatch
+from .quarter_point import Plate, Sizes
+
+#: Sides of triangles, in half cracks: away from cracks and at tips, and by how much they grow with the distance.
+REFINEMENTS = (
+    (1.0, 0.25, 0.8),
+    (0.5, 0.1, 0.5),
+    (0.5, 0.03, 0.35),
+    (0.4, 0.01, 0.25),
+    (0.3, 0.003, 0.18),
+    (0.2, 0.001, 0.125),
+)
+#: A tip's disc ends at this part of the distance to what is next to it.
+DISC = 0.9
+#: The arc's half-angle, and how far its window reaches in the logarithm of the radius.
+QUARTER, REACH = math.pi / 4, 1.2
 
 
 def available() -> bool:
@@ -22,128 +43,94 @@ def available() -> bool:
     return importlib.util.find_spec("skfem") is not None
 
 
-def edge_crack(problem: CrackProblem, refinement: int) -> tuple[np.ndarray, int, float]:
-    """(1, 2) K_I, K_II (zero by symmetry), the number of unknowns and seconds. Elements shrink to the tip by a factor
-    of two in ``refinement`` steps, eight times farther with each refinement."""
-    from skfem import Basis, ElementQuad1, ElementQuad2, ElementVector, MeshQuad, condense, solve
+def solver(problem: CrackProblem | None) -> Callable[[int], tuple[np.ndarray, int, float]]:
+    """Of a ``problem`` (None: the arc) the function refinement (0 … 5) → (n_tips, 2) K_I, K_II, the number of unknowns
+    and seconds."""
+    if problem is None:
+        return _arc
+    if problem.outline is not None:
+        return lambda refinement: _straight(problem, problem.outline, refinement, None)
+    return _window(problem)
 
+
+def tips_of(
+    polylines: Sequence[np.ndarray], mouths: Sequence[tuple[bool, bool]]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(n, 2) tips, (n, 2) unit directions of their advance and (n,) lengths of their last segments."""
+    points, ways = [], []
+    for line, at_mouth in zip(polylines, mouths):
+        for ends, mouth in zip(((line[0], line[1]), (line[-1], line[-2])), at_mouth):
+            if not mouth:
+                points.append(ends[0])
+                ways.append(ends[0] - ends[1])
+    points, ways = np.array(points), np.array(ways)
+    length = np.hypot(*ways.T)
+    return points, ways / length[:, None], length
+
+
+def disc_radii(
+    points: np.ndarray, length: np.ndarray, outline: np.ndarray, polylines: Sequence[np.ndarray]
+) -> np.ndarray:
+    """(n,) radii of discs about the tips ``points`` that hold no more of a crack than the straight end behind the tip,
+    ``length`` (n,)."""
+    lines = [np.vstack([outline, outline[:1]]), *polylines]
+    away = np.array([[distance_to_edges(p, line[:-1], line[1:]) for line in lines] for p in points])
+    # Its own crack is no obstacle beyond its straight end.
+    away[away < 1e-9 * np.ptp(outline)] = np.inf
+    return DISC * np.minimum(away.min(axis=1), length)
+
+
+def _straight(
+    problem: CrackProblem, outline: np.ndarray, refinement: int, rim: Callable[[np.ndarray], np.ndarray] | None
+) -> tuple[np.ndarray, int, float]:
     spent_on = stopwatch()
-    (width, height), tip = problem.outline[2], problem.polylines[0][1, 0]
-    graded = 0.5 ** (np.arange((5 + 3 * refinement) * refinement, -1, -1) / refinement)
-    reach = min(tip + width, width - tip)
-    line = np.unique(np.concatenate([tip - reach * graded, [tip], tip + reach * graded, [-width, width]]))
-    up = np.concatenate([[0.0], reach * graded, np.linspace(reach, height, 1 + 2 * refinement)[1:]])
-    mesh = MeshQuad.init_tensor(line, up)
-    basis = Basis(mesh, ElementVector(ElementQuad2()), intorder=5)
-    force = _pull(basis.boundary(lambda x: np.isclose(x[1], height)), problem.stress[1])
-    stiffness = _stiffness(basis)
-    ahead = basis.get_dofs(lambda x: np.isclose(x[1], 0.0) & (x[0] > tip - 1e-12)).all("u^2")
-    corner = basis.get_dofs(lambda x: np.isclose(x[1], 0.0) & np.isclose(x[0], width)).all("u^1")
-    u = solve(*condense(stiffness, force, D=np.concatenate([ahead, corner])))
-    weight = Basis(mesh, ElementQuad1(), intorder=5)
-    distance = np.max(np.abs(mesh.p - np.array([[tip], [0.0]])), axis=0)
-    q = np.clip(2 - 2 * distance / reach, 0, 1)
-    j = 2 * _energy_release(basis.interpolate(u), weight.interpolate(q), basis.dx)
-    k = np.array([[np.sqrt(ROCK.plane_modulus * j), 0.0]])
-    return k, len(u), spent_on()
+    points, ways, length = tips_of(problem.polylines, problem.mouths)
+    # A crack with a mouth is half of one.
+    free = 2 - np.sum(problem.mouths, axis=1)
+    half = min(np.hypot(*(line[-1] - line[0])) / n for line, n in zip(problem.polylines, free))
+    plate = Plate(outline, problem.cracks, Sizes(*(half * np.array(REFINEMENTS[refinement]) * [1, 1, 1 / half])))
+    u = plate.pulled(problem.stress[1]) if rim is None else plate.moved(rim)
+    k = plate.factors(u, points, ways, disc_radii(points, length, outline, problem.polylines))
+    return k, plate.n_unknowns, spent_on()
 
 
-def specimen(problem: CrackProblem, refinement: int) -> tuple[np.ndarray, int, float]:
-    """(n_tips, 2) K_I, K_II, the number of unknowns and seconds; triangles are halved with every ``refinement``."""
-    from skfem import Basis, ElementTriP1, ElementTriP2, ElementVector, MeshTri, condense, solve
+def _window(problem: CrackProblem) -> Callable[[int], tuple[np.ndarray, int, float]]:
+    every = np.concatenate(problem.polylines)
+    middle, half = 0.5 * (every.min(axis=0) + every.max(axis=0)), 0.5 * np.ptp(every, axis=0).max()
+    mu, nu = ROCK.shear_modulus, ROCK.effective_poissons_ratio
+    if len(problem.polylines) == 1:
+        size = 2.5 * half
 
-    from ..shapes.meshing import mesh_interior
+        def rim(x: np.ndarray) -> np.ndarray:
+            return crack_fields.griffith_field(x, half, np.array(problem.stress), mu, nu)[1]
+    else:
+        from ..model import DdmSettings
 
-    half = 0.5 * float(np.hypot(*np.diff(problem.polylines[0], axis=0)[0]))
-    drawn = mesh_interior([problem.outline], problem.cracks, 1.6 * half / 2**refinement, 0.1 * half / 3**refinement)
+        size = half + 0.5 * np.hypot(*np.diff(problem.polylines[0], axis=0)[0])
+        rim = problem.solve(DdmSettings(order=8, elements_per_crack=4, grading_layers=6)).displacement
+    return lambda refinement: _straight(problem, rectangle(size, size) + middle, refinement, rim)
+
+
+def _arc(refinement: int, disc: float = 0.5) -> tuple[np.ndarray, int, float]:
+    """The crack r = 1 from 45° to 135° in equal biaxial tension, tips in the order of `crack_problems.arc_of_chords`;
+    ``disc``: the radius of their discs."""
     spent_on = stopwatch()
-    mesh = MeshTri(np.ascontiguousarray(drawn.points.T), np.ascontiguousarray(drawn.triangles.T.astype(np.int64)))
-    basis = Basis(mesh, ElementVector(ElementTriP2()), intorder=4)
-    height = problem.outline[2, 1]
-    force = _pull(basis.boundary(lambda x: np.isclose(x[1], height)), problem.stress[1])
-    force += _pull(basis.boundary(lambda x: np.isclose(x[1], -height)), -problem.stress[1])
-    # Three numbers of a rigid motion: a corner, and the height of another.
-    low = int(np.argmin(mesh.p[0] + mesh.p[1]))
-    right = int(np.argmax(mesh.p[0] - mesh.p[1]))
-    held = np.concatenate([basis.nodal_dofs[:, low], basis.nodal_dofs[1:, right]])
-    u = solve(*condense(_stiffness(basis), force, D=held))
-    field = basis.interpolate(u)
-    weight = Basis(mesh, ElementTriP1(), intorder=4)
-    x = np.asarray(basis.global_coordinates())
-    out = []
-    for line in problem.polylines:
-        for tip, way in ((line[0], line[0] - line[1]), (line[1], line[1] - line[0])):
-            way = way / np.hypot(*way)
-            turn = np.array([way, [-way[1], way[0]]])
-            distance = np.hypot(*(mesh.p - tip[:, None])) / half
-            q = weight.interpolate(np.clip(2 - 2.5 * distance, 0, 1))
-            local = np.einsum("ab,b...->a...", turn, x - tip[:, None, None])
-            out.append([_interaction(field, q, local, turn, mode, basis.dx) for mode in (0, 1)])
-    return np.array(out), len(u), spent_on()
-
-
-def _stiffness(basis):
-    from skfem import BilinearForm
-    from skfem.helpers import ddot, eye, sym_grad, trace
-
+    first, last = np.array([QUARTER, 0.0]), np.array([3 * QUARTER, 0.0])
+    window = rectangle(3 * QUARTER, REACH) + 0.5 * (first + last)
+    plate = Plate(
+        window,
+        Cracks.from_polylines([np.array([first, last])], aperture=math.inf),
+        Sizes(*(QUARTER * np.array(REFINEMENTS[refinement]) * [1, 1, 1 / QUARTER])),
+        lambda x: np.exp(x[:, 1:]) * np.column_stack([np.cos(x[:, 0]), np.sin(x[:, 0])]),
+    )
     mu, nu = ROCK.shear_modulus, ROCK.effective_poissons_ratio
-    lame = 2 * mu * nu / (1 - 2 * nu)
-
-    @BilinearForm
-    def form(u, v, _):
-        e = sym_grad(u)
-        return ddot(2 * mu * e + eye(lame * trace(e), 2), sym_grad(v))
-
-    return form.assemble(basis)
-
-
-def _pull(side, traction: float):
-    from skfem import LinearForm
-
-    return LinearForm(lambda v, _: traction * v[1]).assemble(side)
-
-
-def _stress(gradient: np.ndarray) -> np.ndarray:
-    """(2, 2, …) plane strain stress of a displacement gradient ∂u_i/∂x_j."""
-    mu, nu = ROCK.shear_modulus, ROCK.effective_poissons_ratio
-    strain = 0.5 * (gradient + gradient.swapaxes(0, 1))
-    mean = 2 * mu * nu / (1 - 2 * nu) * (gradient[0, 0] + gradient[1, 1])
-    return 2 * mu * strain + np.eye(2)[:, :, None, None] * mean
-
-
-def _energy_release(field, q, dx) -> float:
-    """J = ∫ (σ_ij ∂u_i/∂x_1 − W δ_1j) ∂q/∂x_j dA, the crack along x_1, q falling from 1 to 0 away from the tip."""
-    gradient, dq = field.grad, q.grad
-    stress = _stress(gradient)
-    energy = 0.5 * np.einsum("ij...,ij...->...", stress, gradient)
-    flow = np.einsum("ij...,i...->j...", stress, gradient[:, 0]) - np.stack([energy, 0 * energy])
-    return float(np.sum(np.einsum("j...,j...->...", flow, dq) * dx))
-
-
-def _interaction(field, q, x, turn, mode: int, dx) -> float:
-    """K of ``mode`` 0 or 1: E'/2 times the interaction integral with Williams' field of that mode, in the tip's
-    frame."""
-    gradient = np.einsum("ac,cd...,bd->ab...", turn, field.grad, turn, optimize=True)
-    dq = np.einsum("ac,c...->a...", turn, q.grad)
-    other = _williams_gradient(x, mode)
-    a, b = _stress(gradient), _stress(other)
-    mixed = np.einsum("ij...,ij...->...", a, other)
-    flow = np.einsum("ij...,i...->j...", a, other[:, 0]) + np.einsum("ij...,i...->j...", b, gradient[:, 0])
-    flow[0] -= mixed
-    return float(ROCK.plane_modulus / 2 * np.sum(np.einsum("j...,j...->...", flow, dq) * dx))
-
-
-def _williams_gradient(x: np.ndarray, mode: int) -> np.ndarray:
-    """(2, 2, …) ∂u_i/∂x_j of the singular field with K = 1 (Williams 1957), by the complex potential φ' =
-    K/(2√(2πz))."""
-    z = x[0] + 1j * x[1]
-    kappa, mu = 3 - 4 * ROCK.effective_poissons_ratio, ROCK.shear_modulus
-    k = 1.0 if mode == 0 else -1j
-    root = np.sqrt(2 * np.pi * z)
-    phi, d_phi = k / (2 * root), -k / (4 * z * root)
-    # Faces without traction: ψ' = Ω̄ − φ' − zφ'' with Ω = conj(k)/(2√).
-    psi = np.conj(k) / (2 * root) - phi - z * d_phi
-    # 2μ (u + iv) = κφ − z conj φ' − conj ψ, differentiated by x and by y.
-    by_x = kappa * phi - np.conj(phi) - z * np.conj(d_phi) - np.conj(psi)
-    by_y = 1j * (kappa * phi - np.conj(phi) + z * np.conj(d_phi) + np.conj(psi))
-    return np.stack([np.stack([by_x.real, by_y.real]), np.stack([by_x.imag, by_y.imag])]) / (2 * mu)
+    u = plate.moved(lambda x: crack_fields.arc_field(x, 1.0, QUARTER, mu, nu)[1])
+    c = math.sqrt(0.5)
+    k = plate.factors(
+        u,
+        np.array([[c, c], [-c, c]]),
+        np.array([[c, -c], [-c, -c]]),
+        np.array([disc, disc]),
+        [lambda x: np.hypot(*x) - 1, lambda x: 1 - np.hypot(*x)],
+    )
+    return k, plate.n_unknowns, spent_on()

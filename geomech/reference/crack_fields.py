@@ -57,3 +57,38 @@ def tip_stress(r: np.ndarray, angle: np.ndarray, k_i: float, k_ii: float) -> np.
             size * (k_i * s * c * c3 + k_ii * c * (1 - s * s3)),
         ]
     )
+
+
+def arc_field(
+    points: np.ndarray, tension: float, half_angle: float, shear_modulus: float, poissons_ratio: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) stress and (n, 2) displacement about an open crack along the unit circle, ``half_angle`` (rad) to either
+    side of the y axis, in equal biaxial ``tension`` (Muskhelishvili 1953, §124). Plane strain; points off the circle's
+    cracked part and its centre.
+
+    With X = √((z − a)(z − b)), cut along the arc between its ends a and b, and m = (a + b)/2:
+    Φ + Ω = d (z − m)/X and Φ − Ω = T − d, where Ω(z) = conj Φ(1/z̄) − … stands for Ψ. That Ψ is finite at the circle's
+    centre gives d = 2T/(3 − cos α). Displacements are those of the whole field, no rotation at infinity.
+    """
+    points = np.asarray(points, dtype=float)
+    z = points[:, 0] + 1j * points[:, 1]
+    a, b = 1j * np.exp(-1j * half_angle), 1j * np.exp(1j * half_angle)
+    middle, d = 0.5 * (a + b), 2 * tension / (3 - np.cos(half_angle))
+    # (z − a)/(z − b) has one argument all along the arc: the root's cut is turned there.
+    cut = -(1j - a) / (1j - b)
+
+    def root(w: np.ndarray) -> np.ndarray:
+        return (w - b) * np.sqrt((w - a) / (w - b) / cut) / np.sqrt(1 / cut)
+
+    x, mirrored = root(z), 1 / np.conj(z)
+    phi, omega_mirrored = 0.5 * (d * x + (tension - d) * z), 0.5 * (d * root(mirrored) - (tension - d) * mirrored)
+    big_phi = 0.5 * (d * (z - middle) / x + tension - d)
+    d_big_phi = 0.5 * d * (1 / x - (z - middle) ** 2 / x**3)
+    # Ψ = (Φ − zΦ' − conj Ω(1/z̄))/z²;  2μ(u + iv) = κφ − ω(1/z̄) − (z − 1/z̄) conj Φ.
+    big_omega = 0.5 * (d * (mirrored - middle) / root(mirrored) - tension + d)
+    big_psi = (big_phi - z * d_big_phi - np.conj(big_omega)) / z**2
+    total, deviator = 4 * big_phi.real, 2 * (np.conj(z) * d_big_phi + big_psi)
+    stress = np.column_stack([0.5 * (total - deviator.real), 0.5 * (total + deviator.real), 0.5 * deviator.imag])
+    kappa = 3 - 4 * poissons_ratio
+    u = (kappa * phi - omega_mirrored - (z - mirrored) * np.conj(big_phi)) / (2 * shear_modulus)
+    return stress, np.column_stack([u.real, u.imag])

@@ -33,8 +33,9 @@ def draw(
     ),
     goal: float | None = 1e-4,
 ) -> Path:
-    """``points`` as one curve a method (at most seven, in the legend's order), logarithmic axes shared by all
-    ``panels`` (rows, columns). The first method's ends are labelled by ``size_of``; ``labels`` are those of the axes,
+    """``points`` as one curve a method (at most seven, in the legend's order; several of one colour where points have
+    a ``curve``, which labels their ends), logarithmic axes shared by all ``panels`` (rows, columns). The first method's
+    ends are labelled by ``size_of`` otherwise; ``labels`` are those of the axes,
     ``goal`` an error to mark."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
@@ -46,20 +47,21 @@ def draw(
     handles = {}
     for panel, problem in zip(axes.flat, problems):
         for method, (colour, marker, line) in zip(methods, _STYLES):
-            curve = [p for p in points if (p.problem, p.method) == (problem, method)]
-            if not curve:
-                continue
+            every = [p for p in points if (p.problem, p.method) == (problem, method)]
             ours = method == methods[0]
-            handles[method] = panel.loglog(
-                [p.error for p in curve], [1e3 * p.seconds for p in curve], color=colour, marker=marker, ls=line,
-                lw=2.2 if ours else 1.2, ms=5.5 if ours else 4, zorder=3 if ours else 2,
-            )[0]  # fmt: skip
-            if ours:
-                for p, shift in ((curve[0], (0, -14)), (curve[-1], (6, 7))):
-                    panel.annotate(
-                        size_of(p), (p.error, 1e3 * p.seconds), textcoords="offset points", xytext=shift,
-                        ha="center", fontsize=8, color=colour,
-                    )  # fmt: skip
+            for name in dict.fromkeys(getattr(p, "curve", "") for p in every):
+                curve = [p for p in every if getattr(p, "curve", "") == name]
+                handles[method] = panel.loglog(
+                    [p.error for p in curve], [1e3 * p.seconds for p in curve], color=colour, marker=marker, ls=line,
+                    lw=2.2 if ours else 1.2, ms=5.5 if ours else 4, zorder=3 if ours else 2,
+                )[0]  # fmt: skip
+                if ours:
+                    ends = [(curve[-1], name, (8, -3))] if name else _ends(curve, size_of)
+                    for p, text, shift in ends:
+                        panel.annotate(
+                            text, (p.error, 1e3 * p.seconds), textcoords="offset points", xytext=shift,
+                            ha="left" if name else "center", fontsize=8, color=colour,
+                        )  # fmt: skip
         panel.set_title(problem, fontsize=11, loc="left")
         panel.margins(0.08, 0.12)
         panel.grid(which="major", color="#e4e4e4", lw=0.7)
@@ -75,9 +77,17 @@ def draw(
     axes.flat[0].invert_xaxis()
     figure.supxlabel(labels[0], fontsize=10)
     figure.supylabel(labels[1], fontsize=10)
-    last = axes.flat[-1] if len(problems) < axes.size else figure
     order = [m for m in methods if m in handles]
-    last.legend([handles[m] for m in order], order, loc="center", frameon=False, fontsize=10)
+    drawn = [handles[m] for m in order]
+    if len(problems) < axes.size:
+        axes.flat[-1].legend(drawn, order, loc="center", frameon=False, fontsize=10)
+    else:
+        figure.legend(drawn, order, loc="outside upper center", ncols=min(len(order), columns + 1), frameon=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
     return path
+
+
+def _ends(curve: Sequence[Measured], size_of: Callable[[Measured], str]):
+    """Points at both ends with what labels them and where, in points."""
+    return [(curve[0], size_of(curve[0]), (0, -14)), (curve[-1], size_of(curve[-1]), (6, 7))]

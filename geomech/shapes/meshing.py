@@ -27,14 +27,18 @@ class InteriorMesh:
 
 
 def mesh_interior(
-    loops: Sequence[np.ndarray], cracks: Cracks, size: float | None = None, tip_size: float | None = None
+    loops: Sequence[np.ndarray],
+    cracks: Cracks,
+    size: float | None = None,
+    tip_size: float | None = None,
+    slope: float = 0.5,
 ) -> InteriorMesh:
     """Mesh the block bounded by ``loops`` ((n, 2) each, the outline first, then holes) with ``cracks`` (nodes shared
     where they meet) cut open.
 
     ``size`` is the length of a triangle's side away from cracks (default: two to four thousand triangles in all),
     ``tip_size`` that at crack tips (default a tenth of it), both in m; along cracks sides are half of ``size``, and all
-    grow back to it over two of its lengths. Nodes on cracks are
+    grow back to it by ``slope`` times the distance (a half: over two of its lengths). Nodes on cracks are
     doubled, at junctions once a sector, at mouths too; tips stay single. Raises ValueError for sizes that are not
     positive, RuntimeError where Gmsh cannot mesh the block.
     """
@@ -43,9 +47,11 @@ def mesh_interior(
     # An equilateral triangle of side h covers 0.43 h².
     size = float(np.sqrt(area / 0.43 / 2000)) if size is None else size
     tip_size = 0.1 * size if tip_size is None else tip_size
-    if not (size > 0 and tip_size > 0):
-        raise ValueError(f"mesh sizes must be positive, got size {size!r} and tip_size {tip_size!r} m")
-    points, triangles, crack_edges = _mesh(loops, cracks, size, min(tip_size, size))
+    if not (size > 0 and tip_size > 0 and slope > 0):
+        raise ValueError(
+            f"mesh sizes must be positive, got size {size!r} and tip_size {tip_size!r} m, growing by {slope!r}"
+        )
+    points, triangles, crack_edges = _mesh(loops, cracks, size, min(tip_size, size), size / slope)
     return _torn(points, triangles, crack_edges)
 
 
@@ -73,7 +79,7 @@ def _with_mouths(loop: np.ndarray, mouths: list[tuple[int, np.ndarray]], toleran
     return ring
 
 
-def _mesh(loops, cracks: Cracks, size: float, tip_size: float):
+def _mesh(loops, cracks: Cracks, size: float, tip_size: float, reach: float):
     """(points, triangles, crack edges) as Gmsh makes them, crack lines embedded and not yet torn."""
     tolerance = 1e-9 * max(np.ptp(loop, axis=0).max() for loop in loops)
     mouths = [(int(n), cracks.nodes[n]) for n in np.flatnonzero(cracks.surface)]
@@ -108,7 +114,7 @@ def _mesh(loops, cracks: Cracks, size: float, tip_size: float):
         option("Mesh.LcIntegrationPrecision", 1e-3)
         tips = [tag_of[int(n)] for n in cracks.tips]
         if tips and tip_size < size:
-            _refine(mesh, tips, lines, size, tip_size)
+            _refine(mesh, tips, lines, size, tip_size, reach)
         # Delaunay is the quickest that honours embedded lines; the others are for the rare block it fails on.
         for algorithm in (5, 6, 1):
             option("Mesh.Algorithm", algorithm)
@@ -141,12 +147,12 @@ def _are_edges(pairs: np.ndarray, triangles: np.ndarray, n: int) -> bool:
     return bool(np.isin(pairs[:, 0] * n + pairs[:, 1], sides[:, 0] * n + sides[:, 1]).all())
 
 
-def _refine(mesh, tips, lines, size: float, tip_size: float) -> None:
-    """Side lengths: ``tip_size`` at tips, half of ``size`` along cracks, ``size`` away from both."""
+def _refine(mesh, tips, lines, size: float, tip_size: float, reach: float) -> None:
+    """Side lengths: ``tip_size`` at tips, half of ``size`` along cracks, ``size`` at ``reach`` from both."""
     fields = []
-    for what, items, smallest, start, reach in (
-        ("PointsList", tips, tip_size, tip_size, 2 * size),
-        ("CurvesList", lines, 0.5 * size, 0.5 * size, 2 * size),
+    for what, items, smallest, start in (
+        ("PointsList", tips, tip_size, tip_size),
+        ("CurvesList", lines, 0.5 * size, 0.5 * size),
     ):
         distance = mesh.field.add("Distance")
         mesh.field.setNumbers(distance, what, items)

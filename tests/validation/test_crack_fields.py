@@ -3,10 +3,12 @@
 import math
 
 import numpy as np
+import pytest
 
 from geomech import ddm
+from geomech.bench import crack_problems
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import crack_fields
+from geomech.reference import crack_fields, fracture
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 REMOTE = np.array([0.3e6, 1e6, 0.4e6])
@@ -59,3 +61,49 @@ def test_near_a_tip_the_stress_is_williams():
         stress, _ = solution(order=8).fields(points)
         s, _ = exact(points)
         assert np.abs(stress - s).max() < 3e-7 * np.abs(s).max()
+
+
+#: Beside an arc of a quarter circle, within and without, ahead of a tip, near its centre and far away.
+BESIDE_AN_ARC = np.array([[0.1, 0.85], [-0.3, 1.2], [0.95, 0.5], [0.1, -0.2], [1.5, 0.7], [-0.2, -1.1], [3.0, -40.0]])
+
+
+def arc(points):
+    return crack_fields.arc_field(points, 1.0, math.pi / 4, ROCK.shear_modulus, ROCK.poissons_ratio)
+
+
+def test_muskhelishvilis_arc_keeps_its_conditions():
+    """Nothing pulls on the faces, all is as before far away, ahead of the tips stand the published K, and stress and
+    displacement obey Hooke's law."""
+    q = np.linspace(math.pi / 4 + 0.1, 3 * math.pi / 4 - 0.1, 7)
+    normal = np.column_stack([np.cos(q), np.sin(q)])
+    for r in (1 - 1e-9, 1 + 1e-9):
+        s = arc(r * normal)[0]
+        pull = np.column_stack([s[:, 0] * normal[:, 0] + s[:, 2] * normal[:, 1], (s[:, 1:] * normal[:, ::-1]).sum(1)])
+        assert np.abs(pull).max() < 1e-7
+    assert arc(np.array([[1e4, 3e3]]))[0][0] == pytest.approx([1, 1, 0], abs=1e-7)
+    way, left, r = np.array([1.0, -1.0]) / math.sqrt(2), np.array([1.0, 1.0]) / math.sqrt(2), 1e-8
+    xx, yy, xy = arc((left + r * way)[None])[0][0]
+    pull = math.sqrt(2 * math.pi * r) * np.array([[xx, xy], [xy, yy]]) @ left
+    assert [left @ pull, -way @ pull] == pytest.approx(fracture.circular_arc(1.0, 1.0, math.pi / 4), rel=1e-6)
+    h, mu, nu = 1e-5, ROCK.shear_modulus, ROCK.poissons_ratio
+    by_x, by_y = ((arc(BESIDE_AN_ARC + d)[1] - arc(BESIDE_AN_ARC - d)[1]) / (2 * h) for d in h * np.eye(2))
+    strain = np.column_stack([by_x[:, 0], by_y[:, 1], 0.5 * (by_x[:, 1] + by_y[:, 0])])
+    mean = 2 * mu * nu / (1 - 2 * nu) * (strain[:, 0] + strain[:, 1])
+    hooke = 2 * mu * strain + mean[:, None] * [1, 1, 0]
+    assert np.abs(hooke - arc(BESIDE_AN_ARC)[0]).max() < 1e-6
+
+
+def test_stress_beside_an_arc_is_muskhelishvilis():
+    """A polygon of tangents follows the arc with second order, and so do the fields beside it."""
+    sizes, errors = (8, 16, 32), []
+    for n in sizes:
+        solved = crack_problems.arc_of_tangents(n).solve(DdmSettings(elements_per_crack=1))
+        stress, displacement = solved.fields(BESIDE_AN_ARC)
+        s, u = arc(BESIDE_AN_ARC)
+        moved = displacement - u
+        # Where the plane rests is free.
+        moved = np.abs(moved - moved[0]).max() / np.ptp(u[:-1])
+        errors.append(max(np.abs(stress - s).max(), moved))
+    orders = -np.diff(np.log(errors)) / np.diff(np.log(sizes))
+    print("Muskhelishvili's arc, errors", errors, "observed orders", orders)
+    assert errors[-1] < 1e-3 and orders.min() > 1.7
