@@ -132,8 +132,9 @@ def _take(data, diagonal, changed, factored):
     """Copy the ``changed`` diagonal blocks of ``data`` to ``factored`` (n, 36)."""
     for b in range(len(diagonal)):
         if changed[b]:
+            given, taken = data[36 * diagonal[b] : 36 * diagonal[b] + 36], factored[b]
             for k in range(36):
-                factored[b, k] = data[36 * diagonal[b] + k]
+                taken[k] = given[k]
 
 
 #: A solution (6n,) and its product with the matrix.

@@ -19,6 +19,8 @@ _jit = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="nu
 
 #: Unknowns eliminated at a time; twelve to thirty keep BLAS as busy.
 PANEL = 12
+#: What so many do to the rows and columns behind them is one product: longer ones keep BLAS busier.
+STRIP = 48
 
 #: BLAS's general products, as Numba itself binds them for np.dot: here with strides, and added in place.
 _gemm = types.ExternalFunction(
@@ -189,19 +191,24 @@ def eliminate(
                     else:
                         _add_runs(lower[6 * (i - own) + a], left[6 * u + a], met, begins, 0, mine, 0)
             g = sibling[g]
-        for start in range(0, p, PANEL):
-            end = min(start + PANEL, p)
-            if not _invert(upper[start:end, start:end], swapped):
-                return False
-            right = panel[: (end - start) * (m - end)].reshape((end - start, m - end))
-            scaled = upper[start:end, end:]
-            for i in range(end - start):
-                copied, given = right[i], scaled[i]
-                for j in range(m - end):
-                    copied[j] = given[j]
-            _add_product(one, upper[start:end, start:end], right, none, scaled)
-            _add_product(minus, upper[end:, start:end], scaled, one, upper[end:, end:])
-            _add_product(minus, lower[:, start:end], scaled[:, : p - end], one, lower[:, end:])
+        for begin in range(0, p, STRIP):
+            stop = min(begin + STRIP, p)
+            for start in range(begin, stop, PANEL):
+                end = min(start + PANEL, stop)
+                if not _invert(upper[start:end, start:end], swapped):
+                    return False
+                right = panel[: (end - start) * (m - end)].reshape((end - start, m - end))
+                scaled = upper[start:end, end:]
+                for i in range(end - start):
+                    copied, given = right[i], scaled[i]
+                    for j in range(m - end):
+                        copied[j] = given[j]
+                _add_product(one, upper[start:end, start:end], right, none, scaled)
+                _add_product(minus, upper[end:stop, start:end], scaled, one, upper[end:stop, end:])
+                _add_product(minus, upper[stop:, start:end], scaled[:, : stop - end], one, upper[stop:, end:stop])
+                _add_product(minus, lower[:, start:end], scaled[:, : stop - end], one, lower[:, end:stop])
+            _add_product(minus, upper[stop:, begin:stop], upper[begin:stop, stop:], one, upper[stop:, stop:])
+            _add_product(minus, lower[:, begin:stop], upper[begin:stop, stop:p], one, lower[:, stop:])
         if p > 0:
             _add_product(minus, lower, upper[:, p:], none, rest)
         else:
