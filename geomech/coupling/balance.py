@@ -37,6 +37,9 @@ COMPLIANCE_PASSES = 20
 #: At rest, after so many of them blocks whose forces and strain still chase each other take their mean stress alone.
 PATIENCE = 10
 
+#: A strain that was assumed so well, relative, is not what has cut a step short.
+CERTAIN = 1e-2
+
 #: Larger lags than this are no state: a shorter step is tried, in which inertia leaves strain less to do, so many times
 #: by half.
 NO_ANSWER = 0.1
@@ -89,12 +92,12 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
     tolerance = COMPLIANCE_TOLERANCE if static else DYNAMIC_TOLERANCE
     asked = dt
     response = _expected(now, now.state.time + dt if load_time is None else load_time) if static else now.response
-    result, iterations, tried_whole, chased = None, 0, False, set()
+    result, iterations, tried_whole, chased, doubt = None, 0, False, set(), 0.0
     for attempt in range(COMPLIANCE_PASSES):
         with now.timed("dda"):
             result = now.system.step(now.state, now.problem.loads, dt, response, load_time, result)
             # Passes that took steps of unlike lengths, and so in statics bore unlike loads, would never agree.
-            dt = min(dt, result.dt)
+            cut, dt = result.dt < dt, min(dt, result.dt)
             if load_time is not None and result.state.time != load_time:
                 result = replace(result, state=replace(result.state, time=load_time))
         iterations += result.statistics["open_close_iterations"]
@@ -112,12 +115,13 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
             _solve_bodies(now, result)
         response, differences, answer = _take_response(now, result.state, settling, tolerance)
         mismatch = float(differences.max())
+        doubt = max(doubt, mismatch) if cut else doubt
         if mismatch < tolerance:
             if static:
                 _remember(now, answer)
             # In a step that has been cut short by a chase blocks agree as their inertia holds them: that is no rest.
             give_way = chased if static and dt != asked and tried_whole else set()
-            if not static or dt == asked or (tried_whole and not give_way):
+            if not static or dt == asked or ((tried_whole or doubt < CERTAIN) and not give_way):
                 break
             # What cut a static step short may have been a strain that the first passes assumed.
             dt, tried_whole, chased = asked, True, set()
