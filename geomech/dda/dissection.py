@@ -151,11 +151,62 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
     return fronts, np.array(parent, dtype=np.int64)
 
 
-def _around(blocks: np.ndarray, pointer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of all neighbours of ``blocks`` in the list of neighbours, and where each block's begin among them."""
-    count = pointer[blocks + 1] - pointer[blocks]
-    first = np.cumsum(count) - count
-    return np.repeat(pointer[blocks] - first, count) + np.arange(count.sum()), first
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _seat(number, front, pivots, reach, boundary):
+    """Where a block stands in a front: its own first, then its boundary."""
+    if number < pivots[front + 1]:
+        return number - pivots[front]
+    met = boundary[reach[front] : reach[front + 1]]
+    return pivots[front + 1] - pivots[front] + np.searchsorted(met, number)
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _reached(blocks, rank, pivots, parent, pointer, neighbour):
+    """``reach``, ``boundary`` and ``seat`` of a `Tree`; ``blocks`` (n,) in the order of elimination."""
+    n_fronts = len(parent)
+    reach, boundary, top = np.zeros(n_fronts + 1, np.int64), np.empty(4 * len(blocks) + 16, np.int64), 0
+    child, sibling, met = np.full(n_fronts, -1), np.full(n_fronts, -1), np.full(len(blocks), -1)
+    for f in range(n_fronts):
+        last = pivots[f + 1]
+        if len(boundary) < top + len(blocks):
+            more = np.empty(2 * len(boundary), np.int64)
+            more[:top] = boundary[:top]
+            boundary = more
+        for b in blocks[pivots[f] : last]:
+            for e in range(pointer[b], pointer[b + 1]):
+                r = rank[neighbour[e]]
+                if r >= last and met[r] != f:
+                    met[r], boundary[top] = f, r
+                    top += 1
+        g = child[f]
+        while g >= 0:
+            for k in range(reach[g], reach[g + 1]):
+                r = boundary[k]
+                if r >= last and met[r] != f:
+                    met[r], boundary[top] = f, r
+                    top += 1
+            g = sibling[g]
+        boundary[reach[f] : top] = np.sort(boundary[reach[f] : top])
+        reach[f + 1] = top
+        if parent[f] >= 0:
+            sibling[f], child[parent[f]] = child[parent[f]], f
+    seat = np.full(top, -1)
+    for f in range(n_fronts):
+        for k in range(reach[f], reach[f + 1]):
+            seat[k] = _seat(boundary[k], parent[f], pivots, reach, boundary)
+    return reach, boundary[:top].copy(), seat
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _places(row, column, entry, entries, pivots, reach, boundary):
+    """Where the rows and columns of the matrix blocks ``entry`` (…,), given by their blocks' numbers, stand in their
+    fronts."""
+    rows, columns = np.empty(len(entry), np.int64), np.empty(len(entry), np.int64)
+    for f in range(len(entries) - 1):
+        for k in range(entries[f], entries[f + 1]):
+            rows[k] = _seat(row[entry[k]], f, pivots, reach, boundary)
+            columns[k] = _seat(column[entry[k]], f, pivots, reach, boundary)
+    return rows, columns
 
 
 def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
@@ -165,42 +216,21 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
     pointer = np.searchsorted(rows, np.arange(n + 1))
     fronts, parent = dissect(points, pointer, columns)
     n_fronts = len(fronts)
+    blocks = np.concatenate(fronts)
     rank = np.empty(n, np.int64)
-    rank[np.concatenate(fronts)] = np.arange(n)
+    rank[blocks] = np.arange(n)
     pivots = np.cumsum([0, *map(len, fronts)])
-    reached: list[np.ndarray] = []
-    children: list[list[int]] = [[] for _ in range(n_fronts)]
-    for f, blocks in enumerate(fronts):
-        met = [reached[c] for c in children[f]]
-        if len(blocks):
-            met.append(rank[columns[_around(blocks, pointer)[0]]])
-        met = np.unique(np.concatenate(met))
-        reached.append(met[met >= pivots[f + 1]])
-        if parent[f] >= 0:
-            children[parent[f]].append(f)
-    own, far = np.diff(pivots), np.array([len(r) for r in reached])
-    reach = np.concatenate([[0], np.cumsum(far)])
-    boundary = np.concatenate(reached)
-
-    def seats(f: int, blocks: np.ndarray) -> np.ndarray:
-        """Where ``blocks`` stand in front ``f``: its own first, then its boundary."""
-        mine = blocks < pivots[f + 1]
-        return np.where(mine, blocks - pivots[f], own[f] + np.searchsorted(reached[f], blocks))
-
-    seat = np.full(len(boundary), -1)
-    for f in np.flatnonzero(parent >= 0):
-        seat[reach[f] : reach[f + 1]] = seats(parent[f], reached[f])
+    reach, boundary, seat = _reached(blocks, rank, pivots, parent, pointer, columns)
+    own, far = np.diff(pivots), np.diff(reach)
     row, column = rank[rows], rank[columns]
     # A front without blocks of its own begins where the next one does: the last that begins there owns them.
     front = np.searchsorted(pivots, np.minimum(row, column), side="right") - 1
     entry = np.argsort(front, kind="stable")
     entries = np.searchsorted(front[entry], np.arange(n_fronts + 1))
-    for f in range(n_fronts):
-        here = entry[entries[f] : entries[f + 1]]
-        row[here], column[here] = seats(f, row[here]), seats(f, column[here])
+    row, column = _places(row, column, entry, entries, pivots, reach, boundary)
     tasks, above = _tasks(parent, own, far)
     size = 36 * far**2
-    stack, stack_size = _stacked(parent, children, size, tasks)
+    stack, stack_size = _stacked(parent, size, tasks)
     return Tree(
         rank=rank,
         pivots=pivots,
@@ -210,8 +240,8 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
         seat=seat,
         entries=entries,
         entry=entry,
-        row=row[entry],
-        column=column[entry],
+        row=row,
+        column=column,
         kept=int(size.sum()) <= KEPT,
         own_room=np.cumsum(size) - size,
         own_room_size=int(size.sum()),
@@ -245,9 +275,7 @@ def _tasks(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.nda
     return np.stack([first[order], order + 1], axis=1), number[parent[order]]
 
 
-def _stacked(
-    parent: np.ndarray, children: list[list[int]], size: np.ndarray, tasks: np.ndarray
-) -> tuple[np.ndarray, int]:
+def _stacked(parent: np.ndarray, size: np.ndarray, tasks: np.ndarray) -> tuple[np.ndarray, int]:
     """Where each front leaves its S of ``size`` (n_fronts,), and the room that takes. Each task has two stacks, for
     fronts an even and an odd number of levels from the root: a front's goes onto one while those of its children, the
     last on the other, are used up."""
@@ -255,15 +283,19 @@ def _stacked(
     for f in range(len(parent) - 1, -1, -1):
         if parent[f] >= 0:
             level[f] = level[parent[f]] + 1
-    base = 0
+    base, below = 0, np.full(len(parent), -1)
     for a, b in tasks:
         top, most = [0, 0], [0, 0]
         for f in range(a, b):
             mine = level[f] % 2
-            top[1 - mine] = min([top[1 - mine], *(at[c] for c in children[f] if c >= a)])
+            # The first of its children, where they are of this task, lies lowest.
+            if below[f] >= a:
+                top[1 - mine] = at[below[f]]
             at[f] = top[mine]
             top[mine] += size[f]
             most[mine] = max(most[mine], top[mine])
+            if parent[f] >= 0 and below[parent[f]] < a:
+                below[parent[f]] = f
         at[a:b] += np.where(level[a:b] % 2 == 1, base + most[0], base)
         base += sum(most)
     return at, int(base)
