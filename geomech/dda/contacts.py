@@ -123,8 +123,8 @@ class ContactFinder:
                 table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, by_length[law], partner
             )
         if nodes is not None:
-            geometry[:, 4] = nodes.lengths(geometry[:, 4])
-            parent = nodes.heirs(own, old["state"])
+            geometry[:, 4] = nodes.left(geometry[:, 4])
+            parent = nodes.heirs(own, np.ascontiguousarray(old["state"]))
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
         remembered = self._remembered(old, parent, state.time, geometry, partner, springs, self._stiff[law])

@@ -47,33 +47,39 @@ class NodesInFaces(NamedTuple):
     neighbours: np.ndarray
     share: np.ndarray
 
-    def lengths(self, length: np.ndarray) -> np.ndarray:
-        """(n,) m: the tributary ``length`` with what the nodes have left to their neighbours."""
-        out = length.copy()
-        for node, ends, share in zip(self.node, self.neighbours, self.share, strict=True):
-            # Where others lie between, one hands on what another has left to it.
-            out[ends] += share * out[node]
-            out[node] = 0.0
-        return out
+    def left(self, borne: np.ndarray) -> np.ndarray:
+        """(n,) of contacts: what is ``borne`` (n,), tributary lengths or forces, with what the nodes have left to their
+        neighbours."""
+        return _left(borne, self.node, self.neighbours, self.share)
 
     def heirs(self, parent: np.ndarray, state: np.ndarray) -> np.ndarray:
         """(n,) rows of the last step that contacts go on from: ``parent`` (n,), −1 for new ones, and where these come
         beside a node whose contact was closed, or were open themselves, that one; ``state`` is of the last step's rows."""
-        out = parent.copy()
-        for node, ends in zip(self.node, self.neighbours, strict=True):
-            if parent[node] >= 0 and state[parent[node]] != OPEN:
-                for end in ends:
-                    if out[end] < 0 or state[out[end]] == OPEN:
-                        out[end] = parent[node]
-        return out
+        return _heirs(parent, state, self.node, self.neighbours)
 
-    def left(self, force: np.ndarray) -> np.ndarray:
-        """(n,) N: ``force`` (n,) of the contacts' own rows of the last step, with what the nodes' have left."""
-        out = force.copy()
-        for node, ends, share in zip(self.node, self.neighbours, self.share, strict=True):
-            out[ends] += share * out[node]
-            out[node] = 0.0
-        return out
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _left(borne, node, neighbours, share):
+    out = borne.copy()
+    for k in range(node.shape[0]):
+        # In this order: where another node lies between, it hands on what has been left to it.
+        for side in range(2):
+            out[neighbours[k, side]] += share[k, side] * out[node[k]]
+        out[node[k]] = 0.0
+    return out
+
+
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _heirs(parent, state, node, neighbours):
+    out = parent.copy()
+    for k in range(node.shape[0]):
+        before = parent[node[k]]
+        if before < 0 or state[before] == OPEN:
+            continue
+        for end in neighbours[k]:
+            if out[end] < 0 or state[out[end]] == OPEN:
+                out[end] = before
+    return out
 
 
 def nodes_in_faces(
