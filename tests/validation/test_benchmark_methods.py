@@ -157,6 +157,11 @@ def test_table_and_picture(tmp_path):
         points += [Point(name, precision_table.ASKED, p, 10 * p, 10.0 ** (-p), 1e-3) for p in range(2, 9)]
         points += [Point(name, precision_table.CALIBRATED, n, 2 * n, 0.1 / n, 1e-3 * n) for n in (10, 1000, 10000)]
         points += [Point(name, precision_table.QUADRATIC, n, 2 * n, 1e-3, 1e-3 * n) for n in (10, 500)]
+    for order in (2, 4):
+        for n in (10, 40):
+            told = {"curve": f"p = {order}", "parts": (0.01 / n, 0.02 / n)}
+            points.append(Point(growth_paths.PROBLEM, precision_table.OURS, n, 90 * n, 0.02 / n, 1e-3 * n * order, **told))
+    points += [Point(growth_paths.PROBLEM, precision_table.FEM, n, 900 * n, 0.06 / n, 1e-2 * n) for n in (10, 40)]
     goals = precision_table.goals_of(points)
     rows = {row["method"]: row for row in goals["time at one error over this solver's"]}
     assert rows[precision_table.CALIBRATED]["reached"] and rows[precision_table.CALIBRATED]["ratio"] == pytest.approx(
@@ -165,6 +170,13 @@ def test_table_and_picture(tmp_path):
     assert not rows[precision_table.QUADRATIC]["reached"] and rows[precision_table.QUADRATIC]["ratio"] == pytest.approx(
         500
     )
-    assert "500  and then still at 1e-03; its error does not fall" in precision_table.table(points, growth, goals)
+    text = precision_table.table(points, growth, goals)
+    assert "500  and then still at 1e-03; its error does not fall" in text
+    # Growth is compared at an error of its own, with the quickest of this solver's curves.
+    grown = [row for row in goals["time at one error over this solver's"] if row["problem"] == growth_paths.PROBLEM]
+    assert [row["method"] for row in grown] == [precision_table.FEM] and grown[0]["reached"]
+    assert grown[0]["ratio"] == pytest.approx(0.2 / 0.02, rel=1e-9)
+    assert "this solver, p = 4 " in text and "(path 2.5e-04, load 5.0e-04)" in text
+    assert points[-3].name == f"{growth_paths.PROBLEM}, this solver, p = 4: 40"
     path = draw(points, precision_table.METHODS, tmp_path / "picture.png")
     assert path.read_bytes().startswith(b"\x89PNG")
