@@ -41,8 +41,10 @@ CHANGED = 1e-6
 TRIES = 16
 #: Where so many have changed, it is taken that as many will have the next time.
 MOSTLY = 0.9
-#: Where fronts cannot be eliminated one by one, factors that differ in so few blocks are not made anew.
-FEW = 12
+#: Where fronts cannot be eliminated one by one, factors that differ in so few blocks are not made anew: of 100 000
+#: bricks they take as long as 27 substitutions, and where ten scattered contacts differ GMRES takes 7 to 19 more, of
+#: which this many are tried.
+FEW, TRIES_OF_FEW = 30, 24
 #: Free blocks from which factors are in single precision: half the memory, and on walls of 10 000 bricks three quarters
 #: of the time although a solution takes two substitutions more; of 1 000 as quick.
 SINGLE = 4000
@@ -164,6 +166,11 @@ class BlockSolver:
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
 
+    @property
+    def in_parts(self) -> bool:
+        """Whether a matrix that differs in some blocks from the last is factored for a part of the price."""
+        return self._factors.tree.kept
+
     def holds(self, keys: np.ndarray) -> bool:
         """Whether the pattern has the blocks ``keys`` = row · n + column."""
         return bool((self.keys[self.entry(keys) % len(self.keys)] == keys).all())
@@ -250,7 +257,8 @@ class BlockSolver:
         """`solve` with the factors as they are; None where single precision does not do."""
         if self._has_factors:
             fresh = self._bring(data, 0 if self._factors.tree.kept else FEW)
-            found = self._iterate(data, right, within, self._factors)
+            tries = TRIES if fresh or self.in_parts else TRIES_OF_FEW
+            found = self._iterate(data, right, within, self._factors, tries=tries)
             # Single precision knows no more of this matrix than that, in full or in part.
             if found is not None or (fresh and self._factors.single):
                 return None if found is None else found[0]
@@ -309,9 +317,16 @@ class BlockSolver:
         return multiply(data, self.pointer, self.columns, x)
 
     def _iterate(
-        self, data: np.ndarray, right: np.ndarray, within: float, factors: Factors, begun: _Known | None = None
+        self,
+        data: np.ndarray,
+        right: np.ndarray,
+        within: float,
+        factors: Factors,
+        begun: _Known | None = None,
+        tries: int = TRIES,
     ) -> _Known | None:
-        """GMRES with ``factors`` on the right, from what is ``begun`` with; None when it takes too long."""
+        """GMRES with ``factors`` on the right, from what is ``begun`` with; None when it takes too long, see
+        `_krylov`."""
         target, told = within * float(np.abs(right).max(initial=0.0)), False
         if begun is None:
             x = self.substitute(right, factors)
@@ -332,22 +347,24 @@ class BlockSolver:
                 return x, product
             if not np.isfinite(largest):
                 return None
-            step = self._krylov(data, rest, target, factors)
+            step = self._krylov(data, rest, target, factors, tries)
             if step is None:
                 return None
             x += step
         return None
 
-    def _krylov(self, data: np.ndarray, rest: np.ndarray, target: float, factors: Factors) -> np.ndarray | None:
-        """The correction that brings ``rest`` down to ``target``, None if it would take more than ``TRIES``
-        solutions."""
+    def _krylov(
+        self, data: np.ndarray, rest: np.ndarray, target: float, factors: Factors, tries: int
+    ) -> np.ndarray | None:
+        """The correction that brings ``rest`` down to ``target``, None if it would take more than so many ``tries``,
+        solutions with the factors."""
         size = float(np.linalg.norm(rest))
-        basis, directions = np.empty((TRIES + 1, len(rest))), []
+        basis, directions = np.empty((tries + 1, len(rest))), []
         basis[0] = rest / size
-        hessenberg = np.zeros((TRIES + 1, TRIES))
-        first = np.zeros(TRIES + 1)
+        hessenberg = np.zeros((tries + 1, tries))
+        first = np.zeros(tries + 1)
         first[0] = size
-        for k in range(TRIES):
+        for k in range(tries):
             directions.append(self.substitute(basis[k], factors))
             v = self.multiply(data, directions[-1])
             for _ in range(2):  # twice is enough for orthogonality to round-off

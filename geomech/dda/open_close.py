@@ -39,7 +39,8 @@ _ALL, _SOME, _WORST, _FIRST = 0, 1, 2, 3
 #: Switching all goes on while the number of wrong contacts falls to this part of the fewest so far, …
 _FEWER = 0.55
 #: … or for so many iterations although it does not, more where no more than this part of the contacts is wrong (on a
-#: slope that slides, an iteration takes a fifth of one of the path, of which forty may lead nowhere).
+#: slope that slides, an iteration takes a fifth of one of the path, of which forty may lead nowhere; not where blocks
+#: are so many that both factor all of the matrix).
 _TRIES, _TRIES_OF_FEW, _FEW_OF_ALL = 1, 4, 0.02
 #: If no more than this many contacts are still wrong then, only some are switched, while that helps or for so many
 #: iterations.
@@ -401,6 +402,7 @@ def settle(
     slower: Iterator[tuple[_States, int]] | None = None
     caution, fewest, tries = _ALL, np.inf, 0
     few, small = len(found) <= _FEW, pattern.solver is None
+    cheap = small or pattern.solver.in_parts
     iteration, most = 0, max_iterations
     # Contacts (n,) that were wrong in the last iterations, when few were, and how often they were sought together.
     lately, joint, left = [], 0, _SOLUTIONS
@@ -437,7 +439,7 @@ def settle(
         seen.add(states.key)
         tries = 0 if number <= _FEWER * fewest else tries + 1
         fewest = min(fewest, number)
-        most_tries = _TRIES if few or number > _FEW_OF_ALL * len(found) else _TRIES_OF_FEW
+        most_tries = _TRIES_OF_FEW if cheap and not few and number <= _FEW_OF_ALL * len(found) else _TRIES
         stuck = caution == _ALL and (returned or tries > most_tries)
         if few or caution != _ALL or number > _SOUGHT:
             lately, joint = [], 0

@@ -103,6 +103,32 @@ def test_factors_are_the_same_where_fronts_share_room_and_then_made_anew_in_full
     assert np.array_equal(shared._factors, own._factors)
 
 
+@pytest.mark.parametrize("single", [False, True])
+def test_few_changed_springs_need_no_factors_where_all_would_be_made_anew(monkeypatch, single):
+    # As of 100 000 blocks, whose fronts are too many for each to keep what it has passed on.
+    monkeypatch.setattr(dissection, "KEPT", 0)
+    monkeypatch.setattr(block_solver, "SINGLE", 100 if single else 10**6)
+    n, right = 900, np.random.default_rng(1).normal(size=5400)
+    points, rows, columns, data = springs_between(n, seed=5)
+    # As much inertia as a short step brings.
+    data[rows == columns] += 1e3 * np.eye(6)
+    solver = BlockSolver(points, rows, columns)
+    solver.solve(data.ravel(), right)
+    assert not solver.in_parts and solver.work.factorisations == 1
+    changed = data.copy()
+    for a, b in np.random.default_rng(2).choice(np.stack([rows, columns], axis=1)[rows < columns], 8, replace=False):
+        # A stiff spring more between two blocks that meet.
+        push = np.random.default_rng(a).normal(size=12)
+        spring = 1e4 * np.outer(push, push)
+        for u, k in enumerate((a, b)):
+            for v, m in enumerate((a, b)):
+                changed[(rows == k) & (columns == m)] += spring[6 * u : 6 * u + 6, 6 * v : 6 * v + 6]
+    x = solver.solve(changed.ravel(), right)
+    assert solver.work.factorisations == 1
+    expected = splu(full(rows, columns, changed, n).tocsc()).solve(right)
+    assert np.abs(x - expected).max() <= 1e-8 * np.abs(expected).max()
+
+
 def test_single_precision_is_refined_to_the_same_residual(monkeypatch):
     points, rows, columns, data = springs_between(600, seed=8)
     # As much inertia as a short step brings: with less, these springs at random are beyond single precision.
