@@ -99,7 +99,9 @@ class FacePoints:
         ends, places = some[start[two, None] + [0, 1]], along[start[two, None] + [0, 1]]
         length = np.abs(places[:, 1] - places[:, 0])
         whole = np.abs(geometry[ends, 4].sum(axis=1) - length) <= WITHOUT_GAPS * length
-        whole &= stiff[ends[:, 0]] == stiff[ends[:, 1]]
+        # A bond at one end alone (the other end is where a crack has cut the face) stays at its corner: on a part that
+        # comes and goes with what presses it would be another spring in every step, and bring energy.
+        whole &= (stiff[ends[:, 0]] == stiff[ends[:, 1]]) & (holds[ends[:, 0]] == holds[ends[:, 1]])
         if not whole.any():
             return None
         ends, length = ends[whole], length[whole]

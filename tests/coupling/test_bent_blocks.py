@@ -108,10 +108,13 @@ PARTS = (
 )  # fmt: skip
 
 
-def test_energy_of_a_cantilever_that_breaks_is_told_to_the_end():
+@pytest.mark.parametrize("stiffness", [None, GLUE])
+def test_energy_of_a_cantilever_that_breaks_is_told_to_the_end(stiffness):
     """The crack runs through, the end of the beam falls: weight's work = kinetic + stored + lost + spent at the crack,
-    in every cycle, to the columns of its history alone; what parts sets energy free."""
-    seen = [cycle for cycle in Coupling(cantilever(0.3, 1e-4, 0.015, None, 2e5, 0.4)).cycles() if cycle.number]
+    in every cycle, to the columns of its history alone; what parts sets energy free. (The crack may come out on the
+    glued side. When the bonds left on it stood where the face was pressed, in another place in each step, 5.8 J came
+    from nowhere.)"""
+    seen = [cycle for cycle in Coupling(cantilever(0.3, 1e-4, 0.015, stiffness, 2e5, 0.4)).cycles() if cycle.number]
     assert ["split" in [event.kind for event in cycle.events] for cycle in seen].count(True) == 1
     told = [cycle.statistics for cycle in seen]
     turned = max(one["gravity_work"] for one in told)
