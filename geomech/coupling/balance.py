@@ -15,6 +15,7 @@ from .bodies import boundary_loads, threads_for, tip_rows
 from .compliance import crack_responses, passive, stress_rotations, times
 from .cracked_blocks import CrackedBlocks
 from .foretold import Answer
+from .load_path import loads_at
 from .settling import Settling
 from .side_by_side import side_by_side
 
@@ -159,7 +160,7 @@ def _expected(now: CrackedBlocks, time: float) -> dda.CrackResponse:
         return now.response
     blocks = tuple(now.bodies)
     numbers = np.array(blocks)
-    known, beyond, s = now.foretold.at(time, blocks, _systems(now))
+    known, beyond, s = now.foretold.at(loads_at(now.problem.loads, time), blocks, _systems(now))
     last, grown = now.foretold.last(blocks), np.zeros_like(beyond)
     if last is not None:
         for b, solution in _answers_to_the_last_forces(now, numbers[~known].tolist()).items():
@@ -211,11 +212,13 @@ def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
 
 
 def _remember(now: CrackedBlocks, answer: Answer) -> None:
-    """Passes agree on ``answer``. Unloaded rock had none, and the faces of its cracks their first states."""
+    """Passes agree on ``answer``. Before the first one, where nothing acted, there was none, and the faces of cracks
+    had their first states."""
     blocks, state = tuple(now.bodies), now.state
-    if now.foretold.last(blocks) is None and not state.stress.any() and not state.crack_strain.any():
+    before = loads_at(now.problem.loads, state.time)
+    if now.foretold.last(blocks) is None and not (before.any() or state.stress.any() or state.crack_strain.any()):
         nothing = np.zeros_like(answer.strain)
-        now.foretold.take(blocks, replace(answer, time=state.time, strain=nothing, stress=nothing))
+        now.foretold.take(blocks, replace(answer, loads=before, strain=nothing, stress=nothing))
     now.foretold.take(blocks, answer)
 
 
@@ -273,7 +276,7 @@ def _take_response(
                 again.offset[blocks] = settling.next(before, residual, again.compliance[blocks], size)
     now.response = after
     own_stress = times(stress_rotations(-state.rotation[blocks]), state.stress[blocks])
-    return again, differences, Answer(state.time, _systems(now), strain, own_stress, known)
+    return again, differences, Answer(loads_at(now.problem.loads, state.time), _systems(now), strain, own_stress, known)
 
 
 def _answers(now: CrackedBlocks, state: State) -> dict:

@@ -19,13 +19,14 @@ from functools import partial
 import numpy as np
 
 from ..dda.excavation import until_next_event
-from ..model import History, Loads, Problem
+from ..model import Problem
 from .balance import Balance
 from .cracked_blocks import CrackedBlocks
 from .crossing import Crossing
 from .endless import solved_pass
 from .first_change import FOUND, FirstChange
 from .growing import drive
+from .load_path import histories
 
 #: An event is found when the drive, K_eq/K_Ic, is off one by less than this.
 SETTLED = 1e-6
@@ -50,13 +51,13 @@ class EventSteps:
     """The first pass of every load step of a static run: how far it goes, from what the last ones have shown."""
 
     def __init__(self, problem: Problem) -> None:
-        run, histories = problem.run, _histories(problem.loads)
+        run, timed = problem.run, histories(problem.loads)
         if problem.endless is not None:
-            histories += problem.endless.histories
+            timed += problem.endless.histories
         self.time_step, self.follows = problem.dda.time_step, run.control == "toughness"
-        self._corners = np.unique(np.concatenate([np.asarray(h.times, dtype=float) for h in histories]))
+        self._corners = np.unique(np.concatenate([np.asarray(h.times, dtype=float) for h in timed]))
         # Between the corners of piecewise linear histories a step may take any length; within a sinusoid it may not.
-        swings = any(h.wave is not None for h in histories)
+        swings = any(h.wave is not None for h in timed)
         self._longest = run.longest_step or (self.time_step if swings else math.inf)
         #: Drive of the cracks as they are, at the start of the step, and its growth per second; None: not known yet.
         self._drive: float | None = 0.0
@@ -193,14 +194,3 @@ class EventSteps:
         if not self._pace:
             return min(self._longest, math.inf if self._pace == 0 else self.time_step)
         return min(self._longest, max(self.time_step, USE * now.system.allowed_ratio / self._pace))
-
-
-def _histories(loads: Loads) -> list[History]:
-    """All functions of time that act."""
-    timed = [*loads.edge_tractions, *loads.point_loads, *loads.block_motions, *loads.point_motions]
-    found = [loads.gravity, *(each.history for each in timed)]
-    if loads.water is not None and loads.water.level is not None:
-        found.append(loads.water.level)
-    if loads.base is not None:
-        found.append(loads.base.acceleration)
-    return found

@@ -26,12 +26,17 @@ from geomech.model import (
 ROCK = Material("rock", 10e9, 0.2, density=2500.0, k_ic=1e12)
 
 
+def loads(time: float, aside: float = 0.0) -> np.ndarray:
+    """A weight that grows, beside loads that stay."""
+    return np.array([aside, -10.0 * time, 3e5])
+
+
 def answer(time: float, systems: tuple, softer: float = 1.0) -> Answer:
     """Of two blocks, whose cracks open by S σ and beyond it by 3 and −2 times the time."""
     s = np.stack([np.eye(3), softer * np.eye(3)])
     stress = time * np.array([[1.0, 2.0, 0.0], [0.0, -1.0, 1.0]])
     beyond = time * np.array([[3.0, 0.0, 0.0], [0.0, -2.0, 0.0]]) + 0.5
-    return Answer(time, systems, beyond + (s @ stress[..., None])[..., 0], stress, s)
+    return Answer(loads(time), systems, beyond + (s @ stress[..., None])[..., 0], stress, s)
 
 
 def test_a_third_load_lies_on_the_line_through_two():
@@ -39,17 +44,20 @@ def test_a_third_load_lies_on_the_line_through_two():
     foretold = Foretold()
     foretold.take((4, 9), answer(1.0, systems))
     foretold.take((4, 9), answer(2.0, systems))
-    known, beyond, s = foretold.at(5.0, (4, 9), systems)
+    known, beyond, s = foretold.at(loads(5.0), (4, 9), systems)
     assert known.all() and np.array_equal(s, answer(5.0, systems).compliance)
     assert beyond == pytest.approx(answer(5.0, systems).beyond(s), rel=1e-12)
+    # Beside the line the nearest load is all that is known.
+    beside = foretold.at(loads(5.0, aside=1.0), (4, 9), systems)[1]
+    assert beside == pytest.approx(answer(2.0, systems).beyond(s), rel=1e-12)
     # Faces of the second block have changed: of it the nearest load is all that is known.
     foretold.take((4, 9), answer(3.0, systems, softer=1.5))
-    known, beyond, s = foretold.at(5.0, (4, 9), systems)
+    known, beyond, s = foretold.at(loads(5.0), (4, 9), systems)
     assert beyond[0] == pytest.approx(answer(5.0, systems).beyond(s)[0], rel=1e-12)
     assert beyond[1] == pytest.approx(answer(3.0, systems, softer=1.5).beyond(s)[1], rel=1e-12)
     # Its cracks have grown: of them nothing is.
-    assert foretold.at(5.0, (4, 9), (systems[0], object()))[0].tolist() == [True, False]
-    assert not foretold.at(5.0, (4, 8), systems)[0].any()
+    assert foretold.at(loads(5.0), (4, 9), (systems[0], object()))[0].tolist() == [True, False]
+    assert not foretold.at(loads(5.0), (4, 8), systems)[0].any()
 
 
 def bench(**changes) -> Problem:
