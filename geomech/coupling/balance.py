@@ -204,8 +204,9 @@ def _answers_to_the_last_forces(now: CrackedBlocks, grown: list[int]) -> dict:
     except ddm.NotConverged:
         # Faces may find a state under the forces of the next pass.
         return {}
-    now.solutions |= told
-    now.solved_from |= {b: now.history[b] for b in told if b in now.history}
+    # Whoever watches has those of the last pass still in hand.
+    now.solutions = now.solutions | told
+    now.solved_from = now.solved_from | {b: now.history[b] for b in told if b in now.history}
     with now.timed("compliance"):
         now.compliances |= {b: _compliance(now, b, solution) for b, solution in told.items()}
     return told
