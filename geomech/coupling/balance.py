@@ -50,12 +50,14 @@ SHORTER = 4
 @dataclass(frozen=True, eq=False)
 class Balance:
     """The step of the blocks, the solutions of the cracked ones (block → `ddm.Solution`), their TIP rows with the
-    criterion's angle and K_eq, and how well the two solvers agree."""
+    criterion's angle and K_eq, and how well the two solvers agree. ``left_out``: bodies (block →) that cannot grow and
+    have not been solved."""
 
     result: StepResult
     solutions: dict
     tips: np.ndarray
     statistics: dict[str, float] = field(default_factory=dict)
+    left_out: dict = field(default_factory=dict)
 
 
 def balanced(now: CrackedBlocks, dt: float, load_time: float | None) -> Balance:
@@ -136,8 +138,9 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
             # What has cut the step short may have been the chase.
             dt = asked
             settling.forget()
+    left_out: dict = {}
     if not solved:
-        _solve_bodies(now, result)
+        left_out = _solve_what_may_grow(now, result)
     imbalance = max(load.imbalance for load in now.loads.values())
     statistics = {
         "open_close_iterations": iterations,
@@ -145,8 +148,26 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
         "compliance_mismatch": mismatch,
         "traction_imbalance": imbalance,
     }
-    tips = tip_rows(now.problem, now.blocks, now.solutions, now.nodes_of)
-    return Balance(result, now.solutions, tips, statistics), differences
+    tips = _judged(now)
+    if left_out and (tips["k_eq"] >= toughness(now, tips)).any():
+        # Where something grows all of it is looked at: the step is taken again with what has grown.
+        _solve(now, now.bodies)
+        left_out, tips = {}, _judged(now)
+    for body in left_out.values():
+        body.work.solutions_left_out += 1
+    if not static:
+        now.cannot_grow.solved(now, tips, toughness(now, tips))
+    return Balance(result, now.solutions, tips, statistics, left_out), differences
+
+
+def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
+    """(n_tips,) K_Ic of the rock that each tip stands in, Pa √m."""
+    k_ic = np.array([material.k_ic for material in now.problem.materials])
+    return k_ic[now.blocks.material[tips["block"]]]
+
+
+def _judged(now: CrackedBlocks) -> np.ndarray:
+    return tip_rows(now.problem, now.blocks, now.solutions, now.nodes_of)
 
 
 def _systems(now: CrackedBlocks) -> tuple:
@@ -225,12 +246,30 @@ def _remember(now: CrackedBlocks, answer: Answer) -> None:
 
 def _solve_bodies(now: CrackedBlocks, result: StepResult) -> None:
     """Every body under what the block solver's forces are on it."""
+    _take_loads(now, result)
+    _solve(now, now.bodies)
+
+
+def _solve_what_may_grow(now: CrackedBlocks, result: StepResult) -> dict:
+    """The same, but for bodies whose cracks cannot grow; returned are these (block →)."""
+    _take_loads(now, result)
+    with now.timed("ddm solve"):
+        # What tips that grow release is counted by all that they did before and after.
+        idle = set() if now.crack_energy.grows else now.cannot_grow.among(now, result.dt)
+    _solve(now, {block: body for block, body in now.bodies.items() if block not in idle})
+    return {block: body for block, body in now.bodies.items() if block in idle}
+
+
+def _take_loads(now: CrackedBlocks, result: StepResult) -> None:
     with now.timed("tractions"):
         # Equilibrium holds where the forces of the step act.
         still = result.vertices is now.state.vertices
         motion = now.motion(now.state) if still else Motion.of(now.blocks, result.vertices)
         now.loads = boundary_loads(now.problem, now.blocks, now.state, motion, result, now.bodies)
-    now.solutions = now.solve(now.bodies, now.loads, now.solutions)
+
+
+def _solve(now: CrackedBlocks, bodies: dict) -> None:
+    now.solutions = now.solve(bodies, now.loads, now.solutions)
     now.solved_from = now.history
     for block, load in now.loads.items():
         if load.bases:

@@ -50,8 +50,8 @@ def _add(sums: dict[int, float], block: int, energy: float) -> None:
 
 
 class _FeltTips:
-    """``tips`` with the K that the mean stress brings in blocks that feel no more, ``felt`` by the blocks ``hang`` (block
-    → solution); found when something grows."""
+    """``tips``, and those of blocks that were left out, with the K that the mean stress brings in blocks that feel no
+    more, ``hang`` (block → solution); found when something grows."""
 
     def __init__(self, tips: np.ndarray, hang: dict[int, Solution]) -> None:
         self._tips, self._hang = tips, hang
@@ -62,7 +62,9 @@ class _FeltTips:
     @cached_property
     def rows(self) -> np.ndarray:
         """(n_tips,) TIP."""
-        out = self._tips.copy()
+        there = set(self._tips["block"].tolist())
+        left_out = [of.tips for block, of in self._hang.items() if block not in there]
+        out = np.concatenate([self._tips, *left_out])
         for first, last in _runs(out["block"]):
             solution = self._hang.get(int(out["block"][first]))
             if solution is not None:
@@ -286,6 +288,11 @@ class CrackEnergy:
         spent = taken + rubbed + bond
         self.uneven += max(0.0, spent - stored)
         self.runaway += max(0.0, stored - spent)
+
+    @property
+    def grows(self) -> bool:
+        """Whether tips have grown of which the release is still to be counted."""
+        return bool(self._growing)
 
     @property
     def under_way(self) -> bool:

@@ -13,6 +13,7 @@ from ..model import Blocks, Cracks, Motion, Problem, State
 from ..model.polygon import winding_number
 from .bodies import elastic_bodies, inherited, solve_bodies
 from .by_mean_stress import ByMeanStress
+from .cannot_grow import CannotGrow
 from .crack_energy import CrackEnergy
 from .foretold import Foretold
 from .inherited_loads import on_children, on_moved
@@ -51,6 +52,7 @@ class CrackedBlocks:
         self.loads: dict[int, BoundaryLoad] = {}
         self.compliances: dict[int, tuple] = {}
         self.by_mean_stress = ByMeanStress()
+        self.cannot_grow = CannotGrow()
         self.settling, self.foretold = Settling(), Foretold()
         #: What the last steps of the tips have told of their paths.
         self.chords: Memory = {}
@@ -103,9 +105,11 @@ class CrackedBlocks:
     def felt(self) -> dict:
         """block → the solution that the strain of its cracks is from, in the last pass."""
         own = self.by_mean_stress
+        hang = {block: own.solutions[block] for block in self.bodies if block in own and block in own.solutions}
         return {
-            block: own.solutions[block] if block in own and block in own.solutions else solution
-            for block, solution in self.solutions.items()
+            block: hang[block] if block in hang else self.solutions[block]
+            for block in self.bodies
+            if block in hang or block in self.solutions
         }
 
     # -- changes of the blocks -----------------------------------------------------------------------------------------
@@ -131,6 +135,7 @@ class CrackedBlocks:
             for known in (self.bodies, self.solutions, self.compliances, self.solved_from)
         )
         self.by_mean_stress = self.by_mean_stress.inherited(parent, whole) if len(whole) else ByMeanStress()
+        self.cannot_grow.renumber(parent, whole)
         self.settling, self.foretold = Settling(), Foretold()
         self._take_bodies()
 

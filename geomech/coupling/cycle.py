@@ -239,9 +239,9 @@ class Coupling:
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual, now.crack_energy.uneven)
             self.energy.check(statistics["budget_residual"], result.state.time)
-            if self.tips is not None and len(tips):
+            if self.tips is not None and (len(tips) or found.left_out):
                 statistics["fastest_tip"] = self.tips.speed.fastest(whole)
-            yield record(now, result.state, tips, solutions, events, growth_pass, statistics)
+            yield record(now, result.state, tips, solutions, events, growth_pass, statistics, found.left_out)
             if ends:
                 if growth_pass == growing.max_passes:
                     log.warning(

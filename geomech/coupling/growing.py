@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import Event, State
-from .balance import Balance
+from .balance import Balance, toughness
 from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
 from .endless import take_endless
@@ -28,7 +28,7 @@ def growth_of_tips(
     """The new network (`ddm.growth.Growth`) when some of ``tips`` has a K_eq of ``enough`` times its toughness, else
     None; those with ``together`` times theirs grow with it. No tip goes farther than ``longest`` (n_tips,) m, and none
     with 0. Sets the angles that were followed."""
-    k_ic = _toughness(now, tips)
+    k_ic = toughness(now, tips)
     if not np.any((tips["k_eq"] >= enough * k_ic) & (np.asarray(longest) > 0)):
         return None
     k_ic = together * k_ic
@@ -53,15 +53,10 @@ def growth_of_tips(
     return growth
 
 
-def _toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:
-    """(n_tips,) K_Ic of the rock that each tip stands in, Pa √m."""
-    return np.array([now.problem.materials[m].k_ic for m in now.blocks.material[tips["block"]]])
-
-
 def drive(now: CrackedBlocks, found: Balance) -> float:
     """How near to growth the cracks are: the largest K_eq/K_Ic, or the largest overstress where cracks may be born;
     growth starts at one."""
-    most = float(np.max(found.tips["k_eq"] / _toughness(now, found.tips), initial=0.0))
+    most = float(np.max(found.tips["k_eq"] / toughness(now, found.tips), initial=0.0))
     if now.problem.growth.initiation:
         from .births import born_first
 

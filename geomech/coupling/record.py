@@ -7,22 +7,26 @@ import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..ddm.work import Work
 from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, Skip, State
+from .bodies import solve_bodies, tip_rows
 
 if TYPE_CHECKING:
+    from ..ddm import Body
     from .cracked_blocks import CrackedBlocks
 
 
 def record(
     now: CrackedBlocks, state: State, tips: np.ndarray, solutions: dict, events: tuple[Event, ...], growth_pass: int,
-    statistics: dict[str, float],
+    statistics: dict[str, float], left_out: Mapping[int, Body] = MappingProxyType({}),
 ) -> Cycle:  # fmt: skip
-    """What observers see of a pass that brought the blocks to ``state`` (or of blocks that stand at it)."""
+    """What observers see of a pass that brought the blocks to ``state`` (or of blocks that stand at it). The bodies that
+    were ``left_out`` are solved when somebody asks for what is in them."""
     motion = now.motion(state)
     endless = now.problem.endless
     if endless is not None:
@@ -48,15 +52,49 @@ def record(
     )
     vars(cycle)["motion"] = motion  # known here: the property need not find it again
     del vars(cycle)["faces"]  # found when somebody asks for them
+    if left_out:
+        del vars(cycle)["tips"], vars(cycle)["bodies"]
+        vars(cycle)["_rest"] = _Rest(now, solutions, dict(left_out))
     return cycle
 
 
 class _Told(Cycle):
-    """A cycle whose crack faces are put together when they are asked for."""
+    """A cycle whose crack faces are put together, and bodies that were left out solved, when they are asked for."""
 
     @cached_property
     def faces(self) -> CrackFaces | None:
         return joined_faces(self.cracks, self.bodies)
+
+    @cached_property
+    def bodies(self) -> dict[int, Any]:
+        return self._rest.bodies()
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        return self._rest.tips(self.bodies)
+
+
+class _Rest:
+    """What it takes to solve bodies that were left out of a pass as they would have been in it: ``now`` as it is, which
+    goes on."""
+
+    def __init__(self, now: CrackedBlocks, solutions: dict, left_out: dict[int, Body]) -> None:
+        self._told, self._solutions, self._left_out = now.cannot_grow, solutions, left_out
+        self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
+        self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
+
+    def bodies(self) -> dict[int, Any]:
+        """block → solution of all bodies, in their order."""
+        self._told.asked += 1
+        found = solve_bodies(self._left_out, self._loads, {}, {}, names=self._blocks.names)
+        for body in self._left_out.values():
+            body.work.solutions_left_out -= 1
+        found |= self._solutions
+        return {block: found[block] for block in self._order}
+
+    def tips(self, solutions: dict[int, Any]) -> np.ndarray:
+        """Their TIP rows."""
+        return tip_rows(self._problem, self._blocks, solutions, self._nodes_of)
 
 
 def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
@@ -72,6 +110,7 @@ def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
         found |= {
             "bodies": Skip(work["bodies_kept"], work["bodies"], seconds.get("ddm assembly", 0.0)),
             "solutions": Skip(work["solutions_kept"], work["solutions"], seconds.get("ddm solve", 0.0)),
+            "left-out solutions": Skip(work["solutions_left_out"], work["solutions"], seconds.get("ddm solve", 0.0)),
             "scaled solutions": Skip(work["solutions_scaled"], work["solutions"], seconds.get("ddm solve", 0.0)),
             "compliances": Skip(
                 work["compliances_kept"], work["compliances"] - 1, now.each.seconds.get("compliances", 0.0)

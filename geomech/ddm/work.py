@@ -17,6 +17,7 @@ class Work:
     back_substitutions             right-hand sides solved for with these
     solutions, contact_solves      loads solved for, and passes of the contact of crack faces in them
     compliances                    of cracked bodies, worked out
+    solutions_left_out             of bodies whose cracks could not grow, and nobody asked
     solutions_scaled               under an even stress, from those under unit ones
     bodies_kept, solutions_kept, compliances_kept     what was asked for again with nothing changed, and so not done
     """
@@ -31,6 +32,7 @@ class Work:
     solutions: int = 0
     contact_solves: int = 0
     compliances: int = 0
+    solutions_left_out: int = 0
     solutions_scaled: int = 0
     bodies_kept: int = 0
     solutions_kept: int = 0

@@ -15,6 +15,7 @@ WORDS = {
     "factorisations": "factorisations of the blocks' matrix, from which it had hardly changed since the last",
     "bodies": "assemblies of cracked blocks whose cracks had not grown",
     "solutions": "solutions of cracked blocks under a load that had been solved for",
+    "left-out solutions": "solutions of cracked blocks whose cracks could not grow, by a bound",
     "scaled solutions": "solutions of cracked blocks under their mean stress, which were scaled from unit ones: their crack "
     "faces were in the states of before",
     "compliances": "compliances of cracked blocks whose crack faces were in the states of before",
