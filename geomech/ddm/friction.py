@@ -31,6 +31,8 @@ from .factor import Factor
 from .iterative import Iterated, IterativeCrackSystem
 from .work import Work
 
+#: Pa: less than this is no load; strengths in units of it are still numbers.
+NO_STRESS = 1e-100
 #: Violations allowed, in units of the largest stress (and the opening that it makes).
 TOLERANCE = 1e-10
 #: Newton passes without a new least number of violations before limits are frozen, and passes in all.
@@ -145,7 +147,7 @@ class _Contact:
         self.length = float(self.laws.elements.length.max())
         # Without load there is nothing to measure by but what slip has left behind.
         left = 1e-8 * float(np.abs(memory.rest).max(initial=0.0)) / self.length
-        self.stress = max(float(np.abs(right).max()), left, np.finfo(float).tiny)
+        self.stress = max(float(np.abs(right).max()), left, NO_STRESS)
         self.solves = 0
 
     @property

@@ -221,3 +221,12 @@ def test_what_grows_from_a_cemented_crack_is_not_cemented():
     on_wing = grown.body.faces.source == 1
     assert (grown.states[on_wing] == OPEN).all() and (grown.states[~on_wing] == STICK).all()
     assert grown.tips["k_i"].max() > 0
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("stress", [0.0, 1e-305])
+def test_strong_faces_without_load_stay_as_they_are(stress):
+    """Nothing to measure a strength by: it is not divided until it overflows."""
+    strong = JointLaw("strong", friction_angle=0.5, cohesion=1e6, tensile_strength=1e5)
+    solution = plane([LINE], strong).solve(under(0.0, -stress, stress))
+    assert np.abs(solution.jumps).max() <= stress and (solution.states == STICK).all()
