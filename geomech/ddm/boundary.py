@@ -20,6 +20,9 @@ from .mesh import Mesh
 from .supports import Holds
 from .work import Work
 
+#: From so many bodies in a row on, the inverse of up to so many unknowns pays for itself.
+OFTEN, INVERTED = 8, 800
+
 
 class BoundarySystem:
     """A_ΓΓ of ``mesh.boundary``, what is unchanged since ``previous`` (with the same supports) taken over from it.
@@ -62,6 +65,8 @@ class BoundarySystem:
             and g.n == previous.elements.n
             and np.array_equal(at_old, np.arange(g.n))
         )
+        #: How many bodies in a row have grown on this boundary.
+        self.generation = previous.generation + 1 if self.unchanged else 0
         if self.unchanged:
             self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
             self.matrix, self.known, self.factor = previous.matrix, previous.known, previous.factor
@@ -139,6 +144,13 @@ class BoundarySystem:
         """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; ``transposed``: A_ΓΓ⁻ᵀ."""
         self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
         return self.factor.solve(np.asfortranarray(right), transposed)
+
+    def solve_few(self, right: np.ndarray) -> np.ndarray:
+        """The same for the few columns (n, k) of new elements."""
+        if self.iterated or self.generation <= OFTEN or self.elements.n_unknowns > INVERTED:
+            return self.solve(right)
+        self.work.back_substitutions += right.shape[1]
+        return np.matmul(self.factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
 
     def times(self, u: np.ndarray, lifted: np.ndarray) -> np.ndarray:
         """A_ΓΓ ``u``, and what the lifted rigid motions of ``lifted`` add."""

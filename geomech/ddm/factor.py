@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 
@@ -62,3 +64,9 @@ class Factor:
         if transposed:
             return scale * dgetrs(self._lu, self._pivots, right, trans=1 - self._transposed)[0]
         return dgetrs(self._lu, self._pivots, right * scale, trans=self._transposed, overwrite_b=True)[0]
+
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """(n, n) for what is solved for again and again, a few columns at a time: products take half the time of
+        solutions with thin triangles."""
+        return self.solve(np.eye(self.n, order="F"))

@@ -206,7 +206,10 @@ def corrected(
     settled = not correct
     # A step that joins something may cut a piece off, on which there is nothing to solve.
     while not settled and not growth.joins and np.any(growth.grown > 0):
+        angle = tips["angle"].copy()
         settled = chords.bend(tips, growth.grown, look_ahead(growth.cracks), growth.cracks, cycle)
+        if np.array_equal(angle, tips["angle"]):
+            break  # as it was tried
         tried, growth = growth, grow()
         stuck = (tried.grown > 0) & (growth.grown == 0)
         if stuck.any():

@@ -40,12 +40,13 @@ _jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 
 
 @_jit
-def _distance(px, py, ax, ay, bx, by):
+def _distance_squared(px, py, ax, ay, bx, by):
     """From a point to a segment."""
     dx, dy = bx - ax, by - ay
     s = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy)
     s = min(1.0, max(0.0, s))
-    return np.hypot(px - ax - s * dx, py - ay - s * dy)
+    x, y = px - ax - s * dx, py - ay - s * dy
+    return x * x + y * y
 
 
 def crowding(
@@ -128,10 +129,11 @@ def _crowding(
                             out[j] = max(out[j], length[j] / (apart * length[i]))
             if shared:
                 continue
-            d = _distance(start[i, 0], start[i, 1], start[j, 0], start[j, 1], end[j, 0], end[j, 1])
-            d = min(d, _distance(end[i, 0], end[i, 1], start[j, 0], start[j, 1], end[j, 0], end[j, 1]))
-            d = min(d, _distance(start[j, 0], start[j, 1], start[i, 0], start[i, 1], end[i, 0], end[i, 1]))
-            d = min(d, _distance(end[j, 0], end[j, 1], start[i, 0], start[i, 1], end[i, 0], end[i, 1]))
+            ax, ay, bx, by = start[i, 0], start[i, 1], end[i, 0], end[i, 1]
+            cx, cy, dx, dy = start[j, 0], start[j, 1], end[j, 0], end[j, 1]
+            d = min(_distance_squared(ax, ay, cx, cy, dx, dy), _distance_squared(bx, by, cx, cy, dx, dy))
+            d = min(d, _distance_squared(cx, cy, ax, ay, bx, by), _distance_squared(dx, dy, ax, ay, bx, by))
+            d = np.sqrt(d)
             d = max(d, 1e-300)
             least = 0.0
             if meet != 0:

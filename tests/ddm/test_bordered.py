@@ -9,6 +9,7 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm import Body, BodyLoad
+from geomech.ddm.boundary import OFTEN
 from geomech.ddm.kept_rows import KeptRows
 from geomech.ddm.work import Work
 from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
@@ -148,7 +149,7 @@ def test_cracks_that_grow_together_round_a_piece_are_seen():
 
 
 def test_trials_and_bends_of_a_run_keep_factors():
-    """Eighteen steps under compression, each tried and bent a few times: few of the bodies are factored as wholes, and
+    """Eighteen steps under compression, tried and some of them bent: few of the bodies are factored as wholes, and
     factors that have grown with so many others agree with fresh ones."""
     press = ddm.BodyLoad(sides={0: (0.0, 1e6), 2: (0.0, -1e6)})
     rock, work = replace(ROCK, k_ic=1e6), Work()
@@ -158,6 +159,21 @@ def test_trials_and_bends_of_a_run_keep_factors():
     alone = Body([PLATE], last.cracks, rock, SETTINGS).solve(press.scaled(last.load_factor))
     k, k_alone = (np.stack([s.tips["k_i"], s.tips["k_ii"]]) for s in (last.solution, alone))
     assert np.abs(k - k_alone).max() < 1e-10 * np.abs(k_alone).max()
-    assert last.number == 17 and work.bodies >= 30
-    # Measured: 2 of 31.
+    assert last.number == 17 and work.bodies >= 20
+    # Measured: 1 of 21.
     assert work.crack_factorisations < 0.2 * work.bodies
+
+
+def test_long_growth_goes_by_the_inverse_of_the_boundary():
+    """From the ninth body in a row on, new columns are multiplied, not solved for: K is that of a fresh body to
+    round-off, and a body that was stored and read goes on bit for bit."""
+    body = Body([PLATE], network(0), ROCK, SETTINGS)
+    for steps in range(1, 13):
+        assert ("inverse" in vars(body._outside.factor)) == (steps > OFTEN + 1)
+        body = Body([PLATE], network(steps), ROCK, SETTINGS, previous=body)
+        factors(body)
+    k = factors(Body([PLATE], network(12), ROCK, SETTINGS))
+    assert np.abs(factors(body) - k).max() < 1e-12 * np.abs(k).max()
+    read = pickle.loads(pickle.dumps(body))
+    grown = [Body([PLATE], network(13), ROCK, SETTINGS, previous=before).solve(LOAD) for before in (read, body)]
+    np.testing.assert_array_equal(grown[0].jumps, grown[1].jumps)

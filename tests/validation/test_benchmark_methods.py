@@ -86,7 +86,7 @@ def test_interaction_integrals_do_not_depend_on_their_disc():
 
 def test_growth_by_increments_gives_what_fresh_bodies_give():
     """1e-12: the matrices are the same, what differs is how they were put together."""
-    found = growth_run.measure(3)
+    found = growth_run.measure(12)
     assert found["difference"] < 1e-12
 
 
