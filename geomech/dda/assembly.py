@@ -216,17 +216,6 @@ def _fill_rows(
                 _add_block(data, their, step, push, drag, pull[6 - at : 12 - at], across[6 - at : 12 - at])
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def _fill(
-    data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors, normal, shear, slope, lift
-):
-    start, side = sides_of(len(matrix), order, block, other)
-    _fill_rows(
-        0, len(matrix), start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
-        normal, shear, slope, lift,
-    )  # fmt: skip
-
-
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _fill_shared(
     claimed, told, share, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
@@ -262,16 +251,17 @@ def assemble(
     shear: np.ndarray,
     slope: np.ndarray,
     lift: np.ndarray,
+    sides: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> None:
     """Fill ``data`` with the blocks' own part ``matrix`` (n, 6, 6) and contacts that answer a motion by dN =
     −``normal`` (n − κ t)·Δu, κ the ``lift``, and dS = −``shear`` t·Δu + ``slope`` dN; ``upper`` and ``lower`` as in the
-    ``pattern``, for these contacts."""
+    ``pattern``, for these contacts, whose ``sides`` may be known, as from `sides_of`."""
     at = pattern.begins, pattern.stride, pattern.diagonal, upper, lower, block, other, order
     laws = vectors, normal, shear, slope, lift
+    sides = sides_of(pattern.n, order, block, other) if sides is None else sides
     if pattern.n < THREADED:
-        _fill(data, matrix, *at, *laws)
+        _fill_rows(0, pattern.n, *sides, data, matrix, *at, *laws)
         return
-    sides = sides_of(pattern.n, order, block, other)
     claimed, told = np.zeros(1, np.int64), np.zeros(1, np.int64)
     crew().share(_fill_shared, claimed, told, SHARE, *sides, data, matrix, *at, *laws)
 
@@ -327,6 +317,7 @@ def assemble_contacts(
     sliding: np.ndarray,
     lift: np.ndarray,
     shear0: np.ndarray,
+    sides: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> bool:
     """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric.
 
@@ -337,7 +328,7 @@ def assemble_contacts(
     *laws, symmetric = _springs(
         right, base_right, *at, state, direction, gap, normal, shear, friction, sliding, lift, shear0
     )
-    assemble(pattern, data, matrix, upper, lower, *at, *laws, lift)
+    assemble(pattern, data, matrix, upper, lower, *at, *laws, lift, sides)
     return symmetric
 
 

@@ -151,6 +151,7 @@ class CentralPath:
 
         self._at, self._held_at = at(some), at(held)
         self._all_at = at(np.concatenate([some, held])) if len(held) else self._at
+        self._sides = assembly.sides_of(pattern.n, order, *self._all_at[:2])
         self._upper, self._lower, self._all_lift = (
             np.concatenate([array[some], array[held]]) for array in (pattern.upper, pattern.lower, springs.lift)
         )
@@ -256,7 +257,7 @@ class CentralPath:
         stiff, stiff_along, slope, climb = springs
         assembly.assemble(
             pattern, self._data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
-            self._all_lift - climb,
+            self._all_lift - climb, self._sides,
         )  # fmt: skip
         solve = solution_of(pattern, self._data)
 

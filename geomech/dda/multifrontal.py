@@ -178,11 +178,12 @@ class Factors:
             touched[self._front[changed]] = True
             _mark_above(touched, t.parent)
         self._left = self._again and (again or not touched.all())
-        told = self._shared(
-            _eliminate_shared, THREADED, touched, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row, t.column,
-            t.own_room if self._left else t.stack, t.at, self._child, self._sibling, self._room, self._factors,
-            self._units,
-        )  # fmt: skip
+        with blas_threads(1):
+            told = self._shared(
+                _eliminate_shared, THREADED, touched, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row,
+                t.column, t.own_room if self._left else t.stack, t.at, self._child, self._sibling, self._room,
+                self._factors, self._units,
+            )  # fmt: skip
         if told[1]:
             raise np.linalg.LinAlgError("the block system is singular")
         return float(np.diff(t.at)[touched].sum() / max(1, t.at[-1]))
@@ -206,9 +207,8 @@ class Factors:
         t = self.tree
         told = np.zeros(2, np.int64)
         task = np.zeros(1, np.int64), self._awaited.copy(), told, t.tasks, t.above
-        with blas_threads(1):
-            if len(t.rank) < least:
-                work(*task, *given)
-            else:
-                crew().share(work, *task, *given)
+        if len(t.rank) < least:
+            work(*task, *given)
+        else:
+            crew().share(work, *task, *given)
         return told

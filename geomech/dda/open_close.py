@@ -176,6 +176,7 @@ class _Equations:
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
         self._side = np.empty(6 * self.pattern.n)
+        self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
 
     def together(self, which: np.ndarray, states: _States, answer: _Answer, budget: int) -> tuple[_States | None, int]:
         """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in
@@ -217,7 +218,7 @@ class _Equations:
         symmetric = assembly.assemble_contacts(
             pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
             found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
-            springs.friction, springs.sliding, springs.lift, found.shear,
+            springs.friction, springs.sliding, springs.lift, found.shear, self._sides,
         )  # fmt: skip
         try:
             unknowns = assembly.solve(pattern, self._data, self._side, symmetric)
