@@ -124,7 +124,7 @@ class Chords:
         turns = _turns_ahead(tips, grown, ahead, cracks, cycle)
         angle = tips["angle"].copy()
         first = self.looks == 1
-        known = np.isfinite(self.kappa)
+        known = told = np.isfinite(self.kappa)
         kappa = np.where(known, self.kappa, self._first_guess(turns)) if first else self._secant(turns, angle)
         share = np.maximum(self.share, 1 - 1 / np.maximum(kappa, 1.0))
         rest = share * turns - (1 - share) * (angle - self.start)
@@ -145,6 +145,8 @@ class Chords:
             self.whole = angle + self.share * turns
             smooth = self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF)
             unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)
+            # … and says so: the next trial has half a turn, which is right where no trial is corrected (`AS_TRIED`).
+            told = known | smooth
         else:
             unsettled = off & (left > TOLERANCE)
             if self.looks == 2:
@@ -152,7 +154,7 @@ class Chords:
                 gentle = self.onward & (kappa < GENTLE)
                 tips["angle"][gentle], unsettled = self.whole[gentle], unsettled & ~gentle
         self.last_angle, self.last_turns = angle, turns
-        self.kappa = np.where((self.looks > 1) | known, kappa, np.nan)
+        self.kappa = np.where((self.looks > 1) | told, kappa, np.nan)
         if (np.abs(tips["angle"] - angle)[seen] <= AS_TRIED).all():
             tips["angle"] = angle
             return True

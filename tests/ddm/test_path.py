@@ -12,6 +12,11 @@ def chosen(ask, start_deg: float, memory=None) -> tuple[float, int]:
     end of one along θ, and how many looks ahead that took; ``memory`` is of the last step."""
     tips = np.zeros(1, TIP)
     tips["angle"] = np.radians(start_deg)
+    return stepped(tips, ask, memory)[:2]
+
+
+def stepped(tips, ask, memory) -> tuple[float, int, Remembered]:
+    """`chosen`, and what the step has told for the next one."""
     chords = Chords(tips, None if memory is None else {(0.0, 0.0): memory})
     tips["angle"] = chords.first
     for look in range(1, LOOKS + 1):
@@ -30,7 +35,10 @@ def chosen(ask, start_deg: float, memory=None) -> tuple[float, int]:
         ahead["node"], ahead["angle"] = 2, np.radians(ask(np.degrees(angle)))
         if chords.bend(tips, np.ones(1), ahead, grown, 7):
             break
-    return float(np.degrees(tips["angle"][0])), look
+    told = Remembered(
+        *(float(a[0]) for a in (chords.kappa, tips["angle"], chords.last_angle, chords.last_turns, chords.start))
+    )
+    return float(np.degrees(tips["angle"][0])), look, told
 
 
 def test_chord_of_an_arc_has_half_its_turn():
@@ -135,3 +143,22 @@ def test_what_has_changed_is_looked_at_again():
     angle, looks = chosen(lambda theta: -40.0 - 6.0 * theta, 2.0, memory)
     assert looks > 1
     assert chosen(lambda theta: -40.0 - 6.0 * theta, 2.0)[0] == pytest.approx(angle, abs=0.3)
+
+
+@pytest.mark.parametrize("turn", [0.1, 0.4, 3.0])
+def test_chords_of_an_arc_do_not_lag_however_little_it_turns(turn):
+    """An arc of so many degrees a step, in whose direction the criterion always asks for: chords lie half a turn before
+    the tangents at their ends. Steps so fine that no trial is worth a correction must not stay along the tangents."""
+    memory, heading, lags = None, 0.0, []
+    for n in range(8):
+        start = n * turn - heading
+
+        def ask(theta, n=n, heading=heading):
+            return (n + 1) * turn - heading - theta
+
+        tips = np.zeros(1, TIP)
+        tips["angle"] = np.radians(start)
+        angle, _, memory = stepped(tips, ask, memory)
+        heading += angle
+        lags.append(heading - (n + 0.5) * turn)
+    assert np.abs(lags[3:]).max() < 0.1 * turn
