@@ -67,10 +67,11 @@ class Attempt:
         found: ContactSet,
         cuts: int,
         load_time: float | None,
+        patient: bool = True,
     ) -> None:
         self.system, self.state, self.vertices, self.carried, self.moments = system, state, vertices, carried, moments
         self.dt, self.found, self.cuts, scheme = dt, found, cuts, system.scheme
-        self.time = state.time + dt
+        self.time, self.patient = state.time + dt, patient
         # Mass stays, whatever the strain does to the area.
         self.density = system.mass / moments[:, 0]
         self.given, self.n_free = crack is not None, len(system.moving)
@@ -280,7 +281,7 @@ class Attempt:
             most = system.settings.max_open_close_iterations
             return settle(
                 pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved,
-                system.scheme.static,
+                system.scheme.static, self.patient,
             )  # fmt: skip
 
         if not system.allowed_penetration or not len(found):

@@ -387,10 +387,13 @@ def settle(
     max_iterations: int,
     curved: CurvedJoints | None = None,
     statics: bool = False,
+    patient: bool = True,
 ) -> Settled:
     """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix``
     (n, 6, 6) and ``right`` (n, 6) are the blocks' own part, ``springs`` and ``gap`` those of this step (dashpots
-    included). ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations, those along the central path included.
+    included). ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations,
+    those along the central path included. Unless ``patient``, systems too large for a dense matrix are not asked for
+    by laws and rounds that take hundreds: a shorter step takes less.
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
@@ -474,7 +477,7 @@ def settle(
                 if spent > budget:
                     max_iterations += spent - max(budget, 0) + _FINISH
             seen.clear()
-            if proposal is None:
+            if proposal is None and (patient or small):
                 if slower is None:
                     budget = _PATIENCE * max_iterations
                     slower = _slower(equations, answer, path, states.bonded, offered, budget)

@@ -36,6 +36,8 @@ _BLOCK_SHARE = 0.1
 #: A step that speed limits uses this part of what it may move: round-off, arcs and what blocks hit take the rest, so
 #: that it need not be cut.
 _AIM = 0.99
+#: A hasty step that has been cut so often takes its time.
+PATIENT_AFTER = 3
 #: Gaps below this many times the largest coordinate, its round-off, decide nothing.
 _SLACK = 5e-16
 #: Multipliers are not asked to close gaps below this many times that round-off.
@@ -168,10 +170,12 @@ class BlockSystem:
         crack: CrackResponse | None = None,
         load_time: float | None = None,
         like: StepResult | None = None,
+        hasty: bool = False,
     ) -> StepResult:
         """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme
         weighs them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the
-        result of the same step with another ``crack``, from whose contact states iterations begin.
+        result of the same step with another ``crack``, from whose contact states iterations begin. ``hasty``: the first
+        `PATIENT_AFTER` cuts are made without trying the slow ways to contact states.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
         again from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
@@ -206,7 +210,10 @@ class BlockSystem:
         cuts = 0
         while True:
             try:
-                attempt = Attempt(self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time)
+                attempt = Attempt(
+                    self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
+                    patient=not hasty or cuts >= PATIENT_AFTER,
+                )  # fmt: skip
                 result, largest = attempt.result(), attempt.largest
             except Unsettled as failure:
                 reason = f"{failure}{self.finder.where(found, failure.contact)}"

@@ -12,6 +12,7 @@ from geomech.bench import block_scenes
 from geomech.dda import open_close
 from geomech.dda.convex_rounds import ConvexRounds
 from geomech.dda.rounded_laws import RoundedLaws
+from geomech.dda.system import PATIENT_AFTER
 from geomech.model import JointLaw, State
 
 
@@ -67,6 +68,19 @@ def test_slip_of_the_first_problem_lifts_by_its_friction(monkeypatch):
     assert (slip > 1e-7).any()
     # Both are known to the balance in which the problem ends, here of motions of 0.5 mm.
     assert lifted == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("hasty", [False, True])
+def test_a_hasty_step_does_not_ask_for_them(monkeypatch, hasty):
+    made = by_rounds_alone(monkeypatch)
+    blocks = block_scenes.slope(150)
+    law = JointLaw("joint", friction_angle=np.radians(20))
+    settings = block_scenes.settings(0.01, dynamic=False)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [law], settings=settings)
+    result = system.step(State.at_rest(blocks), block_scenes.WEIGHT, hasty=hasty)
+    told = result.statistics
+    print("hasty" if hasty else "patient", told["open_close_iterations"], "iterations,", told["step_cuts"], "cuts")
+    assert bool(made) == (not hasty or told["step_cuts"] >= PATIENT_AFTER)
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 
 from geomech import dda
 from geomech.bench import block_scenes
+from geomech.conventions import normal_of
 from geomech.model import OPEN, Bolt, JointLaw, State
 
 
@@ -64,3 +65,23 @@ def test_stiff_bolts_between_blocks_take_no_more_iterations_than_none():
     print(f"{len(bars)} bars: {iterations} iterations")
     assert result.statistics["step_cuts"] == 0 and result.statistics["unbalanced"] < 1e-8
     assert iterations <= 30
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["wall", "slope"])
+def test_ten_thousand_blocks_under_sudden_weight_find_their_equilibrium(scene):
+    blocks = {"wall": block_scenes.wall, "slope": block_scenes.slope}[scene](10_010)
+    settings = block_scenes.settings(1.0, dynamic=False)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+    found = dda.equilibrium(system, State.at_rest(blocks), block_scenes.WEIGHT)
+    steps = found.history
+    print(f"{scene} of {blocks.n_blocks}: {len(steps)} steps, {steps['iterations'].sum()} iterations; {found.reason}")
+    assert found.converged
+    # What is fixed bears the weight of all that is not, less what the last step still sets in motion.
+    rows = found.result.contacts[found.result.contacts["state"] != OPEN]
+    force = rows["normal_force"][:, None] * rows["normal"] + rows["shear_force"][:, None] * normal_of(rows["normal"])
+    on_fixed = blocks.fixed[rows["block"]].astype(float) - blocks.fixed[rows["other"]]
+    mass, moved = system.mass[~blocks.fixed], found.result.acceleration[~blocks.fixed, :2]
+    weight = block_scenes.GRAVITY * mass.sum()
+    assert np.abs(mass @ moved).max() < 1e-4 * weight
+    assert on_fixed @ force == pytest.approx([0.0, -weight] - mass @ moved, abs=1e-8 * weight)
