@@ -9,8 +9,7 @@ blocks and cracks no state to settle in.
 
 from __future__ import annotations
 
-from numba import njit
-
+from ..compiled import kept
 from .load_pieces import jit
 
 #: Triangles are on 1/n, 2/n … of a face's length.
@@ -20,7 +19,7 @@ TRIANGLES = 8
 NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
-@njit(error_model="numpy", nogil=True)
+@kept(error_model="numpy", nogil=True)
 def no_pull(length, force, moment):
     """Two pieces (start, end, p_start, p_end) of a pressure on [0, length], linear on each (they add up; one may have no
     length), and lone forces at its start and at its end, all together with resultant ``force`` and ``moment`` about 0.
