@@ -68,8 +68,8 @@ class DdaSettings:
         beta, gamma = self.newmark
         if not (2 * beta >= gamma >= 0.5):
             raise ValueError(
-                f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: it takes 2β ≥ γ ≥ ½ "
-                "(trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
+                f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step, and contact springs are far "
+                "stiffer than steps resolve: it takes 2β ≥ γ ≥ ½ (trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
             )
 
 
