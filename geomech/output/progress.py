@@ -23,6 +23,10 @@ from .units import length_text, stress_text
 SHOWN_WARNINGS, WIDTH = 3, 400
 
 
+#: Of a static run in which blocks slide or turn on and on.
+NO_ANSWER = "since the mechanism what blocks move by means nothing: nothing holds them (events.csv)"
+
+
 class Warned(logging.Handler):
     """Counts what geomech warns of while a run lasts, from its making to its `end`; and keeps the first of each
     kind."""
@@ -199,6 +203,8 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
             f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with "
             f"growth, {length_text(summary['crack_growth_m'])} of new crack in {summary.get('wall_s', math.nan):.2f} s"
         )
+    if "mechanism" in summary.get("first", {}):
+        lines.append(f"  {NO_ANSWER}")
     if summary.get("end") in STOPS:
         lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")
     return [*lines, f"  {folder}"]

@@ -45,9 +45,11 @@ class RunLog:
 
     def on_cycle(self, cycle: Cycle) -> None:
         for event in cycle.events:
+            # A load of 0 is that of a scene which has no leading one.
+            load = f", load {stress_text(event.load)}" if event.load else ""
             _log.info(
-                "cycle %d, t = %g s, load %s: %s at (%.6g, %.6g) %s",
-                event.cycle, event.time, stress_text(event.load), event.kind, *event.point, event.detail,
+                "cycle %d, t = %g s%s: %s at (%.6g, %.6g) %s",
+                event.cycle, event.time, load, event.kind, *event.point, event.detail,
             )  # fmt: skip
 
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:

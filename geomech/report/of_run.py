@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..output.progress import NO_ANSWER
 from ..output.reading import Run
 from ..output.units import largest_of, length_text, length_unit, stress_text, stress_unit
 from .energy_tables import add_energy
@@ -87,6 +88,7 @@ def key_results(run: Run) -> dict[str, Any]:
     facts["cycles"] = summary.get("cycles")
     facts["time simulated, s"] = summary.get("time_s")
     facts["at the end blocks are"] = summary.get("motion", {}).get("condition") or None
+    facts["mind"] = NO_ANSWER if "mechanism" in first else None
     facts["computed in, s"] = scaled("wall_s", 1.0, ".1f")
     return facts
 
