@@ -5,7 +5,7 @@ again; where blocks have hardly moved, none. What is kept so, or factored in sin
 & Schultz 1986), which brings the residual down to round-off.
 
 Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for
-a factorisation and a substitution, ms): these factors 9 + 1.1 and 210 + 19, in single precision 6 + 0.6 and 122 + 11;
+a factorisation and a substitution, ms): these factors 6.5 + 1.1 and 178 + 19, in single precision 4 + 0.6 and 98 + 11;
 PARDISO of MKL 2026 11 to 19 + 6 and 245 to 478 + 61; an incomplete factorisation with GMRES 234 and 5400; smoothed
 aggregation (pyamg 5, six fields an aggregate) and block Jacobi do not come to 1e-10 in 500 iterations.
 """

@@ -68,6 +68,21 @@ def test_stiff_bolts_between_blocks_take_no_more_iterations_than_none():
 
 
 @pytest.mark.slow
+def test_the_last_digits_of_a_step_do_not_decide_how_long_it_takes():
+    # 27 or 28 iterations; with predictors of the central path solved to 1e-2 some of these steps took 100 to 190.
+    blocks = block_scenes.slope(1000)
+    taken = []
+    for k in range(8):
+        settings = block_scenes.settings(0.01 * (1 + k * 1e-10))
+        system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+        result = system.step(State.at_rest(blocks), block_scenes.WEIGHT)
+        taken.append(result.statistics["open_close_iterations"])
+        assert result.statistics["step_cuts"] == 0
+    print(taken)
+    assert max(taken) <= 40
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["wall", "slope"])
 def test_ten_thousand_blocks_under_sudden_weight_find_their_equilibrium(scene):
     blocks = {"wall": block_scenes.wall, "slope": block_scenes.slope}[scene](10_010)
