@@ -25,9 +25,9 @@ from ..model import OPEN, SLIP, STICK
 #: Bonds of a CONTACT row: whole, and cracked from its edge, so that it holds only while it is pressed.
 WHOLE, CRACKED = 1, 3
 #: Contacts whose normals are nearer in direction than this (cosine) may lie on one face …
-_ALIGNED = 0.9986
+ALIGNED = 0.9986
 #: … if they are off its line by less than this part of their distance (sine of the same angle, about 3°).
-_OFF_LINE = 0.053
+OFF_LINE = 0.053
 #: The tributary lengths of a face's contacts add up to its length but for this part: otherwise it has gaps.
 WITHOUT_GAPS = 1e-2
 
@@ -102,8 +102,8 @@ def _on_one_line(first, last, swapped, geometry):
             turn = sense * (-1.0 if swapped[k] else 1.0)
             nx, ny = geometry[k, 1], geometry[k, 2]
             dx, dy = geometry[c, 5] - geometry[k, 5], geometry[c, 6] - geometry[k, 6]
-            straight = turn * (nx * geometry[c, 1] + ny * geometry[c, 2]) > _ALIGNED
-            if straight and abs(nx * dx + ny * dy) <= _OFF_LINE * np.sqrt(dx * dx + dy * dy):
+            straight = turn * (nx * geometry[c, 1] + ny * geometry[c, 2]) > ALIGNED
+            if straight and abs(nx * dx + ny * dy) <= OFF_LINE * np.sqrt(dx * dx + dy * dy):
                 face[c], lead[c], along[c] = face[k], k, nx * dy - ny * dx
                 break
         if face[c] < 0:

@@ -16,7 +16,7 @@ from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
-from .nodes_in_faces import flat_nodes, nodes_in_faces
+from .nodes_in_faces import nodes_in_faces
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -59,13 +59,14 @@ class ContactFinder:
         self._table = JointTable.of(joints)
         self._stiff = ~np.isnan(self._table.normal_stiffness)
         self._stiff_along = ~np.isnan(self._table.shear_stiffness)
+        self._by_length = self._stiff & self._stiff_along
         self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
         self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
         self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
         self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
         self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
-        self._flat = flat_nodes(blocks.vertices, self._next, self._previous)
+        self._flat = blocks.in_side
         self._rigid = rigid
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
@@ -117,10 +118,9 @@ class ContactFinder:
             table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
             partner = _among(keep, partner)
         nodes, own = None, parent
-        by_length = self._stiff & self._stiff_along
-        if by_length.any():
+        if self._by_length.any():
             nodes = nodes_in_faces(
-                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, by_length[law], partner
+                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law], partner
             )
         if nodes is not None:
             geometry[:, 4] = nodes.left(geometry[:, 4])

@@ -15,24 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from ..compiled import kept
 from ..model import OPEN
-
-#: Sides that turn by less than this (sine) are one.
-_FLAT = 1e-6
-#: Contacts lie on one line whose normals are nearer than this (cosine) …
-_ALIGNED = 0.9986
-#: … and that are off it by less than this part of their distance (sine of the same angle, about 3°).
-_OFF_LINE = 0.053
-#: A node's length is half the way between its neighbours but for this part of it: otherwise the face has a gap.
-_WHOLE = 1e-2
-
-
-def flat_nodes(vertices: np.ndarray, next_vertex: np.ndarray, previous_vertex: np.ndarray) -> np.ndarray:
-    """(n_vertices,) whether two sides are one line there; a block of one strain keeps it so."""
-    to, on = vertices - vertices[previous_vertex], vertices[next_vertex] - vertices
-    turn = to[:, 0] * on[:, 1] - to[:, 1] * on[:, 0]
-    size = np.hypot(to[:, 0], to[:, 1]) * np.hypot(on[:, 0], on[:, 1])
-    return (np.abs(turn) <= _FLAT * size) & ((to * on).sum(axis=1) > 0)
+from .bonded_faces import ALIGNED, OFF_LINE, WITHOUT_GAPS
 
 
 class NodesInFaces(NamedTuple):
@@ -92,8 +77,8 @@ def nodes_in_faces(
     by_length: np.ndarray,
     partner: np.ndarray,
 ) -> NodesInFaces | None:
-    """Those among contacts (n,), pair of blocks by pair, of ``vertex`` and ``edge``; ``owner`` and ``flat`` (n_vertices,),
-    ``geometry`` (n, 7), ``law`` and ``partner`` (n, 2) as in `ContactSet`, ``by_length`` (n,) contacts whose springs go by
+    """Those among contacts (n,), pair of blocks by pair, of ``vertex`` and ``edge``; ``owner`` and ``flat`` (n_vertices,)
+    (`Blocks.in_side`), ``geometry`` (n, 7), ``law`` and ``partner`` (n, 2) as in `ContactSet`, ``by_length`` (n,) contacts whose springs go by
     their lengths. None without any."""
     mine = flat[vertex] & by_length & (geometry[:, 4] > 0)
     if not mine.any():
@@ -102,7 +87,7 @@ def nodes_in_faces(
     return NodesInFaces(node, neighbours, share) if len(node) else None
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _between(mine, vertex, edge, owner, geometry, law, paired):
     n = vertex.shape[0]
     out = np.zeros(n, np.bool_)
@@ -129,17 +114,18 @@ def _between(mine, vertex, edge, owner, geometry, law, paired):
                 break
             if q == r or out[q] or paired[q] or law[q] != law[r] or length[q] <= 0.0:
                 continue
-            if abs(nx * geometry[q, 1] + ny * geometry[q, 2]) < _ALIGNED:
+            if abs(nx * geometry[q, 1] + ny * geometry[q, 2]) < ALIGNED:
                 continue
             dx, dy = geometry[q, 5] - geometry[r, 5], geometry[q, 6] - geometry[r, 6]
             along, off = dy * nx - dx * ny, dx * nx + dy * ny
-            if abs(off) > _OFF_LINE * abs(along) + abs(geometry[r, 3]) + abs(geometry[q, 3]):
+            if abs(off) > OFF_LINE * abs(along) + abs(geometry[r, 3]) + abs(geometry[q, 3]):
                 continue
             if along < 0.0 and along > before:
                 before, low = along, q
             elif along > 0.0 and along < after:
                 after, high = along, q
-        if low < 0 or high < 0 or abs(length[r] - 0.5 * (after - before)) > _WHOLE * (after - before):
+        # A node's length is half the way between its neighbours: otherwise the face has a gap.
+        if low < 0 or high < 0 or abs(length[r] - 0.5 * (after - before)) > WITHOUT_GAPS * (after - before):
             continue
         out[r] = True
         node[count] = r

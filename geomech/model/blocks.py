@@ -180,15 +180,19 @@ class Blocks:
         return centre, np.einsum("ij,ijk->ik", arm, np.linalg.inv(moments)[self.vertex_block])
 
     @cached_property
-    def side_start(self) -> list[int]:
-        """(n_vertices,) the first edge of the straight side that each edge is part of: a block's strain, which is the
-        same all over it, leaves straight sides straight."""
+    def in_side(self) -> np.ndarray:
+        """(n_vertices,) the vertices at which a straight side goes on: a block's strain, which is the same all over it,
+        leaves straight sides straight."""
         along = self.vertices[self.next_vertex] - self.vertices
         before = along[self.previous_vertex]
         ahead = before[:, 0] * along[:, 0] + before[:, 1] * along[:, 1]
         turn = before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0]
-        goes_on = ((ahead > 0) & (np.abs(turn) <= STRAIGHT * ahead)).tolist()
-        previous = self.previous_vertex.tolist()
+        return (ahead > 0) & (np.abs(turn) <= STRAIGHT * ahead)
+
+    @cached_property
+    def side_start(self) -> list[int]:
+        """(n_vertices,) the first edge of the straight side that each edge is part of."""
+        goes_on, previous = self.in_side.tolist(), self.previous_vertex.tolist()
         first = [-1] * self.n_vertices
         for edge in range(self.n_vertices):
             chain = [edge]

@@ -204,7 +204,8 @@ class RunSettings:
     names is told of by other steps as well, when they end; None: all of it by steps to events, nothing by others.
     ``boundary_stress`` says how contact forces load cracked blocks: "contacts" spread over faces, "bases" so, and on
     fixed and guided blocks as on a rigid base, "springs" at points, "kelvin-springs" at points of the infinite plane.
-    Without ``skip`` every body is made anew and every answer worked out anew in every pass, though nothing about it has changed: the same results, for comparison.
+    Without ``skip`` every body is made anew and every answer worked out anew in every pass, though nothing about it has
+    changed: the same results, for comparison.
     """
 
     end_time: float = 1.0
