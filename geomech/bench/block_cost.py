@@ -103,20 +103,20 @@ def _watched() -> Iterator[Watch]:
         finally:
             watch.search += spent_on()
 
-    def timed(work, *given):
+    def timed(work, *given, **named):
         nonlocal inside
         if inside:  # a rough solution may ask for an exact one
-            return work(*given)
+            return work(*given, **named)
         inside, spent_on = True, stopwatch()
         try:
-            return work(*given)
+            return work(*given, **named)
         finally:
             inside = False
             watch.solution += spent_on()
 
-    def timed_solve(self, data, right, *within):
+    def timed_solve(self, data, right, *within, **force):
         watch.last = self, data, right
-        return timed(solve, self, data, right, *within)
+        return timed(solve, self, data, right, *within, **force)
 
     def timed_roughly(self, data):
         solution = timed(roughly, self, data)

@@ -332,8 +332,11 @@ def assemble_contacts(
     return symmetric
 
 
-def solve(pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool) -> np.ndarray:
-    """Unknowns (6 n,) in the pattern's order. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+def solve(
+    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0
+) -> np.ndarray:
+    """Unknowns (6 n,) in the pattern's order; ``force`` as for `BlockSolver.solve`. Overwrites ``data`` when dense.
+    Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
@@ -347,4 +350,4 @@ def solve(pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool
         if info != 0:
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
-    return pattern.solver.solve(data, right)
+    return pattern.solver.solve(data, right, force=force)

@@ -25,7 +25,8 @@ from .work import Work
 
 _jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 
-#: The largest residual of a solution, relative to the largest right-hand side, …
+#: The largest residual of a solution, relative to the largest force in the right-hand side (blocks at rest leave 3e-8 of
+#: it, the rounding of coordinates times stiff springs), …
 RESIDUAL = 1e-12
 #: … or to the largest Σ|A||x| of a row, below which it is round-off.
 ROUND_OFF = 2e-15
@@ -179,19 +180,23 @@ class BlockSolver:
         """The number of each of the matrix blocks ``keys``."""
         return np.searchsorted(self.keys, keys)
 
-    def solve(self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL) -> np.ndarray:
+    def solve(
+        self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL, force: float = 0.0
+    ) -> np.ndarray:
         """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row, with a residual ``within`` that part of
-        ``right``, or of round-off. Raises numpy.linalg.LinAlgError."""
+        ``right``, or of a larger ``force`` that others balance in it, or of round-off. Raises
+        numpy.linalg.LinAlgError."""
+        target = within * max(force, float(np.abs(right).max(initial=0.0)))
         if self._factors.single:
             try:
-                x = self._solved(data, right, within)
+                x = self._solved(data, right, within, target)
             except np.linalg.LinAlgError:
                 x = None
             if x is not None:
                 return x
             # Beyond single precision, as many sets of states are that are far from the right ones.
             self._hold(np.float64)
-        return self._solved(data, right, within)
+        return self._solved(data, right, within, target)
 
     def _hold(self, dtype: type) -> None:
         """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.4
@@ -230,7 +235,8 @@ class BlockSolver:
                 # What is begun from is mostly the last answer, whose product with the matrix is known.
                 same = known is not None and known[0] is start
                 begun = None if start is None else (start, known[1] if same else self.multiply(data, start))
-                known = self._iterate(data, right, within, factors, begun)
+                target = within * float(np.abs(right).max(initial=0.0))
+                known = self._iterate(data, right, within, target, factors, begun)
                 if known is not None:
                     return known[0]
                 self._rough_serves = False
@@ -253,20 +259,21 @@ class BlockSolver:
             self._rough = Factors(*self._pattern, np.float32, self._factors.tree, again=False)
         return self._rough
 
-    def _solved(self, data: np.ndarray, right: np.ndarray, within: float) -> np.ndarray | None:
-        """`solve` with the factors as they are; None where single precision does not do."""
+    def _solved(self, data: np.ndarray, right: np.ndarray, within: float, target: float) -> np.ndarray | None:
+        """`solve` with the factors as they are, to residuals of ``target``; None where single precision does not
+        do."""
         if self._has_factors:
             fresh = self._bring(data, 0 if self._factors.tree.kept else FEW)
             tries = TRIES if fresh or self.in_parts else TRIES_OF_FEW
-            found = self._iterate(data, right, within, self._factors, tries=tries)
+            found = self._iterate(data, right, within, target, self._factors, tries=tries)
             # Single precision knows no more of this matrix than that, in full or in part.
             if found is not None or (fresh and self._factors.single):
                 return None if found is None else found[0]
         self.factor(data)
         if self._factors.single:
-            found = self._iterate(data, right, within, self._factors)
+            found = self._iterate(data, right, within, target, self._factors)
             return None if found is None else found[0]
-        x, target, told = self.substitute(right), within * float(np.abs(right).max(initial=0.0)), False
+        x, told = self.substitute(right), False
         for _ in range(REFINEMENTS):
             rest = right - self.multiply(data, x)
             largest = float(np.abs(rest).max())
@@ -321,13 +328,14 @@ class BlockSolver:
         data: np.ndarray,
         right: np.ndarray,
         within: float,
+        target: float,
         factors: Factors,
         begun: _Known | None = None,
         tries: int = TRIES,
     ) -> _Known | None:
-        """GMRES with ``factors`` on the right, from what is ``begun`` with; None when it takes too long, see
-        `_krylov`."""
-        target, told = within * float(np.abs(right).max(initial=0.0)), False
+        """GMRES with ``factors`` on the right, from what is ``begun`` with, to residuals of ``target``; None when it
+        takes too long, see `_krylov`."""
+        told = False
         if begun is None:
             x = self.substitute(right, factors)
         else:

@@ -176,6 +176,7 @@ class _Equations:
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
         self._side = np.empty(6 * self.pattern.n)
+        self._force = float(np.abs(self.right).max(initial=0.0))
         self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
 
     def together(self, which: np.ndarray, states: _States, answer: _Answer, budget: int) -> tuple[_States | None, int]:
@@ -221,7 +222,7 @@ class _Equations:
             springs.friction, springs.sliding, springs.lift, found.shear, self._sides,
         )  # fmt: skip
         try:
-            unknowns = assembly.solve(pattern, self._data, self._side, symmetric)
+            unknowns = assembly.solve(pattern, self._data, self._side, symmetric, self._force)
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         if not np.isfinite(unknowns).all():

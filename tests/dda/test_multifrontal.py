@@ -282,3 +282,21 @@ def test_products_and_their_largest_terms(monkeypatch):
     monkeypatch.setattr(block_solver, "SHARED", 0)
     monkeypatch.setattr(block_solver, "SHARE", 4)
     assert np.array_equal(block_solver.multiply(*at), product)
+
+
+def test_what_large_forces_leave_when_they_cancel_is_solved_to_their_round_off(monkeypatch):
+    monkeypatch.setattr(block_solver, "SINGLE", 0)
+    points, rows, columns, data = springs_between(600, seed=8)
+    data[rows == columns] += 1e3 * np.eye(6)
+    right = np.random.default_rng(2).normal(size=3600)
+    solver = BlockSolver(points, rows, columns)
+    exact = solver.solve(data.ravel(), right)
+    before = solver.counts["substitutions"]
+    solver.solve(data.ravel(), right)
+    alone = solver.counts["substitutions"] - before
+    force = 1e8 * np.abs(right).max()
+    x = solver.solve(data.ravel(), right, force=force)
+    assert solver.counts["substitutions"] - before - alone < alone
+    rest = right - full(rows, columns, data, 600) @ x
+    assert 0 < np.abs(rest).max() <= 1e-12 * force
+    assert np.abs(x - exact).max() <= 1e-3 * np.abs(exact).max()
