@@ -133,10 +133,11 @@ def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tu
     now.take_split(split)
     if now.problem.dda.dynamic_factor != 0.0:
         begin_in_motion(now, split, cut, begun, stored)
-    if stands:
-        with now.timed("growth"):
-            contacts = contacts_after(now.system, split, cut, solutions, loads, now.problem.loads)
-        now.state = replace(now.state, contacts=contacts)
+    with now.timed("growth"):
+        contacts = contacts_after(
+            now.system, split, cut, solutions if stands else {}, loads, now.problem.loads, begun.contacts
+        )
+    now.state = replace(now.state, contacts=contacts)
     return tuple(events)
 
 

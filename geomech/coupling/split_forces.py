@@ -20,9 +20,11 @@ import numpy as np
 
 from .. import dda
 from ..conventions import normal_of, traction
+from ..dda.bonded_faces import WHOLE
 from ..dda.overlap import REFUSED
 from ..model import OPEN, Blocks, Loads, State
 from ..model.blocks import STRAIGHT
+from .divided_faces import from_their_faces
 from .splitting import Split
 from .tractions import BoundaryLoad
 
@@ -146,24 +148,27 @@ def contacts_after(
     solutions: dict,
     loads: dict[int, BoundaryLoad],
     acting: Loads,
+    contacts: np.ndarray,
 ) -> np.ndarray:
     """CONTACT rows for the blocks of ``split``, whose next step begins with the forces at the end of the last.
 
     ``system`` is that of the new blocks, ``before`` are those that were cut, ``solutions`` and boundary ``loads``
-    (block →) those of the last pass at ``split.state``; ``acting`` are the loads of the blocks.
+    (block →) those of the last pass at ``split.state``; ``acting`` are the loads of the blocks, ``contacts`` the
+    CONTACT rows before the split.
     """
     blocks, state = split.blocks, split.state
-    found = system.contacts_near(state)
-    if not len(found):
-        return state.contacts
+    near = system.contacts_near(state)
+    found = from_their_faces(near, state.contacts, contacts, split.parent)
     parts = np.bincount(split.parent, minlength=before.n_blocks)
     cut = [b for b in np.flatnonzero(parts > 1).tolist() if b in solutions]
+    if not len(found) or (found is near and not cut):
+        return state.contacts
     told = _Told.none(len(found))
     for parent in cut:
         _tell_of_walls(told, found, split, parent, solutions[parent], float(state.rotation[parent]))
         loaded = {load.edge_name for load in acting.edge_tractions}
         _tell_of_divided_edges(told, found, split, before, parent, loads[parent], loaded)
-    return system.told(found, _contacts(system, found, told, blocks, np.isin(split.parent, cut)))
+    return system.told(state, found, _contacts(system, found, told, blocks, np.isin(split.parent, cut)))
 
 
 def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_part: np.ndarray) -> dda.ToldContacts:
@@ -172,7 +177,8 @@ def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_pa
     across = found.geometry[:, 1:3]
     normal = np.sum(told.force * across, axis=1)
     shear = np.sum(told.force * normal_of(across), axis=1)
-    normal = np.where(normal > _NOTHING * np.abs(told.force).max(initial=0.0), normal, 0.0)
+    least = _NOTHING * np.abs(told.force).max(initial=0.0)
+    normal = np.where((normal > least) | ((found.bonded == WHOLE) & (normal < -least)), normal, 0.0)
     rough = np.array([joint.roughness is not None for joint in system.joints])[found.law]
     keeps = ~told.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
     normal, shear = np.where(told.known, normal, found.normal), np.where(told.known, shear, found.shear)

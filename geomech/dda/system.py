@@ -23,7 +23,7 @@ from .step import CrackResponse, NotConverged, StepResult
 from .step_length import StepLength
 from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
-from .told_contacts import ToldContacts, told_rows
+from .told_contacts import ToldContacts, at_their_springs, told_rows
 from .turned_in import turned_in
 from .work import Work
 
@@ -260,14 +260,20 @@ class BlockSystem:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
         return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit, lumped=True)
 
-    def told(self, found: ContactSet, forces: ToldContacts) -> np.ndarray:
-        """CONTACT rows of ``found``, as ``forces`` say where they tell of one: for a `State` whose next step begins
-        so."""
-        if self.allowed_penetration:
-            on_multiplier = self.finder.on_penalty(found)[0]
-        else:
-            on_multiplier = np.zeros(len(found), bool)
-        return told_rows(found, forces, self.finder.closure, on_multiplier)
+    def told(self, state: State, found: ContactSet, forces: ToldContacts) -> np.ndarray:
+        """CONTACT rows of ``found``, the contacts near ``state``, as ``forces`` say where they tell of one: for a
+        `State` whose next step begins so."""
+
+        def on_multiplier(contacts: ContactSet) -> np.ndarray:
+            held = bool(self.allowed_penetration)
+            return self.finder.on_penalty(contacts)[0] if held else np.zeros(len(contacts), bool)
+
+        rows = told_rows(found, forces, self.finder.closure, on_multiplier(found))
+        vertices, window = np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit
+        placed = self.finder.find(replace(state, contacts=rows), vertices, window)
+        if placed.points is None:
+            return rows
+        return at_their_springs(rows, placed, forces.which, self.finder.closure, on_multiplier(placed))
 
     def _refuse_unheld(self, loads: Loads, time: float) -> None:
         """In statics weight needs something to rest on: what falls for ever has no equilibrium."""

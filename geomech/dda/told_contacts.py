@@ -26,7 +26,7 @@ _AT_STRENGTH = 1e-3
 class ToldContacts:
     """What the contacts ``which`` (k,), rows of a `ContactSet`, begin with.
 
-    normal  (k,) N, positive in compression; 0: open, unless the contact is bonded
+    normal  (k,) N, positive in compression; 0: open, unless the contact is bonded, which may be pulled
     shear   (k,) N, along the edge's direction
     gap     (k,) m, of those that are open
     slip    (k,) m, sliding so far, along the edge's direction
@@ -58,7 +58,7 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
     slides = closed & (found.bonded[at] == 0) & (np.abs(told.shear) >= (1 - _AT_STRENGTH) * strength)
     # What slides without friction has no force to tell which way.
     slides &= (told.shear != 0) | (strength == 0)
-    pressed_in = np.where(on_multiplier[at], 0.0, n / (found.springs.normal[at] + n / closure[found.law[at]]))
+    pressed_in = np.where(on_multiplier[at], 0.0, _closed_by(n, found.springs.normal[at], closure[found.law[at]]))
     rows["state"][at] = np.where(closed, np.where(slides, SLIP, STICK), OPEN)
     rows["normal_force"][at] = np.where(closed, n, 0.0)
     rows["shear_force"][at] = np.where(closed, told.shear, 0.0)
@@ -66,5 +66,36 @@ def told_rows(found: ContactSet, told: ToldContacts, closure: np.ndarray, on_mul
     rows["lift"][at] = g[at, 3] - rows["gap"][at]
     rows["slip"][at] = told.slip
     rows["wear"][at] = np.where(closed, np.maximum(found.wear[at], np.abs(told.slip)), found.wear[at])
-    rows["stretch"][at], rows["inset"][at], rows["bare"][at] = 0.0, False, -1.0
+    rows["stretch"][at], rows["bare"][at] = 0.0, -1.0
     return rows
+
+
+def at_their_springs(
+    rows: np.ndarray, placed: ContactSet, which: np.ndarray, closure: np.ndarray, on_multiplier: np.ndarray
+) -> np.ndarray:
+    """The ``rows`` of `told_rows`, those ``which`` are told of in faces whose springs stand inside them (``placed``)
+    with the gaps at which these springs, and not ones at the corners, bear the resultant and the moment told."""
+    n_vertices = int(max(rows["vertex"].max(), rows["edge"].max(), placed.edge.max())) + 1
+    keys, theirs = rows["vertex"] * n_vertices + rows["edge"], placed.vertex * n_vertices + placed.edge
+    order = np.argsort(keys)
+    here = order[np.minimum(np.searchsorted(keys[order], theirs), len(keys) - 1)]
+    points = placed.points
+    told = np.zeros(len(rows), bool)
+    told[which] = True
+    # Where only one end is told of, the other keeps the gap that it had.
+    ends = points.ends[(told[here[points.ends]] & (rows["state"][here[points.ends]] != OPEN)).all(axis=1)]
+    force = points.at_points(rows["normal_force"][here])
+    gap = points.gap_at_corners(
+        np.where(on_multiplier, 0.0, -_closed_by(force, placed.springs.normal, closure[placed.law]))
+    )
+    at = here[ends]
+    out = rows.copy()
+    out["gap"][at] = gap[ends]
+    out["lift"][at] = points.corners[ends, 3] - gap[ends]
+    return out
+
+
+def _closed_by(force: np.ndarray, stiffness: np.ndarray, closure: np.ndarray) -> np.ndarray:
+    """(n,) m by which springs of ``stiffness`` N/m are closed under ``force`` N, straight or hyperbolic to
+    ``closure``."""
+    return force / (stiffness + force / closure)
