@@ -17,6 +17,7 @@ from ..model import OPEN, STICK, Loads, State
 from . import assembly
 from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
+from .contact_rows import copied
 from .contact_set import ContactSet
 from .contact_springs import Springs, end_of_step, over_a_step
 from .contact_states import reserves
@@ -81,6 +82,7 @@ class Attempt:
         self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
         self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
         self.iterations = 0
+        self._edges_along: tuple[np.ndarray | None, np.ndarray] = None, np.zeros((0, 2))
         foreseen = self._foreseen()
         self._place(foreseen)
         if scheme.place == 1.0 and foreseen is not None:
@@ -254,7 +256,11 @@ class Attempt:
 
     def _along(self, found: ContactSet) -> np.ndarray:
         """(n, 2) m: the edges of ``found``."""
-        return self.vertices[self.system.next[found.edge]] - self.vertices[found.edge]
+        edge, along = self._edges_along
+        if found.edge is not edge:
+            along = self.vertices[self.system.next[found.edge]] - self.vertices[found.edge]
+            self._edges_along = found.edge, along
+        return along
 
     def _over_the_step(self, found: ContactSet):
         """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs,
@@ -391,7 +397,7 @@ class Attempt:
         memory = rows
         if scheme.weight != 1.0 or found.points is not None:
             # Of what springs inside faces bear in shear, each goes on with its own.
-            memory = rows.copy()
+            memory = copied(rows)
             memory["shear_force"] = end_shear
         if system.taken_out is not None:
             new_stress[system.taken_out] = 0.0

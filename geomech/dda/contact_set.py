@@ -10,6 +10,7 @@ import numpy as np
 
 from ..model import CONTACT, OPEN, SLIP
 from .bonded_faces import BondedFaces
+from .contact_rows import fill
 from .contact_springs import Springs
 from .face_points import FacePoints
 
@@ -198,23 +199,20 @@ class ContactSet:
     def rows(self, settled: Settled, acting: np.ndarray | None = None) -> np.ndarray:
         """CONTACT rows of the finished step, on the geometry on which it was assembled: ``acting`` (n, 7) of the corners
         where the forces acted, None where the step began."""
-        rows = np.zeros(len(self), CONTACT)
-        for name in ("vertex", "edge", "block", "other", "law", "inset"):
-            rows[name] = getattr(self, name)
-        for name in ("state", "bonded", "gap", "normal_force", "shear_force"):
-            rows[name] = getattr(settled, name)
-        geometry, lift = self.geometry, self.lift
-        if (points := self.points) is not None:
+        geometry, lift, points = self.geometry, self.lift, self.points
+        gap, normal, shear = settled.gap, settled.normal_force, settled.shear_force
+        if points is not None:
             geometry, lift = points.corners, self.lumped.lift
-            for name in ("normal_force", "shear_force"):
-                rows[name] = points.at_corners(rows[name])
+            normal, shear = points.at_corners(normal), points.at_corners(shear)
+            gap = points.gap_at_corners(gap)
+        rows = np.empty(len(self), CONTACT)
+        fill(
+            rows, self.vertex, self.edge, self.block, self.other, self.law, self.inset, settled.state, settled.bonded,
+            gap, normal, shear, self.slip, self.wear, settled.slip, lift, settled.lifted,
+            geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]),
+        )  # fmt: skip
+        if points is not None:
             rows["bare"][points.ends] = np.abs(points.part - [0.0, 1.0])
-            rows["gap"] = points.gap_at_corners(settled.gap)
-        acting = geometry if acting is None else acting
-        rows["position"], rows["normal"], rows["point"] = acting[:, 0], acting[:, 1:3], acting[:, 5:7]
-        rows["length"] = geometry[:, 4]
-        rows["slip"], rows["wear"] = self.slip + settled.slip, self.wear + np.abs(settled.slip)
-        # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
-        rows["lift"] = np.maximum(lift + settled.lifted, np.minimum(lift, 0.0))
-        rows["stretch"] = settled.stretch
+        if np.any(settled.stretch):
+            rows["stretch"] = settled.stretch
         return rows

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from . import contact_rows
 from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
 from .contact_set import ContactSet
@@ -93,22 +94,18 @@ class ContactFinder:
         without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
         (vertex·n_vertices + edge), too."""
-        old = state.contacts
-        if len(old):
-            # Faces that slid apart press at a distance, those that do not fit pass each other by as much.
-            window += float(np.abs(old["lift"]).max())
-            # What soft springs have let in deeper than that touches still.
-            window = max(window, -_DEEPER * float(old["gap"][old["state"] != OPEN].min(initial=0.0)))
-        keys = old["vertex"] * len(vertices) + old["edge"]
+        old = np.ascontiguousarray(state.contacts)
+        old_vertex, old_edge, keys, old_normal, lift, gap = contact_rows.names(old, len(vertices))
+        # Faces that slid apart press at a distance, those that do not fit pass each other by as much; what soft springs
+        # have let in deeper than that touches still.
+        window = max(window + lift, -_DEEPER * gap)
         rank = np.argsort(keys, kind="stable")
         table = find_contacts(
             vertices, self._next, self._previous, self._start, self._near.of(vertices, window), window, keys[rank]
         )
         geometry, mate, parent = describe_contacts(
-            table, vertices, self._next, self._previous, window,
-            np.ascontiguousarray(old["vertex"]), np.ascontiguousarray(old["edge"]),
-            np.ascontiguousarray(old["normal"]), rank,
-        )  # fmt: skip
+            table, vertices, self._next, self._previous, window, old_vertex, old_edge, old_normal, rank
+        )
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
@@ -221,14 +218,9 @@ class ContactFinder:
         """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
         known = parent >= 0
 
-        def of(name: str) -> np.ndarray:
-            # Field by field: taking whole rows moves ten times the memory.
-            if len(old) == 0:
-                return np.zeros(len(parent), old.dtype[name])
-            return np.where(known, old[name][parent], old.dtype[name].type(0))
-
-        contact_state, bonded, normal, shear = of("state"), of("bonded"), of("normal_force"), of("shear_force")
-        slip, wear, lift, stretch, bare = of("slip"), of("wear"), of("lift"), of("stretch"), of("bare")
+        (contact_state, bonded), (normal, shear, slip, wear, lift, stretch, bare), inset = contact_rows.inherited(
+            old, parent
+        )
         if not known.all():
             # New contacts that touch already are tried closed first; one with a partner must show which line it
             # crosses.
@@ -242,7 +234,6 @@ class ContactFinder:
         pulls = springs.friction * normal + springs.sliding < 0.0
         direction = np.where(contact_state == SLIP, np.sign(shear), 0.0) * np.where(pulls, -1.0, 1.0)
         # Bonds of blocks that bend are there from the start, or never.
-        inset = of("inset")
         if len(old) == 0 and time == 0.0 and self._bends.any():
             inset = (bonded == 1) & (springs.tension > 0) & ~stiff
         rough = (springs.peak > 0) | (bonded > 0)
@@ -320,14 +311,7 @@ class ContactFinder:
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""
-        rows = rows.copy()
-        start, point = vertices[rows["edge"]], vertices[rows["vertex"]]
-        along = vertices[self._next[rows["edge"]]] - start
-        length = np.hypot(along[:, 0], along[:, 1])
-        rows["point"] = point
-        rows["position"] = np.einsum("ij,ij->i", point - start, along) / length**2
-        rows["normal"] = np.stack([along[:, 1], -along[:, 0]], axis=1) / length[:, None]
-        return rows
+        return contact_rows.carried(rows, vertices, self._next)
 
     def where(self, found: ContactSet, contact: int) -> str:
         """Which contact of ``found`` it is, for messages; empty for −1."""
