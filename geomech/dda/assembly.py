@@ -20,6 +20,8 @@ from .shared_tasks import add_at_once, await_value, crew
 DENSE_BLOCKS = 60
 #: From so many blocks on, rows are filled on all cores, of so many at a time.
 THREADED, SHARE = 4000, 256
+#: Up to this part of the blocks, only the rows of those whose contacts have other laws are filled again.
+FILLED_AGAIN = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,6 +239,32 @@ def _fill_shared(
     await_value(told, 0, shares)
 
 
+@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+def _fill_again(
+    most, held, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
+    normal, shear, slope, lift,
+):  # fmt: skip
+    """Fill the rows of blocks whose contacts have other laws than those ``held`` (4 of (n_contacts,)), unless these are
+    more than ``most`` blocks; whether that is done."""
+    n, rows = len(matrix), 0
+    differs = np.zeros(n, np.bool_)
+    for c in range(len(block)):
+        if normal[c] != held[0][c] or shear[c] != held[1][c] or slope[c] != held[2][c] or lift[c] != held[3][c]:
+            for i in (order[block[c]], order[other[c]]):
+                if i >= 0 and not differs[i]:
+                    differs[i] = True
+                    rows += 1
+    if rows > most:
+        return False
+    for b in range(n):
+        if differs[b]:
+            _fill_rows(
+                b, b + 1, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
+                vectors, normal, shear, slope, lift,
+            )  # fmt: skip
+    return True
+
+
 def assemble(
     pattern: Pattern,
     data: np.ndarray,
@@ -252,13 +280,17 @@ def assemble(
     slope: np.ndarray,
     lift: np.ndarray,
     sides: tuple[np.ndarray, np.ndarray] | None = None,
+    held: tuple[np.ndarray, ...] | None = None,
 ) -> None:
     """Fill ``data`` with the blocks' own part ``matrix`` (n, 6, 6) and contacts that answer a motion by dN =
     −``normal`` (n − κ t)·Δu, κ the ``lift``, and dS = −``shear`` t·Δu + ``slope`` dN; ``upper`` and ``lower`` as in the
-    ``pattern``, for these contacts, whose ``sides`` may be known, as from `sides_of`."""
+    ``pattern``, for these contacts, whose ``sides`` may be known, as from `sides_of`. ``held``: the laws (``normal``,
+    ``shear``, ``slope``, ``lift``) with which ``data`` is filled already, all else the same."""
     at = pattern.begins, pattern.stride, pattern.diagonal, upper, lower, block, other, order
     laws = vectors, normal, shear, slope, lift
     sides = sides_of(pattern.n, order, block, other) if sides is None else sides
+    if held is not None and _fill_again(int(FILLED_AGAIN * pattern.n), held, *sides, data, matrix, *at, *laws):
+        return
     if pattern.n < THREADED:
         _fill_rows(0, pattern.n, *sides, data, matrix, *at, *laws)
         return
@@ -318,8 +350,10 @@ def assemble_contacts(
     lift: np.ndarray,
     shear0: np.ndarray,
     sides: tuple[np.ndarray, np.ndarray] | None = None,
-) -> bool:
-    """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric.
+    held: tuple[np.ndarray, ...] | None = None,
+) -> tuple[bool, tuple[np.ndarray, ...]]:
+    """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric, and
+    what ``data`` holds then, see `assemble`.
 
     Normal force N = −kₙ(g + n·Δu − κ t·Δu), with the lift κ by sliding. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c),
     with N the unknown one, which makes the matrix unsymmetric but friction exact in one solution.
@@ -328,8 +362,9 @@ def assemble_contacts(
     *laws, symmetric = _springs(
         right, base_right, *at, state, direction, gap, normal, shear, friction, sliding, lift, shear0
     )
-    assemble(pattern, data, matrix, upper, lower, *at, *laws, lift, sides)
-    return symmetric
+    laws = (*laws, lift)
+    assemble(pattern, data, matrix, upper, lower, *at, *laws, sides, held)
+    return symmetric, laws
 
 
 def solve(

@@ -199,7 +199,7 @@ class Attempt:
         else:
             raise Unsettled("faces do not settle on the part of them that touches")
         self.found, self.settled, self.unknowns = found, settled, unknowns
-        self.vectors, self.weight = vectors, weight
+        self.vectors, self.weight, self.acting = vectors, weight, geometry
 
     def _laboured(self) -> bool:
         """Whether shorter steps are likely to come sooner to where this one goes."""
@@ -370,8 +370,10 @@ class Attempt:
         """The step as it is told of."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
         state, actions, dt, gravity, middle = self.state, self.actions, self.dt, self.gravity, self.middle
-        corners = found.geometry if found.points is None else found.points.corners
-        rows = found.rows(settled, middle.contacts(corners, found.block, found.other, self._along(found)))
+        acting = self.acting
+        if found.points is not None:
+            acting = middle.contacts(found.points.corners, found.block, found.other, self._along(found))
+        rows = found.rows(settled, acting)
         reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
         points, load, turn = self.points, self.load, self.increment[:, 2]
         if actions is not None:

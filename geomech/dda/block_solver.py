@@ -186,7 +186,10 @@ class BlockSolver:
         """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row, with a residual ``within`` that part of
         ``right``, or of a larger ``force`` that others balance in it, or of round-off. Raises
         numpy.linalg.LinAlgError."""
-        target = within * max(force, float(np.abs(right).max(initial=0.0)))
+        largest = float(np.abs(right).max(initial=0.0))
+        target = within * max(force, largest)
+        if largest > 0.0:
+            within = target / largest
         if self._factors.single:
             try:
                 x = self._solved(data, right, within, target)

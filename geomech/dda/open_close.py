@@ -176,6 +176,7 @@ class _Equations:
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
         self._side = np.empty(6 * self.pattern.n)
+        self._held: tuple[np.ndarray, ...] | None = None
         self._force = float(np.abs(self.right).max(initial=0.0))
         self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
 
@@ -216,11 +217,13 @@ class _Equations:
             springs, gap = self.curved.lines(
                 self.springs, self.gap, found, state, direction, bonded, normal_force, plastic
             )
-        symmetric = assembly.assemble_contacts(
+        symmetric, held = assembly.assemble_contacts(
             pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
             found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
-            springs.friction, springs.sliding, springs.lift, found.shear, self._sides,
+            springs.friction, springs.sliding, springs.lift, found.shear, self._sides, self._held,
         )  # fmt: skip
+        # Dense matrices are overwritten by their factors, links added to all.
+        self._held = held if pattern.solver is not None and pattern.links is None else None
         try:
             unknowns = assembly.solve(pattern, self._data, self._side, symmetric, self._force)
         except np.linalg.LinAlgError as error:
