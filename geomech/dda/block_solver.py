@@ -1,8 +1,8 @@
 """Solutions of one 6×6-block system after another, each with no more work than its difference from the last asks for.
 
 Where springs have changed since the last factorisation, only the fronts of their blocks and those above are eliminated
-again; where blocks have hardly moved, none. What is kept so, or factored in single precision, preconditions GMRES (Saad
-& Schultz 1986), which brings the residual down to round-off.
+again; where blocks have hardly moved, none. What is kept so, or factored in single precision, preconditions conjugate
+residuals (`directions`), which bring them down to round-off.
 
 Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for
 a factorisation and a substitution, ms): these factors 6.5 + 1.1 and 178 + 19, in single precision 4 + 0.6 and 98 + 11;
@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 
 from ..compiled import kept
+from .directions import Directions
 from .multifrontal import Factors
 from .shared_tasks import add_at_once, await_value, crew
 from .work import Work
@@ -38,12 +39,12 @@ REFINEMENTS = 3
 #: springs lose so stays below the inertia that holds a block against them (measured: 1e-3 takes twice the time at dt =
 #: 1 ms).
 CHANGED = 1e-6
-#: Solutions in a cycle of GMRES at most.
+#: Solutions in a cycle of conjugate residuals at most.
 TRIES = 16
 #: Where so many have changed, it is taken that as many will have the next time.
 MOSTLY = 0.9
 #: Where fronts cannot be eliminated one by one, factors that differ in so few blocks are not made anew: of 100 000
-#: bricks they take as long as 27 substitutions, and where ten scattered contacts differ GMRES takes 7 to 19 more, of
+#: bricks they take as long as 27 substitutions, and where ten scattered contacts differ conjugate residuals take 7 to 19 more, of
 #: which this many are tried.
 FEW, TRIES_OF_FEW = 30, 24
 #: Free blocks from which factors are in single precision: half the memory, and on walls of 10 000 bricks three quarters
@@ -140,10 +141,6 @@ def _take(data, diagonal, changed, factored):
                 taken[k] = given[k]
 
 
-#: A solution (6n,) and its product with the matrix.
-_Known = tuple[np.ndarray, np.ndarray]
-
-
 class BlockSolver:
     """Solves A x = b for one pattern of 6×6 blocks and matrices that change from time to time.
 
@@ -163,6 +160,8 @@ class BlockSolver:
         self._has_factors = False
         self._rough: Factors | None = None
         self._rough_serves = True
+        # Those of rough solutions serve until the next matrix, whatever is solved between.
+        self._directions, self._shown = (Directions(6 * self.n, most) for most in (max(TRIES, TRIES_OF_FEW), TRIES))
         #: ``shares``: factorisations, one that was done in part as that part.
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
@@ -209,12 +208,12 @@ class BlockSolver:
         self._factors = Factors(*self._pattern, dtype, tree)
 
     def rough_solution(self, data: np.ndarray) -> Callable[..., np.ndarray]:
-        """What gives x (6n,) for one right side after the other, ``solution(right, within, start)``, with a residual
-        ``within`` that part of it, from where it is known to ``start`` (6n,), from factors in single precision (half
-        the time of double ones, where that is all the digits asked for), which leave those of `solve` alone, unless
-        they are of so many blocks that single ones take their place. Raises numpy.linalg.LinAlgError."""
+        """What gives x (6n,) for one right side after the other, ``solution(right, within)``, with a residual ``within``
+        that part of it, from factors in single precision (half the time of double ones, where that is all the digits
+        asked for), which leave those of `solve` alone, unless they are of so many blocks that single ones take their
+        place. What one right side has shown of the matrix serves the next. Raises numpy.linalg.LinAlgError."""
 
-        def exactly(right: np.ndarray, within: float, start: np.ndarray | None = None) -> np.ndarray:
+        def exactly(right: np.ndarray, within: float) -> np.ndarray:
             return self.solve(data, right, within)
 
         factors = self._rough_factors()
@@ -230,18 +229,15 @@ class BlockSolver:
             self._rough_serves = False
             return exactly
 
-        known: _Known | None = None
+        known = self._shown
+        known.forget()
 
-        def solution(right: np.ndarray, within: float, start: np.ndarray | None = None) -> np.ndarray:
-            nonlocal known
+        def solution(right: np.ndarray, within: float) -> np.ndarray:
             if self._rough_serves:
-                # What is begun from is mostly the last answer, whose product with the matrix is known.
-                same = known is not None and known[0] is start
-                begun = None if start is None else (start, known[1] if same else self.multiply(data, start))
+                x, rest = np.zeros(len(right)), right.copy()
                 target = within * float(np.abs(right).max(initial=0.0))
-                known = self._iterate(data, right, within, target, factors, begun)
-                if known is not None:
-                    return known[0]
+                if self._follow(data, x, rest, known.project(x, rest), target, factors, known, TRIES):
+                    return x
                 self._rough_serves = False
             if self._factors.single:
                 self._hold(np.float64)
@@ -271,11 +267,11 @@ class BlockSolver:
             found = self._iterate(data, right, within, target, self._factors, tries=tries)
             # Single precision knows no more of this matrix than that, in full or in part.
             if found is not None or (fresh and self._factors.single):
-                return None if found is None else found[0]
+                return found
         self.factor(data)
         if self._factors.single:
             found = self._iterate(data, right, within, target, self._factors)
-            return None if found is None else found[0]
+            return found
         x, told = self.substitute(right), False
         for _ in range(REFINEMENTS):
             rest = right - self.multiply(data, x)
@@ -327,67 +323,34 @@ class BlockSolver:
         return multiply(data, self.pointer, self.columns, x)
 
     def _iterate(
-        self,
-        data: np.ndarray,
-        right: np.ndarray,
-        within: float,
-        target: float,
-        factors: Factors,
-        begun: _Known | None = None,
-        tries: int = TRIES,
-    ) -> _Known | None:
-        """GMRES with ``factors`` on the right, from what is ``begun`` with, to residuals of ``target``; None when it
-        takes too long, see `_krylov`."""
-        told = False
-        if begun is None:
-            x = self.substitute(right, factors)
-        else:
-            x, product = begun
-            rest = right - product
-            if np.abs(rest).max(initial=0.0) <= target:
-                return begun
-            x = x + self.substitute(rest, factors)
+        self, data: np.ndarray, right: np.ndarray, within: float, target: float, factors: Factors, tries: int = TRIES
+    ) -> np.ndarray | None:
+        """x (6n,) with a residual of ``target``, from ``factors`` that are nearly those of the matrix; None when it
+        takes more than so many ``tries``, solutions with them."""
+        known, told = self._directions, False
+        known.forget()
+        x = self.substitute(right, factors)
         for cycle in range(3):
-            product = self.multiply(data, x)
-            rest = right - product
+            rest = right - self.multiply(data, x)
             largest = float(np.abs(rest).max(initial=0.0))
             # Round-off is asked for only where it may decide, once: the first x of a coarse solution need not know it.
             if largest > target and not told and (cycle or within <= COARSE):
                 target, told = max(target, self._round_off(data, x)), True
             if largest <= target:
-                return x, product
-            if not np.isfinite(largest):
+                return x
+            if not self._follow(data, x, rest, largest, target, factors, known, tries):
                 return None
-            step = self._krylov(data, rest, target, factors, tries)
-            if step is None:
-                return None
-            x += step
         return None
 
-    def _krylov(
-        self, data: np.ndarray, rest: np.ndarray, target: float, factors: Factors, tries: int
-    ) -> np.ndarray | None:
-        """The correction that brings ``rest`` down to ``target``, None if it would take more than so many ``tries``,
-        solutions with the factors."""
-        size = float(np.linalg.norm(rest))
-        basis, directions = np.empty((tries + 1, len(rest))), []
-        basis[0] = rest / size
-        hessenberg = np.zeros((tries + 1, tries))
-        first = np.zeros(tries + 1)
-        first[0] = size
-        for k in range(tries):
-            directions.append(self.substitute(basis[k], factors))
-            v = self.multiply(data, directions[-1])
-            for _ in range(2):  # twice is enough for orthogonality to round-off
-                shares = basis[: k + 1] @ v
-                hessenberg[: k + 1, k] += shares
-                v -= shares @ basis[: k + 1]
-            hessenberg[k + 1, k] = np.linalg.norm(v)
-            part = hessenberg[: k + 2, : k + 1]
-            y, *_ = np.linalg.lstsq(part, first[: k + 2], rcond=None)
-            left = float(np.linalg.norm(first[: k + 2] - part @ y))
-            # Restarted, the next round would bring down what this one leaves; it need not go below a millionth.
-            if left <= max(target, 1e-6 * size) or hessenberg[k + 1, k] == 0.0:
-                return sum(share * direction for share, direction in zip(y, directions, strict=True))
-            basis[k + 1] = v / hessenberg[k + 1, k]
-        return None
+    def _follow(
+        self, data: np.ndarray, x: np.ndarray, rest: np.ndarray, largest: float, target: float, factors: Factors,
+        known: Directions, tries: int,
+    ) -> bool:  # fmt: skip
+        """Bring ``rest`` (6n,), the residual of ``x`` (6n,), and its ``largest`` entry down to ``target``, both in
+        place, by further ``known`` directions; False if that takes more than so many ``tries``."""
+        for _ in range(tries):
+            if largest <= target or not np.isfinite(largest):
+                break
+            direction = self.substitute(rest, factors)
+            largest = known.add(direction, self.multiply(data, direction), x, rest)
+        return largest <= target

@@ -71,9 +71,9 @@ _END, _STUCK = 1e-14, 1e-3
 #: … and so many in a row that are shorter than this, hardly.
 _BLOCKED, _SHORT = 5, 0.05
 #: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. The
-#: predictor, with which correctors begin, needs it too: a slope of 976 blocks under sudden weight takes 27 to 190
-#: iterations with 1e-2 and 1e-4, as the last digits fall, and 28 with 1e-5 of both. (Walls ask for no more than 1e-4.)
-WITHIN, _GUESSED = 1e-5, 1e-5
+#: predictor needs it too: a slope of 976 blocks under sudden weight takes 27 to 144 iterations with 1e-4 of that one
+#: alone, as the last digits fall, and 27 with 1e-5. (Walls ask for no more than 1e-4.)
+WITHIN = 1e-5
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)
@@ -95,7 +95,7 @@ def add_forces(right, block, other, order, vectors, normal, shear):
 
 def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
     """What solves with the matrix of ``data`` for one right side after the other, to a residual ``within`` that part of
-    it, from a ``start`` (6 n,) on that is nearly it. Raises numpy.linalg.LinAlgError."""
+    it. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is not None:
         return pattern.solver.rough_solution(data)
@@ -104,7 +104,7 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
     factors, pivots, info = dgetrf(data.reshape(6 * pattern.n, -1))
     if info != 0:
         raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
-    return lambda right, within=WITHIN, start=None: dgetrs(factors, pivots, right)[0]
+    return lambda right, within=WITHIN: dgetrs(factors, pivots, right)[0]
 
 
 def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
@@ -261,27 +261,27 @@ class CentralPath:
         )  # fmt: skip
         solve = solution_of(pattern, self._data)
 
-        def newton(goals, within=WITHIN, start=None):
+        def newton(goals):
             """Changes of the unknowns, motions (n, 2) of contacts, changes of the six positive numbers and of S, and
             how far they may go."""
             pulled = pulls(goals, numbers, missed, laws, self._rise)
             side = residual.copy()
             add_forces(side, *self._at, pulled[0], pulled[2])
-            step = solve(side, within, start)
+            step = solve(side, WITHIN)
             motion = moved(step, *self._at, self._lift)
             return step, motion, *changes(goals, numbers, missed, pulled, motion, laws, kn, mu, rough, self._rise)
 
-        guess, _, changed, _, far = newton(np.zeros((3, len(kn))), _GUESSED)
+        _, _, changed, _, far = newton(np.zeros((3, len(kn))))
         left = products(numbers, changed, far, rough, unit) / total
         target = epsilon * left**3 * unit
         goals = second_order(target, changed)
-        step, motion, changed, d_shear, far = newton(goals, start=guess)
+        step, motion, changed, d_shear, far = newton(goals)
         for _ in range(_CORRECTORS):
             if far > _FAR:
                 break
             wanted = min(1.0, _FARTHER * far + _FURTHER)
             tried_goals = nearer(goals, numbers, changed, wanted, target, _SPREAD)
-            tried = newton(tried_goals, start=step)
+            tried = newton(tried_goals)
             if tried[-1] < far + _GAIN * (wanted - far):
                 break
             goals, (step, motion, changed, d_shear, far) = tried_goals, tried
