@@ -1,4 +1,4 @@
-"""Elimination of dense fronts of 6×6 blocks, and substitution through them, in double or single precision.
+"""Elimination of dense fronts of 6×6 blocks, in double or single precision.
 
 A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel
 of two blocks at a time,
@@ -7,6 +7,12 @@ of two blocks at a time,
 
 and what is left of F_BB is added into its parent's front (Duff & Reid 1983). Arrays of the tree are those of
 `dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) chain the children of a front.
+
+Factors lie in the order in which `substitution` reads them, first what it reads on its way up, then what it reads on
+its way back: one core reads so 28 GB/s, but 9 where it skips every other few kilobytes (measured). ``at`` and ``back``
+(n_fronts,) say where a front's begin: at ``at`` for every panel F_k·, then Z, and behind all panels F_BP; at ``back``
+U of every panel, the last first. Each is a number of *sixes*: six rows, first a register of the first, of the second,
+…, then the next register of each, and what is left of each.
 """
 
 from __future__ import annotations
@@ -14,8 +20,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
-#: Sums may be reordered and fused: the products of whole fronts are summed as BLAS likes, too.
-_jit = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+from .lanes import BYTES, load, load_first, numbers, store, store_first
+
+#: Kept with the kernel that calls them only, for they are made of what stands in other files, too. Sums may be
+#: reordered and fused: the products of whole fronts are summed as BLAS likes, too.
+_jit = njit(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 
 #: Unknowns eliminated at a time; twelve to thirty keep BLAS as busy.
 PANEL = 12
@@ -31,16 +40,6 @@ _gemm = types.ExternalFunction(
         types.voidptr, types.intp, types.voidptr, types.voidptr, types.intp,
     ),
 )  # fmt: skip
-
-
-@_jit
-def _product(a, x):
-    """Σ a x. Where a factor streams from memory, one row after the other runs at twice the speed of BLAS, which reads
-    four at a time."""
-    total = a.dtype.type(0)
-    for j in range(len(a)):
-        total += a[j] * x[j]
-    return total
 
 
 @_jit
@@ -96,6 +95,53 @@ def _clear(array):
         array[k] = 0
 
 
+def places(own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """``at`` and ``back`` of fronts with so many blocks of their ``own`` and ``far`` ones (n_fronts,), and how many
+    numbers all factors are."""
+    p, b = 6 * own, 6 * far
+    panels, rest = p // PANEL, p % PANEL
+    # Σ h e over the panels of h rows up to the row e.
+    squares = PANEL**2 * panels * (panels + 1) // 2 + rest * p
+    up, down = squares + b * p, p * (p + b) - squares
+    return np.cumsum(up) - up, int(up.sum() + down.sum()) - np.cumsum(down), int(up.sum() + down.sum())
+
+
+@_jit
+def _leave_sixes(given, at, stride, rows, n, taken, to, width):
+    """Write ``rows`` so far apart, of n numbers each, as sixes; where they end."""
+    for i in range(at, at + rows * stride, 6 * stride):
+        j = 0
+        while j + width <= n:
+            for a in range(6):
+                store(taken, to + a * width, load(given, i + a * stride + j))
+            j, to = j + width, to + 6 * width
+        k = n - j
+        if k > 0:
+            for a in range(6):
+                store_first(taken, to + a * k, load_first(given, i + a * stride + j, k), k)
+            to += 6 * k
+    return to
+
+
+@_jit
+def _leave(front, p, m, factors, at, back):
+    """Write the factors of a ``front`` to where they belong."""
+    if p == 0:
+        return 0
+    width = BYTES // front.itemsize
+    here, there = numbers(front), numbers(factors)
+    for start in range(0, p, PANEL):
+        end = min(start + PANEL, p)
+        at = _leave_sixes(here, start * m, m, end - start, start, there, at, width)
+        at = _leave_sixes(here, start * m + start, m, end - start, end - start, there, at, width)
+    _leave_sixes(here, p * m, p, m - p, p, there, at, width)
+    for start in range(PANEL * ((p - 1) // PANEL), -1, -PANEL):
+        end = min(start + PANEL, p)
+        back = _leave_sixes(here, start * m + end, m, end - start, m - end, there, back, width)
+    # What is found by its place is kept until here.
+    return len(front) + len(factors)
+
+
 @_jit
 def _runs(met, own, begins):
     """Where runs of blocks that stand side by side begin among the seats ``met`` (n,) in a front with ``own`` blocks:
@@ -124,16 +170,6 @@ def _add_runs(here, added, met, begins, first, last, beside):
 
 
 @_jit
-def longest(pivots, reach, first, last):
-    """The most unknowns of any front from ``first`` to before ``last``, and the most beyond its own."""
-    most, far = 0, 0
-    for f in range(first, last):
-        most = max(most, 6 * (pivots[f + 1] - pivots[f] + reach[f + 1] - reach[f]))
-        far = max(far, 6 * (reach[f + 1] - reach[f]))
-    return most, far
-
-
-@_jit
 def eliminate(
     first,
     last,
@@ -148,6 +184,7 @@ def eliminate(
     column,
     stack,
     at,
+    back,
     child,
     sibling,
     room,
@@ -159,17 +196,17 @@ def eliminate(
     ``stack`` (n_fronts,): where S are left in the ``room``; ``units`` are 1, −1, 0; ``space`` as from
     `working_space`."""
     one, minus, none = units[0:1], units[1:2], units[2:3]
-    panel, begins, swapped = space
+    front, panel, begins, swapped = space
     for f in range(first, last):
         if not touched[f]:
             continue
         own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
         p, b = 6 * own, 6 * far
         m = p + b
-        upper = factors[at[f] : at[f] + p * m].reshape((p, m))
-        lower = factors[at[f] + p * m : at[f + 1]].reshape((b, p))
+        upper = front[: p * m].reshape((p, m))
+        lower = front[p * m : p * m + b * p].reshape((b, p))
         rest = room[stack[f] : stack[f] + b * b].reshape((b, b))
-        _clear(factors[at[f] : at[f + 1]])
+        _clear(front[: p * m + b * p])
         for k in range(entries[f], entries[f + 1]):
             i, j = row[k], column[k]
             block = data[36 * entry[k] : 36 * entry[k] + 36]
@@ -213,6 +250,7 @@ def eliminate(
             _add_product(minus, lower, upper[:, p:], none, rest)
         else:
             _clear(rest.reshape(b * b))
+        _leave(front, p, m, factors, at[f], back[f])
         g = child[f]
         while g >= 0:
             met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
@@ -227,57 +265,10 @@ def eliminate(
 
 @_jit
 def working_space(pivots, reach, factors):
-    """What `eliminate` works in: room for a panel, and for numbers."""
-    most, far = longest(pivots, reach, 0, len(reach) - 1)
-    return np.empty(PANEL * most, factors.dtype), np.empty(far // 6 + 1, np.int64), np.empty(PANEL, np.int64)
-
-
-@_jit
-def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, passed):
-    """Forward substitution in ``out`` (6n,), in the order of elimination, through fronts from ``first`` to before
-    ``last``; ``passed`` holds what each front passes on."""
-    part = np.empty(PANEL, factors.dtype)
-    for f in range(first, last):
-        own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
-        p = 6 * own
-        m = p + 6 * far
-        mine, further = out[6 * pivots[f] : 6 * pivots[f + 1]], passed[6 * reach[f] : 6 * reach[f + 1]]
-        further[:] = 0
-        g = child[f]
-        while g >= 0:
-            for u in range(reach[g], reach[g + 1]):
-                i = seat[u]
-                here = mine[6 * i : 6 * i + 6] if i < own else further[6 * (i - own) : 6 * (i - own) + 6]
-                for a in range(6):
-                    here[a] += passed[6 * u + a]
-            g = sibling[g]
-        upper = factors[at[f] : at[f] + p * m].reshape((p, m))
-        lower = factors[at[f] + p * m : at[f + 1]].reshape((6 * far, p))
-        for start in range(0, p, PANEL):
-            end = min(start + PANEL, p)
-            for i in range(start, end):
-                part[i - start] = mine[i] - _product(upper[i, :start], mine)
-            for i in range(start, end):
-                mine[i] = _product(upper[i, start:end], part)
-        for i in range(6 * far):
-            further[i] -= _product(lower[i], mine)
-
-
-@_jit
-def backward(first, last, out, pivots, reach, boundary, at, factors):
-    """Backward substitution in ``out`` from front ``last`` − 1 down to ``first``."""
-    known = np.empty(longest(pivots, reach, first, last)[0], factors.dtype)
-    for f in range(last - 1, first - 1, -1):
-        start_of, p, n = 6 * pivots[f], 6 * (pivots[f + 1] - pivots[f]), reach[f + 1] - reach[f]
-        m = p + 6 * n
-        upper = factors[at[f] : at[f] + p * m].reshape((p, m))
-        known[:p] = out[start_of : start_of + p]
-        for u in range(n):
-            i, j = 6 * boundary[reach[f] + u], p + 6 * u
-            for a in range(6):
-                known[j + a] = out[i + a]
-        for start in range(PANEL * ((p - 1) // PANEL), -1, -PANEL):
-            end = min(start + PANEL, p)
-            for i in range(start, end):
-                known[i] -= _product(upper[i, end:], known[end:])
-        out[start_of : start_of + p] = known[:p]
+    """What `eliminate` works in: room for a front but for its F_BB, for a panel, and for numbers."""
+    most, far, size = 0, 0, 0
+    for f in range(len(reach) - 1):
+        p, b = 6 * (pivots[f + 1] - pivots[f]), 6 * (reach[f + 1] - reach[f])
+        most, far, size = max(most, p + b), max(far, b), max(size, p * (p + 2 * b))
+    front, panel = np.empty(size, factors.dtype), np.empty(PANEL * most, factors.dtype)
+    return front, panel, np.empty(far // 6 + 1, np.int64), np.empty(PANEL, np.int64)

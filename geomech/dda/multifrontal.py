@@ -16,8 +16,9 @@ from numba import njit
 from ..compiled import kept
 from .blas_threads import blas_threads
 from .dissection import Tree, plan
-from .fronts import backward, eliminate, forward, working_space
+from .fronts import eliminate, places, working_space
 from .shared_tasks import add_at_once, await_value, crew
+from .substitution import backward, forward
 
 _jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 
@@ -43,6 +44,7 @@ def _eliminate_shared(
     column,
     stack,
     at,
+    back,
     child,
     sibling,
     room,
@@ -60,14 +62,30 @@ def _eliminate_shared(
             space = working_space(pivots, reach, factors)
         await_value(awaited, q, 0)
         if not eliminate(
-            tasks[q, 0], tasks[q, 1], touched, data, pivots, reach, seat, entries, entry, row, column, stack, at, child,
-            sibling, room, factors, units, space,
+            tasks[q, 0], tasks[q, 1], touched, data, pivots, reach, seat, entries, entry, row, column, stack, at, back,
+            child, sibling, room, factors, units, space,
         ):  # fmt: skip
             add_at_once(told, 1, 1)
         if above[q] >= 0:
             add_at_once(awaited, above[q], -1)
         add_at_once(told, 0, 1)
     await_value(told, 0, len(tasks))
+
+
+@_jit
+def _take(right, order, size, out):
+    """``out`` ← ``right`` / ``size``, block by block in this ``order``."""
+    for k in range(len(order)):
+        for a in range(6):
+            out[6 * k + a] = right[6 * order[k] + a] / size
+
+
+@_jit
+def _give(out, order, size, x):
+    """``x`` ← ``out`` ``size``, back from this ``order``."""
+    for k in range(len(order)):
+        for a in range(6):
+            x[6 * order[k] + a] = out[6 * k + a] * size
 
 
 @_jit
@@ -91,6 +109,7 @@ def _substitute_shared(
     seat,
     boundary,
     at,
+    back,
     child,
     sibling,
     factors,
@@ -116,7 +135,7 @@ def _substitute_shared(
                 await_value(awaited, above[q], -2)
             else:
                 await_value(awaited, q, -1)
-            backward(tasks[q, 0], tasks[q, 1], out, pivots, reach, boundary, at, factors)
+            backward(tasks[q, 0], tasks[q, 1], out, pivots, reach, boundary, back, factors)
             # −2: and back.
             add_at_once(awaited, q, -1)
         add_at_once(told, 0, 1)
@@ -147,11 +166,12 @@ class Factors:
             if parent[f] >= 0:
                 self._sibling[f] = self._child[parent[f]]
                 self._child[parent[f]] = f
-        self._by_rank = (6 * np.argsort(self.tree.rank)[:, None] + np.arange(6)).ravel()
+        self._order = np.argsort(self.tree.rank)
         self._front = np.searchsorted(self.tree.pivots, self.tree.rank, side="right") - 1
         above = self.tree.above
         self._awaited = np.bincount(above[above >= 0], minlength=len(above))
-        self._factors = np.empty(self.tree.at[-1], dtype)
+        self._at, self._back, size = places(np.diff(self.tree.pivots), np.diff(self.tree.reach))
+        self._factors = np.empty(size, dtype)
         # Whether factors may be made anew in part, and whether those at hand may: every S is where it was left.
         again = again and self.tree.kept
         self._room = np.empty(self.tree.own_room_size if again else self.tree.stack_size, dtype)
@@ -181,7 +201,7 @@ class Factors:
         with blas_threads(1):
             told = self._shared(
                 _eliminate_shared, THREADED, touched, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row,
-                t.column, t.own_room if self._left else t.stack, t.at, self._child, self._sibling, self._room,
+                t.column, t.own_room if self._left else t.stack, self._at, self._back, self._child, self._sibling, self._room,
                 self._factors, self._units,
             )  # fmt: skip
         if told[1]:
@@ -193,14 +213,14 @@ class Factors:
         t = self.tree
         # Single precision has no more than 38 decades: the right side is brought to its middle.
         size = float(np.abs(right).max(initial=0.0)) or 1.0
-        out = (right[self._by_rank] / size).astype(self._factors.dtype)
+        out, x = np.empty(len(right), self._factors.dtype), np.empty(len(right))
+        _take(right, self._order, size, out)
         self._shared(
-            _substitute_shared, THREADED_SOLUTION, out, t.pivots, t.reach, t.seat, t.boundary, t.at, self._child,
+            _substitute_shared, THREADED_SOLUTION, out, t.pivots, t.reach, t.seat, t.boundary, self._at, self._back, self._child,
             self._sibling, self._factors, self._passed,
         )  # fmt: skip
-        x = np.empty(len(right))
-        x[self._by_rank] = out
-        return size * x
+        _give(out, self._order, size, x)
+        return x
 
     def _shared(self, work: Callable, least: int, *given) -> np.ndarray:
         """Do the ``work`` of all tasks, from ``least`` blocks on by all cores; how many are done, and have failed."""
