@@ -169,6 +169,8 @@ class Attempt:
             geometry = middle.contacts(found.geometry, found.block, found.other, self._along(found))
             vectors = assembly.contact_vectors(found.block, found.other, geometry, order, middle.moments)
             middle.turn_back(vectors, found.block, found.other, geometry)
+            if found.points is not None:
+                found.points.share_shear(vectors, found.block)
             if held is not None and self.n_free:
                 hold(held, self.matrix, self.right, vectors, found.block, found.other, order)
             if not self.n_free:
@@ -231,7 +233,9 @@ class Attempt:
         if not system.scheme.static:
             self._place(increment)
         self._follow(increment, vertices)
-        self.found = self.found.trying(tried)
+        # In statics bonds were first asked about blocks where they stand: on the arcs of one that has flown off, any
+        # would seem to hold.
+        self.found = self.found.trying(tried, without_lost=system.scheme.static)
         return True
 
     def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:

@@ -52,7 +52,7 @@ class ContactSet:
     arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the
                 straight one
     swing       (n,)     m that it adds so to the motion along the edge
-    tried                      state and direction that open–close iterations begin with, where these are others
+    tried                      state, direction and bond that open–close iterations begin with, where these are others
     """
 
     vertex: np.ndarray
@@ -84,11 +84,12 @@ class ContactSet:
     lumped: ContactSet | None = None
     arc: np.ndarray | float = 0.0
     swing: np.ndarray | float = 0.0
-    tried: tuple[np.ndarray, np.ndarray] | None = None
+    tried: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
-    def trying(self, rows: np.ndarray) -> ContactSet:
+    def trying(self, rows: np.ndarray, without_lost: bool = False) -> ContactSet:
         """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are
-        rows of the same contacts: those with which another attempt at the step has ended."""
+        rows of the same contacts: those with which another attempt at the step has ended; ``without_lost`` of its bonds
+        that were lost there."""
         if len(rows) != len(self) or not all(
             np.array_equal(rows[name], getattr(self, name)) for name in ("vertex", "edge")
         ):
@@ -96,16 +97,20 @@ class ContactSet:
         way = np.where(rows["state"] == SLIP, np.sign(rows["shear_force"]), 0.0)
         # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not
         # known.
-        known = (self.bonded == 0) | (rows["bonded"] == self.bonded)
+        known = (self.bonded == 0) | (rows["bonded"] == self.bonded) | without_lost
         known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
-        return replace(self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction)))
+        bonded = rows["bonded"].copy() if without_lost else self.bonded
+        return replace(
+            self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction), bonded)
+        )
 
     def trying_again(self, settled: Settled) -> ContactSet:
         """The same contacts, of which open–close iterations begin with the states so ``settled`` with springs that stood
         elsewhere. (The sense of sliding is that of each spring: forces at the corners of a face may have another.)"""
         # A bond that was lost there may hold here.
-        known = (self.bonded == 0) | (settled.bonded == self.bonded)
-        tried = np.where(known, settled.state, self.state), np.where(known, settled.direction, self.direction)
+        bonded = self.bonded if self.tried is None else self.tried[2]
+        known = (bonded == 0) | (settled.bonded == bonded)
+        tried = np.where(known, settled.state, self.state), np.where(known, settled.direction, self.direction), bonded
         return replace(self, tried=tried)
 
     def like(self, rows: np.ndarray) -> ContactSet:
@@ -136,7 +141,7 @@ class ContactSet:
             points=points,
             lumped=self,
             arc=points.between_corners(self.arc) if isinstance(self.arc, np.ndarray) else self.arc,
-            swing=points.between_corners(self.swing) if isinstance(self.swing, np.ndarray) else self.swing,
+            swing=points.along_faces(self.swing) if isinstance(self.swing, np.ndarray) else self.swing,
         )
 
     def misplaced(self, settled: Settled) -> ContactSet | None:

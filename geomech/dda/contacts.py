@@ -169,15 +169,16 @@ class ContactFinder:
         if broken is not None:
             inside = inside & ~np.isin(vertex * len(vertices) + edge, broken)
 
-        def bend(ends, length):
+        def apart(ends, length):
             """Part of its length that the springs of a face are apart: they give by its rotation what its blocks would
             bend."""
+            across, point = found.geometry[ends[:, 0], 1:3], found.geometry[ends[:, 0], 5:7]
             give = sum(
                 give_by_bending(
-                    owner[ends[:, 0]], found.geometry[ends[:, 0], 1:3], vertices, self._start, self._area, self._modulus, self._bends
+                    owner[ends[:, 0]], across, point, vertices, self._next, self._start, self._modulus, self._bends
                 )
                 for owner in (block, other)
-            )  # fmt: skip
+            )
             # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold
             # it.
             give[self._rigid[block[ends[:, 0]]] | self._rigid[other[ends[:, 0]]]] = 0.0
@@ -187,7 +188,7 @@ class ContactFinder:
         def placed(inside):
             return FacePoints.of(
                 block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
-                (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), bend,
+                (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), apart,
             )  # fmt: skip
 
         points = placed(inside)

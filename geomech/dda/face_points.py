@@ -12,15 +12,17 @@ of what is missed).
 
 Bonds of blocks that have no stiffness of their own, and hold at their extreme fibre too, are held in the mean by the
 solver's springs. At the corners these would hold every rotation as well; but a block of one strain cannot bend, and
-what it would give under the moment on its face has to be given at the face. Half of a block of the depth d behind a
-face that spans it turns by
+what it would give under the moment on its face has to be given at the face. A beam of the block's depth that has its
+second moment I about its centroid across the face, and reaches from there by h to the face, would turn by
 
-    θ = M (d/2) / (E' ℓ³/12)        (its share of a beam; Kawai 1978 has rigid blocks give so throughout),
+    θ = M h / (E' I / 2h)        (of a rectangle M h / (E' ℓ³/12); Kawai 1978 has rigid blocks give so throughout),
 
-and so far inside their corners stand the two springs that give it. Otherwise rectangles glued together lock: between
-displacements that agree at four corners and are linear, none bends. A triangle's three do not lock. Bricks laid in bond
-hold each other's ends besides, which this does not mend: in two and four courses they sag 0.78 and 0.91 of what a beam
-of their rock does, twice as long as high 0.40 and 0.60.
+and so far inside their corners stand the two springs that give it. Along the face they stand in its middle, both: a
+block that bends is stretched along its faces by a strain that changes across it, its neighbours as they bend, and
+springs that held the faces at two places along each other would hold that. So bricks in courses, bricks laid in bond
+and cells of any shape glued together bend as a beam does, the better the more of them there are; otherwise they lock:
+between displacements that agree at the corners and are linear in every block, none bends. A triangle's three do not
+lock.
 
 Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and
 moment, and bring the same stress. (What a state carries over of shear is that of the springs.)
@@ -58,6 +60,7 @@ class FacePoints:
     held      (m,)    bonds may pull: the part is the whole face
     shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
     apart     (m,)    distance of the two springs, in parts of the part
+    bends     (m,)    bonds that give as their blocks would bend: along the face both springs stand in its middle
     went      (m, 2)  how far its ends have gone with the last iteration of the step
     stride    (m,)    the part of the way to where they seem to be that they go: half the last one's, or less, after
               turning about
@@ -70,6 +73,7 @@ class FacePoints:
     held: np.ndarray
     shortest: np.ndarray
     apart: np.ndarray
+    bends: np.ndarray
     went: np.ndarray
     stride: np.ndarray
 
@@ -85,12 +89,12 @@ class FacePoints:
         bare: np.ndarray,
         holds: np.ndarray,
         least: np.ndarray,
-        bends: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        give: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> FacePoints | None:
         """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
         blocks, 0 for neither, last known to press by ``normal`` N and to be ``bare`` of touch
         from their corners on, ``holds`` a bond that may pull, ``least`` m of face
-        that the stiffness is at least that of; ``bends(ends, length)`` the ``apart`` of bonds. None without any."""
+        that the stiffness is at least that of; ``give(ends, length)`` the ``apart`` of bonds. None without any."""
         some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
         if len(some) < 2:
             return None
@@ -109,12 +113,14 @@ class FacePoints:
         apart, glued = np.full(len(ends), _GAUSS), stiff[ends[:, 0]] == 2
         if glued.any():
             shortest[glued] = 1.0
-            apart[glued] = bends(ends[glued], length[glued])
+            apart[glued] = give(ends[glued], length[glued])
             some = apart < _AT_CORNERS
-            ends, length, held, shortest, apart = ends[some], length[some], held[some], shortest[some], apart[some]
+            ends, length, held, shortest, apart, glued = (
+                each[some] for each in (ends, length, held, shortest, apart, glued)
+            )
         part = _left(bare[ends], _pressed(normal[ends], held, shortest), held, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))
-        return cls(ends, geometry, length, part, held, shortest, apart, still, full)
+        return cls(ends, geometry, length, part, held, shortest, apart, glued, still, full)
 
     def pressed_by(self, normal: np.ndarray) -> FacePoints:
         """The same faces on the parts that forces ``normal`` (n,) N at the corners press on."""
@@ -180,6 +186,25 @@ class FacePoints:
         out[near, 5:7] = vertex + share[..., None] * (sense * along[:, None] - foot)
         out[:, 3] = self.between_corners(self.corners[:, 3])
         out[near, 4] = (0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length)[:, None]
+        return out
+
+    def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
+        """Let both springs of faces that bend feel the motion along the middle of the face, in place: ``vectors`` (n, 2,
+        12) as `contact_vectors` has them, ``block`` (n,) that of the vertex."""
+        if not self.bends.any():
+            return
+        one, two = self.ends[self.bends].T
+        # Seen from the other block, whose edge runs the other way, the sides are exchanged and the motion is the same.
+        swapped = (block[one] != block[two])[:, None]
+        along, other = vectors[one, 1], vectors[two, 1]
+        mean = 0.5 * (along + np.where(swapped, np.roll(other, 6, axis=1), other))
+        vectors[one, 1], vectors[two, 1] = mean, np.where(swapped, np.roll(mean, 6, axis=1), mean)
+
+    def along_faces(self, value: np.ndarray) -> np.ndarray:
+        """(n,) of motion along the edges, ``value`` (n,) at the corners, as the springs feel it."""
+        out = self.between_corners(value)
+        ends = self.ends[self.bends]
+        out[ends] = out[ends].mean(axis=1, keepdims=True)
         return out
 
     def springs(self, lumped: Springs, stiff_in_shear: np.ndarray) -> Springs:
@@ -271,21 +296,32 @@ class FacePoints:
 
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
-def give_by_bending(owner, across, vertices, start, area, modulus, bends):
-    """(m,) rad/(N m): what half of the block ``owner`` (m,) turns by behind a face across the normal ``across`` (m, 2)
-    that spans it, 6 d/(E' w³), d = area over the width w along the face; 0 for blocks that do not bend. A face that is
-    shorter than the block is wide turns the whole of that width."""
+def give_by_bending(owner, across, point, vertices, following, start, modulus, bends):
+    """(m,) rad/(N m): what the block ``owner`` (m,) turns by behind the face across the normal ``across`` (m, 2) through
+    ``point`` (m, 2), h / (E' I / 2h) with its second moment I along the face and the distance h from its centroid; 0 for
+    blocks that do not bend. ``vertices`` (n, 2), the next of each ``following`` (n,), those of a block from ``start`` on,
+    its ``modulus`` Pa. (A face that is shorter than the block is wide turns the whole of that width.)"""
     out = np.zeros(owner.shape[0])
     for f in range(owner.shape[0]):
         b = owner[f]
         if not bends[b]:
             continue
-        low, high = np.inf, -np.inf
+        nx, ny = across[f, 0], across[f, 1]
+        area = first = second = far = 0.0
         for v in range(start[b], start[b + 1]):
-            along = across[f, 0] * vertices[v, 1] - across[f, 1] * vertices[v, 0]
-            low, high = min(low, along), max(high, along)
-        width = high - low
-        out[f] = 6.0 * area[b] / (modulus[b] * width**4)
+            w = following[v]
+            # Along the face and away from it.
+            s = (vertices[v, 1] - point[f, 1]) * nx - (vertices[v, 0] - point[f, 0]) * ny
+            d = (vertices[v, 0] - point[f, 0]) * nx + (vertices[v, 1] - point[f, 1]) * ny
+            r = (vertices[w, 1] - point[f, 1]) * nx - (vertices[w, 0] - point[f, 0]) * ny
+            e = (vertices[w, 0] - point[f, 0]) * nx + (vertices[w, 1] - point[f, 1]) * ny
+            cross = d * r - s * e
+            area += cross / 2
+            far += cross * (d + e) / 6
+            first += cross * (s + r) / 6
+            second += cross * (s * s + s * r + r * r) / 12
+        height = far / area
+        out[f] = 2.0 * height * height / (modulus[b] * (second - first * first / area))
     return out
 
 

@@ -402,7 +402,7 @@ def settle(
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
     equations = _Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics)
-    states = _States(*((found.state, found.direction) if found.tried is None else found.tried), found.bonded)
+    states = _States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
     normal_force, slip = found.normal, np.zeros(len(found))
     seen: set[bytes] = set()
     offered: set[bytes] = set()

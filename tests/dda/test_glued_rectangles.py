@@ -47,8 +47,8 @@ def test_a_cantilever_of_bricks_sags_as_timoshenkos():
     # Held at the corners of their faces these bricks sag 0.016, 0.024 and 0.05 of what they should.
     # Bricks two metres long see the moment at five places only; second order.
     assert one == pytest.approx([0.060, 0.0134, 0.0019], abs=1e-3)
-    # Courses hold each other's stretch along their beds as well: second order, from the stiff side.
-    assert more == pytest.approx([-0.100, -0.057, -0.032], abs=2e-3)
+    # Courses leave each other's stretch along their beds free. Springs of 40 E' give 1/80 of what bricks do.
+    assert more == pytest.approx([1 / 80] * 3, abs=4e-3)
 
 
 def bricks_in_bond(columns: int, rows: int, **settings) -> dda.BlockSystem:
@@ -81,7 +81,7 @@ def test_bricks_in_bond_are_too_stiff_by_a_part_that_falls_with_their_size():
         "; twice as long",
         np.round(long, 3),
     )
-    assert square == pytest.approx([0.783, 0.907], abs=5e-3) and long == pytest.approx([0.399, 0.598], abs=5e-3)
+    assert square == pytest.approx([0.943, 0.984], abs=5e-3) and long == pytest.approx([0.547, 0.739], abs=5e-3)
     # Between first and second order.
     assert 1 - square[1] < 0.5 * (1 - square[0])
 
@@ -97,7 +97,7 @@ def test_bricks_in_bond_bend_as_a_beam_does_the_more_of_them_there_are():
     missed = np.array([1 - sag(bricks_in_bond(8 * n, n, **stiff), weight) / beam for n in (4, 8, 16)])
     orders = np.log2(missed[:-1] / missed[1:])
     print("sag missed in 4, 8, 16 courses:", np.round(missed, 4), "; orders", np.round(orders, 2))
-    assert 0 < missed[-1] < 0.015 and orders[0] > 1.4 and orders[1] > 1.75
+    assert 0 < missed[-1] < 0.006 and orders[0] > 1.25 and orders[1] > 1.75
 
 
 def test_pure_bending_turns_as_curvature_says():
