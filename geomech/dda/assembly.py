@@ -368,10 +368,10 @@ def assemble_contacts(
 
 
 def solve(
-    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0
+    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, beside: bool = False
 ) -> np.ndarray:
-    """Unknowns (6 n,) in the pattern's order; ``force`` as for `BlockSolver.solve`. Overwrites ``data`` when dense.
-    Raises numpy.linalg.LinAlgError."""
+    """Unknowns (6 n,) in the pattern's order; ``force`` as for `BlockSolver.solve`; ``beside``: see there. Overwrites
+    ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
@@ -385,4 +385,5 @@ def solve(
         if info != 0:
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
-    return pattern.solver.solve(data, right, force=force)
+    solver = pattern.solver.beside if beside else pattern.solver
+    return solver.solve(data, right, force=force)

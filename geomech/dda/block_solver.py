@@ -20,6 +20,7 @@ from numba import njit
 
 from ..compiled import kept
 from .directions import Directions
+from .dissection import Tree
 from .multifrontal import Factors
 from .shared_tasks import add_at_once, await_value, crew
 from .work import Work
@@ -145,20 +146,21 @@ class BlockSolver:
     """Solves A x = b for one pattern of 6×6 blocks and matrices that change from time to time.
 
     ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
-    triangles and the diagonal, sorted by row then column. The order of elimination is internal. ``counts`` tells what
-    was done; ``work`` counts it beside that of other solvers.
+    triangles and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree``
+    already planned for the same pattern. ``counts`` tells what was done; ``work`` counts it beside that of other solvers.
     """
 
-    def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray):
+    def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, tree: Tree | None = None):
         self.n = len(points)
         self.keys = rows * self.n + columns
         self.pointer, self.columns = np.searchsorted(rows, np.arange(self.n + 1)), columns
         self._diagonal = np.flatnonzero(rows == columns)
         self._pattern = points, rows, columns
-        self._factors = Factors(points, rows, columns, np.float32 if self.n >= SINGLE else np.float64)
+        self._factors = Factors(points, rows, columns, np.float32 if self.n >= SINGLE else np.float64, tree)
         self._factored = np.empty((self.n, 36))
         self._has_factors = False
         self._rough: Factors | None = None
+        self._beside: BlockSolver | None = None
         self._rough_serves = True
         # Those of rough solutions serve until the next matrix, whatever is solved between.
         self._directions, self._shown = (Directions(6 * self.n, most) for most in (max(TRIES, TRIES_OF_FEW), TRIES))
@@ -170,6 +172,17 @@ class BlockSolver:
     def in_parts(self) -> bool:
         """Whether a matrix that differs in some blocks from the last is factored for a part of the price."""
         return self._factors.tree.kept
+
+    @property
+    def beside(self) -> BlockSolver:
+        """A solver of the same pattern for matrices of another kind, that come by turns with this one's: the factors of
+        each are made anew in part. This one where that is not done."""
+        if not self.in_parts:
+            return self
+        if self._beside is None:
+            self._beside = BlockSolver(*self._pattern, self._factors.tree)
+            self._beside.work, self._beside.counts = self.work, self.counts
+        return self._beside
 
     def holds(self, keys: np.ndarray) -> bool:
         """Whether the pattern has the blocks ``keys`` = row · n + column."""

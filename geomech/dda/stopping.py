@@ -122,7 +122,8 @@ def stop(
             found.other, pattern.order, vectors, state, np.ones(n), nothing, springs.normal, springs.shear, nothing,
             push, nothing, pull,
         )  # fmt: skip
-        change = assembly.solve(pattern, data, side, True).reshape(-1, 6)
+        # A matrix without friction: of a step's it has hardly a block, of the last step's own nearly all.
+        change = assembly.solve(pattern, data, side, True, beside=True).reshape(-1, 6)
         moved = _moved(found, rows, pattern.order, vectors, change)
         force = np.where(given, push[rows], pull[rows] - springs.shear[rows] * moved)
         total = resisted - sense * force

@@ -300,3 +300,24 @@ def test_what_large_forces_leave_when_they_cancel_is_solved_to_their_round_off(m
     rest = right - full(rows, columns, data, 600) @ x
     assert 0 < np.abs(rest).max() <= 1e-12 * force
     assert np.abs(x - exact).max() <= 1e-3 * np.abs(exact).max()
+
+
+def test_matrices_of_two_kinds_that_come_by_turns_are_each_factored_in_part(monkeypatch):
+    points, rows, columns, data = springs_between(300, seed=3)
+    right = np.random.default_rng(5).normal(size=1800)
+    solver, other = BlockSolver(points, rows, columns), data * np.where(rows == columns, 3.0, 1.0)[:, None, None]
+    solver.solve(data.ravel(), right)
+    solver.beside.solve(other.ravel(), right)
+    assert solver.counts == {"factorisations": 2, "shares": 2.0, "substitutions": solver.counts["substitutions"]}
+    for at in np.flatnonzero(rows == columns)[[7, 150]]:
+        data[at] *= 1.5
+        other[at] *= 1.5
+        solver.solve(data.ravel(), right)
+        x = solver.beside.solve(other.ravel(), right)
+    assert solver.counts["factorisations"] == 6 and solver.counts["shares"] < 4.0
+    expected = splu(full(rows, columns, other, 300).tocsc()).solve(right)
+    assert np.abs(x - expected).max() <= 1e-8 * np.abs(expected).max()
+    # Where factors are made anew in full, one set has the memory.
+    monkeypatch.setattr(dissection, "KEPT", 0)
+    large = BlockSolver(points, rows, columns)
+    assert large.beside is large
