@@ -169,26 +169,28 @@ class ContactFinder:
         if broken is not None:
             inside = inside & ~np.isin(vertex * len(vertices) + edge, broken)
 
-        def apart(ends, length):
+        def softened(ends, length):
             """Part of its length that the springs of a face are apart: they give by its rotation what its blocks would
-            bend."""
+            bend; and the part of their stiffness that they have."""
             across, point = found.geometry[ends[:, 0], 1:3], found.geometry[ends[:, 0], 5:7]
-            give = sum(
+            behind = [
                 give_by_bending(
                     owner[ends[:, 0]], across, point, vertices, self._next, self._start, self._modulus, self._bends
                 )
                 for owner in (block, other)
-            )
+            ]
+            share = np.minimum(1.0, length / np.maximum(length, np.maximum(behind[0][:, 1], behind[1][:, 1])))
+            give = behind[0][:, 0] + behind[1][:, 0]
             # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold
             # it.
             give[self._rigid[block[ends[:, 0]]] | self._rigid[other[ends[:, 0]]]] = 0.0
-            own = 2.0 / (springs.normal[ends[:, 0]] * length**2)
-            return np.sqrt(own / np.maximum(own, give))
+            own = 2.0 / (share * springs.normal[ends[:, 0]] * length**2)
+            return np.sqrt(own / np.maximum(own, give)), share
 
         def placed(inside):
             return FacePoints.of(
                 block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
-                (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), apart,
+                (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), softened,
             )  # fmt: skip
 
         points = placed(inside)
@@ -337,12 +339,14 @@ def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarr
     nowhere."""
     if stood is None:
         return replace(found, inset=inset)
-    gap = found.geometry[:, 3]
-    spring = stood.at_corners(-stood.between_corners(found.gap_before))
+    gap, full = found.geometry[:, 3], found.springs
+    soft, before = stood.springs(full, np.zeros(len(gap), bool)), stood.between_corners(found.gap_before)
+    spring = stood.at_corners(-soft.normal * before) / full.normal
     closed = (found.state != OPEN) | (found.bonded > 0)
     told = np.where(closed, gap + spring, np.minimum(gap, 0.0))
     # Blocks that were bent by the moment on their faces, as springs inside these are, are bent no more.
-    bent = 0.5 * found.springs.normal * (stood.between_corners(found.gap_before) ** 2 - spring**2)
+    bent = 0.5 * (soft.normal * before**2 - full.normal * spring**2)
+    bent += 0.5 * found.shear**2 * (1.0 / soft.shear - 1.0 / full.shear)
     return replace(
         found, lift=np.where(out, told, found.lift), inset=inset, unbent=float(bent[out & closed].sum())
     )  # fmt: skip

@@ -22,7 +22,9 @@ block that bends is stretched along its faces by a strain that changes across it
 springs that held the faces at two places along each other would hold that. So bricks in courses, bricks laid in bond
 and cells of any shape glued together bend as a beam does, the better the more of them there are; otherwise they lock:
 between displacements that agree at the corners and are linear in every block, none bends. A triangle's three do not
-lock.
+lock. Their springs are as stiff as a part ℓ/w of the solver's, w = √(12 I / A) the width of the block along the face:
+under one stress all faces of a block then give as much. Springs as stiff on a short face as on a long one would bear by
+what those beside them give, many times the stress of the rock, and break the bond under a part of what it holds.
 
 Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and
 moment, and bring the same stress. (What a state carries over of shear is that of the springs.)
@@ -61,6 +63,7 @@ class FacePoints:
     shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
     apart     (m,)    distance of the two springs, in parts of the part
     bends     (m,)    bonds that give as their blocks would bend: along the face both springs stand in its middle
+    share     (m,)    the part of the stiffness at the corners that its springs have
     went      (m, 2)  how far its ends have gone with the last iteration of the step
     stride    (m,)    the part of the way to where they seem to be that they go: half the last one's, or less, after
               turning about
@@ -74,6 +77,7 @@ class FacePoints:
     shortest: np.ndarray
     apart: np.ndarray
     bends: np.ndarray
+    share: np.ndarray
     went: np.ndarray
     stride: np.ndarray
 
@@ -89,12 +93,13 @@ class FacePoints:
         bare: np.ndarray,
         holds: np.ndarray,
         least: np.ndarray,
-        give: Callable[[np.ndarray, np.ndarray], np.ndarray],
+        softened: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
     ) -> FacePoints | None:
         """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
         blocks, 0 for neither, last known to press by ``normal`` N and to be ``bare`` of touch
         from their corners on, ``holds`` a bond that may pull, ``least`` m of face
-        that the stiffness is at least that of; ``give(ends, length)`` the ``apart`` of bonds. None without any."""
+        that the stiffness is at least that of; ``softened(ends, length)`` the ``apart`` and
+        ``share`` of bonds. None without any."""
         some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
         if len(some) < 2:
             return None
@@ -110,17 +115,17 @@ class FacePoints:
             return None
         ends, length = ends[whole], length[whole]
         held, shortest = holds[ends].all(axis=1), np.minimum(2 * least[ends].max(axis=1) / length, 1.0)
-        apart, glued = np.full(len(ends), _GAUSS), stiff[ends[:, 0]] == 2
+        apart, share, glued = np.full(len(ends), _GAUSS), np.ones(len(ends)), stiff[ends[:, 0]] == 2
         if glued.any():
             shortest[glued] = 1.0
-            apart[glued] = give(ends[glued], length[glued])
-            some = apart < _AT_CORNERS
-            ends, length, held, shortest, apart, glued = (
-                each[some] for each in (ends, length, held, shortest, apart, glued)
+            apart[glued], share[glued] = softened(ends[glued], length[glued])
+            some = (apart < _AT_CORNERS) | (share < _AT_CORNERS)
+            ends, length, held, shortest, apart, share, glued = (
+                each[some] for each in (ends, length, held, shortest, apart, share, glued)
             )
         part = _left(bare[ends], _pressed(normal[ends], held, shortest), held, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))
-        return cls(ends, geometry, length, part, held, shortest, apart, glued, still, full)
+        return cls(ends, geometry, length, part, held, shortest, apart, glued, share, still, full)
 
     def pressed_by(self, normal: np.ndarray) -> FacePoints:
         """The same faces on the parts that forces ``normal`` (n,) N at the corners press on."""
@@ -213,10 +218,12 @@ class FacePoints:
         ratio = np.ones(len(self.corners))
         lengths = 0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length
         ratio[self.ends] = lengths[:, None] / self.corners[self.ends, 4]
+        share = np.ones(len(self.corners))
+        share[self.ends] = self.share[:, None]
         return replace(
             lumped,
-            normal=lumped.normal * ratio,
-            shear=np.where(stiff_in_shear, lumped.shear * ratio, lumped.shear),
+            normal=lumped.normal * ratio * share,
+            shear=np.where(stiff_in_shear, lumped.shear * ratio, lumped.shear * share),
             cohesion=lumped.cohesion * ratio,
             tension=lumped.tension * ratio,
         )
@@ -297,11 +304,11 @@ class FacePoints:
 
 @njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
 def give_by_bending(owner, across, point, vertices, following, start, modulus, bends):
-    """(m,) rad/(N m): what the block ``owner`` (m,) turns by behind the face across the normal ``across`` (m, 2) through
-    ``point`` (m, 2), h / (E' I / 2h) with its second moment I along the face and the distance h from its centroid; 0 for
-    blocks that do not bend. ``vertices`` (n, 2), the next of each ``following`` (n,), those of a block from ``start`` on,
+    """(m, 2): what the block ``owner`` (m,) turns by (rad/(N m)) behind the face across the normal ``across`` (m, 2)
+    through ``point`` (m, 2), h / (E' I / 2h) with its second moment I along the face and the distance h from its
+    centroid; and its width along the face, √(12 I / A) (m); 0 for blocks that do not bend. ``vertices`` (n, 2), the next of each ``following`` (n,), those of a block from ``start`` on,
     its ``modulus`` Pa. (A face that is shorter than the block is wide turns the whole of that width.)"""
-    out = np.zeros(owner.shape[0])
+    out = np.zeros((owner.shape[0], 2))
     for f in range(owner.shape[0]):
         b = owner[f]
         if not bends[b]:
@@ -320,8 +327,9 @@ def give_by_bending(owner, across, point, vertices, following, start, modulus, b
             far += cross * (d + e) / 6
             first += cross * (s + r) / 6
             second += cross * (s * s + s * r + r * r) / 12
-        height = far / area
-        out[f] = 2.0 * height * height / (modulus[b] * (second - first * first / area))
+        height, inertia = far / area, second - first * first / area
+        out[f, 0] = 2.0 * height * height / (modulus[b] * inertia)
+        out[f, 1] = np.sqrt(12.0 * inertia / area)
     return out
 
 

@@ -81,7 +81,7 @@ def test_parts_that_go_back_and_forth_with_their_neighbours_come_to_rest(gain):
     rest, n = 0.5, 0
     faces = FacePoints(
         np.array([[0, 1]]), np.zeros((2, 7)), np.ones(1), np.array([[0.0, 0.6]]), np.zeros(1, bool), np.full(1, 0.05),
-        np.full(1, 3**-0.5), np.zeros(1, bool), np.zeros((1, 2)), np.ones(1),
+        np.full(1, 3**-0.5), np.zeros(1, bool), np.ones(1), np.zeros((1, 2)), np.ones(1),
     )  # fmt: skip
     while faces is not None and n < 8:
         last, n = faces, n + 1

@@ -119,7 +119,7 @@ def test_cells_on_stiff_glue_are_the_rock_they_were_cut_from(cells, most, mean):
         modulus, poisson = -STRESS / strain[1] / MODULUS_2D - 1, -strain[0] / strain[1] / POISSON_2D - 1
         errors.append((modulus, *off(stress)))
         print(f"{penalty:g} E': E off by {modulus:.1e}, nu by {poisson:.1e}, stress at most {errors[-1][1]:.1e}")
-        assert -0.5 / penalty < modulus < 0 and abs(poisson) < 1 / penalty
+        assert -0.7 / penalty < modulus < 0 and abs(poisson) < 1 / penalty
     assert errors[0][1] < most and errors[0][2] < mean
     assert errors[1][2] < 0.4 * errors[0][2]
 
@@ -198,7 +198,7 @@ def sag(cells: list[np.ndarray]) -> float:
 def test_a_cantilever_of_hexagons_bends_as_a_beam_the_more_of_them_there_are():
     sags = [sag(hexagons(LENGTH, DEPTH, rows)) for rows in (2, 4)]
     print("sag over a beam's, 2 and 4 rows of hexagons:", np.round(sags, 3))
-    assert sags == pytest.approx([0.763, 0.902], abs=5e-3)
+    assert sags == pytest.approx([0.768, 0.910], abs=3e-3)
 
 
 @pytest.mark.slow
@@ -206,13 +206,61 @@ def test_a_cantilever_of_cells_bends_as_a_beam_the_more_of_them_there_are():
     """One strain a cell bends too little, the less the smaller they are: about as the size to the power 1.5, from cells
     that are all alike to any."""
     for name, cells, missed in (
-        ("hexagons", lambda rows: hexagons(LENGTH, DEPTH, rows), 0.03),
-        ("even cells", lambda rows: voronoi(8 * rows**2, LENGTH, DEPTH, even=8), 0.04),
-        ("random cells", lambda rows: voronoi(8 * rows**2, LENGTH, DEPTH), 0.12),
+        ("hexagons", lambda rows: hexagons(LENGTH, DEPTH, rows), 0.025),
+        ("even cells", lambda rows: voronoi(8 * rows**2, LENGTH, DEPTH, even=8), 0.025),
+        ("random cells", lambda rows: voronoi(8 * rows**2, LENGTH, DEPTH), 0.07),
     ):
         sags = np.array([sag(cells(rows)) for rows in (2, 4, 8)])
         print(f"{name}: sag over a beam's, 2, 4 and 8 deep:", np.round(sags, 3))
         assert (np.diff(sags) > 0).all() and 1 - sags[-1] < missed and 1 - sags[2] < 0.45 * (1 - sags[1])
+
+
+# -- strength ----------------------------------------------------------------------------------------------------------
+
+
+def first_to_break(cells: list[np.ndarray], penalty: float, parts: tuple[float, ...]) -> list[bool]:
+    """Whether all glue holds at these parts of the pull σ n_y² = σ_t on the face that looks most along it."""
+    strength = 2e6
+    steepest = 0.0
+    for cell in cells:
+        a, b = cell, np.roll(cell, -1, axis=0)
+        inside = ~((a[:, 1] == b[:, 1]) & np.isin(a[:, 1], (0.0, HEIGHT)))
+        along = (b - a)[inside] / np.hypot(*(b - a)[inside].T)[:, None]
+        steepest = max(steepest, float((along[:, 0] ** 2).max()))
+    stiff = {"normal_penalty": penalty * MODULUS_2D, "shear_penalty": penalty * MODULUS_2D}
+    glue = JointLaw("glue", 0.5, 1e12, strength)
+    system = specimen(cells, glue, **stiff)
+    # Pulled at both ends, without the floor.
+    free = dda.BlockSystem(
+        system.blocks, system.materials, [glue], lambda a, b: None if "floor" in (a, b) else 0, system.settings
+    )
+
+    def holds(pull: float) -> bool:
+        ends = tuple(
+            EdgeTraction(name, History.constant([0.0, sign * pull])) for name, sign in (("top", 1), ("bottom", -1))
+        )
+        rows = free.step(State.at_rest(system.blocks), Loads(edge_tractions=ends), 0.1).contacts
+        return bool((rows["bonded"][rows["length"] > 0] == 1).all())
+
+    return [holds(part * strength / steepest) for part in parts]
+
+
+def test_hexagons_break_at_the_strength_of_their_glue():
+    # Springs of 40 E' let faces of different lengths bear 1.3 % more or less than their share.
+    assert first_to_break(hexagons(WIDTH, HEIGHT, 4), 40.0, (0.98, 1.01)) == [True, False]
+
+
+def test_voronoi_cells_hold_until_the_strength_of_their_glue():
+    """As stiff on a short face as on a long one the springs would bear many times the stress of the rock there: random
+    cells would break at less than a fifth of what they hold."""
+    assert first_to_break(voronoi(40, WIDTH, HEIGHT, even=3), 40.0, (0.84,)) == [True]
+    assert first_to_break(voronoi(40, WIDTH, HEIGHT, even=3), 400.0, (0.98,)) == [True]
+    assert first_to_break(voronoi(40, WIDTH, HEIGHT), 40.0, (0.7,)) == [True]
+
+
+@pytest.mark.slow
+def test_voronoi_cells_break_at_the_strength_of_their_glue():
+    assert first_to_break(voronoi(40, WIDTH, HEIGHT, even=3), 400.0, (0.98, 1.01)) == [True, False]
 
 
 def test_a_cantilever_of_cells_breaks_and_falls_with_its_energy():
