@@ -323,7 +323,7 @@ class Attempt:
     def _move(self) -> None:
         """Blocks are moved; their velocities, stresses and accelerations at the end."""
         scheme, found, dt = self.system.scheme, self.found, self.dt
-        state, carried, actions = self.state, self.carried, self.actions
+        carried, actions = self.carried, self.actions
         increment = self._increment(self.unknowns)
         imposed = None if actions is None else actions.imposed
         self.new_vertices, velocity, self.new_stress, self.new_crack, self.largest = self._advanced(increment)
@@ -332,7 +332,8 @@ class Attempt:
             self.edges = np.concatenate([self.edges, absorbed])
             self.load = self.load + self.middle.loads_back(generalised(self.points[:0], absorbed, self.middle.centroid))
         acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
-        velocity, self.kept = scheme.corrected(velocity, state.acceleration, acceleration, increment[:, 2], dt)
+        before = self._remembered(acceleration)
+        velocity, self.kept = scheme.corrected(velocity, before, acceleration, increment[:, 2], dt)
         if self.heavier != 1.0:
             acceleration = 2.0 * self.heavier * (increment - self.begun * dt) / (dt * dt)
         self.slid = sliding(self.vectors, self.settled.unknowns, self.order, found.block, found.other)
@@ -344,6 +345,24 @@ class Attempt:
         self.increment, self.velocity, self.acceleration = increment, velocity, acceleration
         if not scheme.static and self.n_free:
             self._stop(imposed)
+
+    def _remembered(self, mean: np.ndarray) -> np.ndarray | None:
+        """(n_blocks, 6) the acceleration that the step began with, as far as it still holds; None before there is any.
+
+        Where a contact has opened or closed it tells of forces that are gone, or not of those that have come, and what
+        a spring makes of it that the step does not resolve, k dt² > m, is noise that can grow from bounce to bounce:
+        there the ``mean`` of the step stands for it, with which no step gains energy."""
+        before, system = self.state.acceleration, self.system
+        if before is None or system.scheme.alpha or not system.scheme.memory:
+            return before
+        found, closed = self.found, self.settled.state != OPEN
+        changed = np.where(closed, (found.state == OPEN) & (found.gap_before >= 0.0), found.state != OPEN)
+        stiffness = np.where(closed, found.springs.normal, 0.0) * self.dt**2
+        before = before.copy()
+        for blocks in (found.block, found.other):
+            forgets = blocks[changed | (stiffness > system.mass[blocks])]
+            before[forgets] = mean[forgets]
+        return before
 
     def _stop(self, imposed) -> None:
         """Take the sliding that friction has stopped in the step off the velocity; the energy (J/m) that this takes."""

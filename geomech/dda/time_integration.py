@@ -12,10 +12,15 @@ springs, blocks' own included): it never grows. A contact counts at the start of
 not at all if its weighted force would pull; met or left within a step it loses energy besides, after the idea of Kane,
 Repetto, Ortiz & Marsden (1999), that what comes and goes must act implicitly.
 
+With 2β > γ an acceleration is kept. What it remembers of a contact that has come, gone, or is stiffer than the step
+resolves tells of another force than acts, and is left out (`attempt`). In free flight it still exchanges energy with
+vibrations as dt changes: from β > γ − ¼ on, by more than γ damps, so that dropped blocks rise higher than they fell from
+(sixty times as high with β = γ = ½). Such choices are refused.
+
 What γ > ½ damps, springs, stress and loads that change with time, is followed to the first order in dt, as Newmark's
 family is bound to be. Where blocks turn, forces act in the middle of the step (`middle`): γ = 2β follows that motion to
-the second order, whatever γ; any other choice leaves (γ − 2β) dt of the acceleration's change in the velocity, v̇ = a +
-(γ − 2β) dt ȧ. Second order and damping together: the α-scheme.
+the second order, whatever γ; any other choice leaves (γ − 2β) dt of the change of an acceleration that is kept in the
+velocity, v̇ = a + (γ − 2β) dt ȧ. Second order and damping together: the α-scheme.
 
 The α-scheme of Wood, Bossak & Zienkiewicz (1981), (1−α) a₁ + α a₀ = M⁻¹ f₁ with all forces f₁ at the end of the step,
 damps what the step does not resolve and leaves the rest alone: with the constants of Chung & Hulbert (1993), α =
@@ -61,6 +66,11 @@ class TimeScheme:
         """At which part of the step its forces have their places and directions: the α-scheme's are those of its
         end."""
         return 1.0 if self.alpha else 0.5
+
+    @property
+    def keeps(self) -> bool:
+        """Whether an acceleration is kept from step to step."""
+        return self.alpha or self.memory != 0.0
 
     @classmethod
     def of(cls, settings: DdaSettings) -> TimeScheme:
@@ -116,7 +126,7 @@ class TimeScheme:
         """Velocity with what the acceleration ``before`` the step (None: that of the step) has to say, and the
         acceleration after it; None where the scheme keeps none. All (n_blocks, 6); ``mean`` ā on the axes before the
         step, ``turn`` (n_blocks,) rad the rotation over it, which ``velocity`` has made already."""
-        if self.memory == 0.0 and not self.alpha:
+        if not self.keeps:
             return velocity, None
         before = mean if before is None else before
         change = turned(before - mean, turn)

@@ -27,10 +27,10 @@ class DdaSettings:
     adds multipliers to these springs until closed contacts gape and sticking ones give by less than
     ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``dynamic_factor`` multiplies the
     velocity carried from step to step: 0 is static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1)
-    is Shi's, (¼, ½) the trapezoidal rule, which has no dissipation; in between it has some; 2β ≥ γ ≥ ½. With γ > ½ it
+    is Shi's, (¼, ½) the trapezoidal rule, which has no dissipation; in between it has some; 2β ≥ γ ≥ ½, β ≤ γ − ¼. With γ > ½ it
     is of first order (of second for what only falls and turns, if γ = 2β). ``spectral_radius`` ϱ of 0 to 1 puts the
     α-scheme of Wood, Bossak & Zienkiewicz in its place, of second order, which damps by ϱ a step what the step does not
-    resolve. ``damping`` is the fraction of critical damping of a block's own lowest vibration, and of its contacts'
+    resolve; near 1 blocks that bounce may gain energy. ``damping`` is the fraction of critical damping of a block's own lowest vibration, and of its contacts'
     (dynamic steps only): below about 0.3 a block that should stick may flutter on its friction and creep, waves that
     cross many blocks want less; ``rayleigh_mass`` 1/s and ``rayleigh_stiffness``
     s damp blocks by α M + β K besides (`rayleigh_coefficients` finds them). ``max_displacement_ratio`` bounds the
@@ -70,6 +70,11 @@ class DdaSettings:
             raise ValueError(
                 f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step, and contact springs are far "
                 "stiffer than steps resolve: it takes 2β ≥ γ ≥ ½ (trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
+            )
+        if beta > max(gamma - 0.25, 0.5 * gamma) * (1 + 1e-12):
+            raise ValueError(
+                f"Newmark's β = {beta:g}, γ = {gamma:g} keeps more in its accelerations than it damps, and blocks that "
+                "bounce gain energy: it takes β ≤ γ − ¼ (trapezoidal rule 0.25, 0.5; Shi's scheme 0.5, 1)"
             )
 
 

@@ -103,14 +103,14 @@ def test_the_alpha_scheme_follows_a_block_that_turns_to_second_order(radius):
 
 
 @pytest.mark.parametrize("newmark", [(1.0, 1.5), (0.75, 1.0), (0.5, 0.75)])
-def test_newmarks_scheme_off_gamma_2_beta_is_late_by_that_of_a_step(newmark):
-    """v̇ = a + (γ − 2β) dt ȧ, from steps of two lengths by Richardson's extrapolation."""
+def test_newmarks_scheme_off_gamma_2_beta_follows_a_block_that_turns_as_well_as_one_on_it(newmark):
+    """The acceleration kept would be late by (γ − 2β) dt ȧ; of contacts that steps do not resolve none is kept."""
     beta, gamma = newmark
     exact, dt = pivot(0.1), 5e-3
-    found = [(pivoting(step, 0.1, newmark=newmark) - exact) / step for step in (dt, 0.5 * dt)]
-    foreseen = (pivot(0.1, (gamma - 2 * beta) * 1e-4) - exact) / 1e-4
-    print(f"{newmark}: angle and speed off by {found[0]}, {found[1]} of dt, foreseen {foreseen}")
-    assert 2 * found[1] - found[0] == pytest.approx(foreseen, rel=0.03)
+    late = np.abs(pivot(0.1, (gamma - 2 * beta) * dt) / exact - 1)
+    missed = np.array([np.abs(pivoting(step, 0.1, newmark=newmark) / exact - 1) for step in (dt, 0.5 * dt)])
+    print(f"{newmark}: angle and speed off by {missed.tolist()}, would be late by {late}")
+    assert (missed[0] < 0.1 * late).all() and missed[0].max() < 7e-5 and missed[1].max() < 7e-5
 
 
 @pytest.mark.parametrize("settings", [{}, {"contact": "augmented"}], ids=["springs", "multipliers"])

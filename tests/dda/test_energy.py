@@ -161,7 +161,7 @@ def test_the_geometry_update_is_all_that_is_left_of_the_budget_of_a_wall_that_fa
     ("law", "settings"),
     [
         (JointLaw("joint", 0.6), {"newmark": (0.25, 0.5)}),
-        (JointLaw("joint", 0.6), {"newmark": (0.36, 0.6), "damping": 0.0}),
+        (JointLaw("joint", 0.6), {"newmark": (0.35, 0.6), "damping": 0.0}),
         (JointLaw("joint", 0.6), {"rayleigh_mass": 2.0, "rayleigh_stiffness": 1e-5}),
         (JointLaw("joint", 0.6), {"contact": "augmented", "normal_penalty": 1e10}),
         (JointLaw("dilates", 0.6, dilation_angle=0.1), {}),

@@ -210,6 +210,26 @@ def test_schemes_that_keep_an_acceleration_gain_no_energy_from_a_bounce(newmark,
     assert 0 < top < 2500.0 * 9.81 * 0.001
 
 
+@pytest.mark.parametrize("newmark", [(0.5, 0.75), (1.0, 1.25), (0.3, 0.55)])
+@pytest.mark.parametrize("damping", [0.0, 0.4])
+def test_steps_that_do_not_resolve_a_bounce_never_throw_the_block_higher(newmark, damping):
+    """On springs of 40 E' an impact is over within a step. With the accelerations of impacts kept, a block rose to 5 times
+    its height with β, γ = 1, 1.25, to 60 times with ½, ½."""
+    blocks = Blocks.from_polygons([rectangle(-3, -1, 3, 0), rectangle(0, 0.02, 1, 1.02)], fixed=[True, False])
+    rock = Material("rock", 5e9, 0.25, density=2600.0)
+    settings = DdaSettings(dynamic_factor=1.0, damping=damping, newmark=newmark)
+    system = dda.BlockSystem(blocks, [rock], [JointLaw("joint", 0.5)], settings=settings)
+    state, start, most = State.at_rest(blocks), 2600.0 * 9.81 * 0.02, 0.0
+    for _ in range(200):
+        result = system.step(state, Loads(gravity=History.constant([0.0, -9.81])), 0.01)
+        state = result.state
+        height = state.vertices[4:, 1].mean() - 0.5
+        stored = sum(result.statistics[f"{kind}_energy"] for kind in ("kinetic", "elastic", "contact"))
+        most = max(most, (stored + 2600.0 * 9.81 * height) / start)
+    print(f"β, γ = {newmark}, damping {damping}: {most:.6f} of the energy at most, {state.time:.2f} s")
+    assert state.time > 0.15 and 0.9 < most < 1 + 1e-6
+
+
 def test_rayleigh_damping_has_the_fractions_asked_for():
     fractions = (0.05, 0.02)
     omega = exact.square_block_frequency(1.0, 10e9, 2600.0)
@@ -289,6 +309,8 @@ def test_stress_turns_with_the_block_whatever_the_axes():
     [
         ({"newmark": (0.25, 0.4)}, "2β ≥ γ ≥ ½"),
         ({"newmark": (0.2, 0.5)}, "not stable at every time step"),
+        ({"newmark": (0.5, 0.5)}, "blocks that bounce gain energy"),
+        ({"newmark": (1.0, 1.0)}, "blocks that bounce gain energy"),
         ({"damping": -0.1}, "damping must not be negative"),
         ({"rayleigh_mass": -1.0}, "rayleigh_mass must not be negative"),
         ({"spectral_radius": 1.5}, "spectral_radius must be from 0 to 1"),

@@ -27,7 +27,7 @@ class DdaTable(Table):
     newmark: Pair = Field(
         (0.5, 1.0),
         description="β and γ of the time scheme: [0.5, 1] is Shi's, [0.25, 0.5] the trapezoidal rule without dissipation; "
-        "2β ≥ γ ≥ 0.5; γ > 0.5 damps and is of first order, `spectral_radius` damps and is of second",
+        "2β ≥ γ ≥ 0.5 and β ≤ γ − 0.25; γ > 0.5 damps and is of first order, `spectral_radius` damps and is of second",
     )
     spectral_radius: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
@@ -80,6 +80,8 @@ class DdaTable(Table):
         beta, gamma = value
         if not 2 * beta >= gamma >= 0.5:
             raise ValueError(f"Newmark's β = {beta:g}, γ = {gamma:g} is not stable at every time step: 2β ≥ γ ≥ 0.5")
+        if beta > max(gamma - 0.25, 0.5 * gamma) * (1 + 1e-12):
+            raise ValueError(f"Newmark's β = {beta:g}, γ = {gamma:g} lets blocks that bounce gain energy: β ≤ γ − 0.25")
         return value
 
     @model_validator(mode="after")
