@@ -24,7 +24,6 @@ from .balance import Balance, balanced
 from .budget_watch import BudgetWatch
 from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
-from .elastic_range import ElasticRange
 from .endless import out_of_sight, solved_pass
 from .event_steps import SETTLED, TOGETHER, EventSteps
 from .first_change import FirstChange
@@ -93,7 +92,7 @@ class Coupling:
         #: What the growth that ended the last load step brought, where the load follows the cracks.
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
-        self.range, self.balance, self.mechanism = ElasticRange(), LoadBalance(), Mechanism()
+        self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
         self.energy = BudgetWatch()
         self.under_way: UnderWay | None = None
         #: s, when the present load step began.
@@ -185,9 +184,10 @@ class Coupling:
                 yield self._still(pending, growth_pass)
                 return True
             result, solutions = found.result, found.solutions
-            if now.bodies and not endless:
+            if not endless:
                 strain = self.range.check(now.motion(result.state), now.blocks, result.state.time)
-                self.balance.check(now.loads, now.blocks, strain, result.state.time)
+                if now.bodies:
+                    self.balance.check(now.loads, now.blocks, strain, result.state.time)
             if static:
                 # The passes of a step share its load, also when one of them has to take a shorter step.
                 load_time = result.state.time

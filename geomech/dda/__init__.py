@@ -9,16 +9,18 @@
 """
 
 from .basis import displacement_matrix
+from .elastic_range import ElasticRange
 from .energy import EnergyBudget, StepEnergy
 from .equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
 from .force_rows import EDGE_FORCE, POINT_FORCE
 from .in_situ import InSituState, NoInSituEquilibrium, in_situ_state
 from .loads import AppliedForces
 from .moments import block_moments, mass_matrix
+from .running import run
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
 from .step_length import StepLength
 from .strength_reduction import FactorOfSafety, NothingToReduce, factor_of_safety
-from .system import BlockSystem, run
+from .system import BlockSystem
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts
 from .work import Work
@@ -30,6 +32,7 @@ __all__ = [
     "AppliedForces",
     "BlockSystem",
     "CrackResponse",
+    "ElasticRange",
     "EnergyBudget",
     "Equilibrium",
     "FactorOfSafety",

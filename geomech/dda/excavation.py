@@ -41,11 +41,19 @@ class Excavations:
                 out[self._taken(excavation)] = True
         return out
 
+    def refuse(self, loads: Loads) -> None:
+        """Raises ValueError for an excavation, now or later, that takes none of these blocks, or one that is not
+        there."""
+        for excavation in loads.excavations:
+            self._taken(excavation)
+
     def _taken(self, excavation: Excavation) -> list[int]:
         n = self._blocks.n_blocks
         for block in excavation.blocks:
-            if not 0 <= block < n:
-                raise ValueError(f"the excavation at {excavation.time:g} s takes block {block}, but there are {n}")
+            if not (isinstance(block, (int, np.integer)) and 0 <= block < n):
+                raise ValueError(
+                    f"the excavation at {excavation.time:g} s takes block {block!r}, but there are {n}, numbered from 0"
+                )
         taken = list(excavation.blocks)
         if excavation.polygon is not None:
             loop = [np.asarray(excavation.polygon, dtype=float)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,6 @@ from .open_close import Unsettled
 from .overlap import refuse_overlap
 from .rigid import with_rigid
 from .step import CrackResponse, NotConverged, StepResult
-from .step_length import StepLength
 from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, at_their_springs, told_rows
@@ -59,8 +58,8 @@ class BlockSystem:
     ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``slack`` (m) is the rounding of coordinates:
     less is no motion.
 
-    Raises ValueError when materials or joints are missing, a block has no area, or one that moves has no mass in a
-    dynamic run.
+    Raises ValueError when there are no blocks, materials or joints are missing, a block has no area, or one that moves
+    has no mass in a dynamic run.
     """
 
     def __init__(
@@ -73,7 +72,9 @@ class BlockSystem:
         work: Work | None = None,
     ) -> None:
         self.work = work or Work()
-        if blocks.n_blocks and int(np.max(blocks.material)) >= len(materials):
+        if not blocks.n_blocks:
+            raise ValueError("there are no blocks to move")
+        if int(np.max(blocks.material)) >= len(materials):
             raise ValueError(f"a block names material {int(np.max(blocks.material))}, but there are {len(materials)}")
         self.blocks = blocks
         self.materials = tuple(materials)
@@ -197,6 +198,7 @@ class BlockSystem:
         moments = block_moments(vertices, self.next, self.vertex_start)
         if state.time == 0.0 and len(state.contacts) == 0:
             refuse_overlap(self.blocks, vertices, moments)
+            self._excavations.refuse(loads)
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
         limit = self.step_limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
@@ -340,36 +342,3 @@ class BlockSystem:
         pattern.solver.work = self.work
         self._sparse = pairs, pattern
         return pattern
-
-
-def run(
-    blocks: Blocks,
-    materials: Sequence[Material],
-    joints: Sequence[JointLaw],
-    loads: Loads,
-    settings: DdaSettings,
-    end_time: float,
-    *,
-    joint_index: Callable[[str, str], int | None] | None = None,
-    state: State | None = None,
-    watch: Callable[[StepResult], None] | None = None,
-) -> Iterator[State]:
-    """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
-    long. ``watch`` sees every `StepResult`.
-
-    ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
-    """
-    if not end_time >= 0:
-        raise ValueError(f"end_time must not be negative, got {end_time!r} s")
-    system = BlockSystem(blocks, materials, joints, joint_index, settings)
-    state = State.at_rest(blocks) if state is None else state
-    yield state
-    length = StepLength(settings)
-    while state.time < end_time * (1 - 1e-12):
-        dt = min(length.dt, end_time - state.time)
-        result = system.step(state, loads, dt)
-        length.after(result, dt, system.allowed_ratio)
-        if watch is not None:
-            watch(result)
-        state = result.state
-        yield state

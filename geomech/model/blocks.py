@@ -9,7 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from ..conventions import outward_normal_of
-from .polygon import area_moments, crossing_edges, plainly_simple, signed_area, winding_number
+from .polygon import (
+    area_moments,
+    crossing_edges,
+    crossing_loops,
+    plainly_simple,
+    point_in_both,
+    signed_area,
+    winding_number,
+)
 
 #: Edges lie in one line when the tangent of their angle is below this.
 STRAIGHT = 1e-6
@@ -59,8 +67,8 @@ class Blocks:
         """Build from ``polygons[block][loop]`` = (n, 2) vertices without the closing repetition; a bare (n, 2) array
         stands for a block without holes. ``edge_names[block][loop][edge]`` names edges. Loops are turned to the
         house's sense. Raises ValueError naming the block for loops of fewer than three vertices, repeated vertices,
-        non-finite coordinates, edges that cross, no area, or holes outside the outline, and for lists that have not
-        one entry a block."""
+        non-finite coordinates, edges that cross, no area, or holes that reach out of the outline or into one another,
+        and for lists that have not one entry a block."""
         n_blocks = len(polygons)
         given = {"material": material, "fixed": fixed, "held": held, "edge_names": edge_names, "names": names}
         _refuse_lengths(n_blocks, given)
@@ -86,6 +94,8 @@ class Blocks:
                 _refuse_crooked(loops[k], names[owner[k]])
             for k in np.flatnonzero(~outer):
                 _refuse_stray(loops[block_loop[owner[k]]], loops[k], names[owner[k]])
+            for b in np.flatnonzero(np.diff(block_loop) > 2):
+                _refuse_shared(loops[block_loop[b] + 1 : block_loop[b + 1]], names[b])
             for k in np.flatnonzero(turns_left != outer):
                 loops[k] = loops[k][::-1]
                 if labels is not None:
@@ -311,3 +321,21 @@ def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
         # On a corner where it touches the outline, a hole sees the outline's angle there.
         if abs(winding_number([outline], np.array([x, y]))) < 1e-6:
             raise ValueError(f"{name}: a hole reaches out of the outline at ({x:g}, {y:g})")
+    crossing = crossing_loops(outline, hole)
+    if crossing is not None:
+        raise ValueError(f"{name}: a hole reaches out of the outline at ({crossing[0]:g}, {crossing[1]:g})")
+
+
+def _refuse_shared(holes: list[np.ndarray], name: str) -> None:
+    """What two holes share would be taken out of the block twice."""
+    low, high = (np.array([extreme(hole, axis=0) for hole in holes]) for extreme in (np.min, np.max))
+    for k, hole in enumerate(holes):
+        near = ((low[:k] <= high[k]) & (high[:k] >= low[k])).all(axis=1)
+        for m in np.flatnonzero(near):
+            shared = crossing_loops(hole, holes[m])
+            shared = point_in_both(hole, holes[m]) if shared is None else shared
+            if shared is not None:
+                raise ValueError(
+                    f"{name}: holes {m + 1} and {k + 1} overlap at ({shared[0]:g}, {shared[1]:g}): draw what they take out "
+                    "together as one hole"
+                )

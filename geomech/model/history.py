@@ -212,6 +212,14 @@ class History:
         return first, second
 
 
+def refuse_no_history(what: str, history: object) -> None:
+    """Raises TypeError, saying ``what`` it is of, for what is no `History`."""
+    if not isinstance(history, History):
+        raise TypeError(
+            f"{what} must be a History, for what never changes History.constant(…), got a {type(history).__name__}"
+        )
+
+
 def baseline_corrected(acceleration: History, degree: int = 1) -> History:
     """The record less the polynomial of ``degree`` in time whose velocity fits the record's best (least squares), so
     that the base comes to rest and does not drift away: degree 0 takes a constant acceleration off, 1 a linear one.

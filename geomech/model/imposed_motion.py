@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from .history import History
+from .history import History, refuse_no_history
 from .numbers import refuse_point
 
 #: The six unknowns of a block, in order.
@@ -39,6 +39,7 @@ class BlockMotion:
 
     def __post_init__(self) -> None:
         _known_kind(self.kind, "the motion of a block")
+        refuse_no_history(f"the motion of block {self.block}", self.history)
         if not self.unknowns or len(set(self.unknowns)) < len(self.unknowns) or set(self.unknowns) - set(UNKNOWNS):
             raise ValueError(f"the imposed unknowns are some of {', '.join(UNKNOWNS)}, once each, not {self.unknowns}")
         if np.shape(self.history.values)[1] != len(self.unknowns):
@@ -80,6 +81,7 @@ class PointMotion:
     def __post_init__(self) -> None:
         _known_kind(self.kind, "the motion of a point")
         refuse_point(f"the motion of a point of block {self.block}", self.at)
+        refuse_no_history(f"the motion of a point of block {self.block}", self.history)
         columns = np.shape(self.history.values)[1]
         if columns != (2 if self.direction is None else 1):
             wanted = "two columns, x and y" if self.direction is None else "one column, along its direction"
@@ -122,6 +124,7 @@ class BaseMotion:
     def __post_init__(self) -> None:
         if self.frame not in ("ground", "base"):
             raise ValueError(f'base motion is seen from the "ground" or from the "base", not {self.frame!r}')
+        refuse_no_history("the acceleration of the base", self.acceleration)
         if np.shape(self.acceleration.values)[1] != 2:
             raise ValueError("the acceleration of the base needs two columns, x and y")
         if self.frame == "base" and self.blocks is not None:

@@ -112,7 +112,8 @@ class JointLaw:
         for what in angles:
             value = getattr(self, what)
             if value is not None and not 0 <= value < math.pi / 2:
-                self._refuse(f"{what.replace('_', ' ')} must lie in [0°, 90°), got {math.degrees(value):g}°")
+                radians = " (angles are in radians here)" if value > 1.6 else ""
+                self._refuse(f"{what.replace('_', ' ')} must lie in [0°, 90°), got {math.degrees(value):g}°{radians}")
         refuse_numbers(self, _NUMBERS, f"joint {self.name!r}")
         if math.isinf(self.cohesion) and self.softening_slip:
             self._refuse("an infinite cohesion does not fall over a softening_slip")

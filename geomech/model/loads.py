@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .bolt import Bolt
-from .history import History
+from .history import History, refuse_no_history
 from .imposed_motion import BaseMotion, BlockMotion, PointMotion
 from .numbers import refuse_point
 
 
 def _refuse_columns(what: str, history: History, wanted: int = 2) -> None:
+    refuse_no_history(what, history)
     columns = np.shape(history.values)[1]
     if columns != wanted:
         columns_wanted = "two columns, x and y" if wanted == 2 else "one column"

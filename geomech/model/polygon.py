@@ -111,3 +111,39 @@ def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
         elif not (ahead or behind):
             return int(i), int(j)
     return None
+
+
+def crossing_loops(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
+    """(2,) where edges of two loops (n, 2) and (m, 2) pass through one another, the first found; None where they only
+    touch, or are apart."""
+    origin = one[0]
+    p, q = one - origin, other - origin
+    a, b = np.roll(p, -1, axis=0) - p, np.roll(q, -1, axis=0) - q
+    size = max(np.ptp(p, axis=0).max(), np.ptp(q, axis=0).max())
+    # Ends of every edge from the line of every edge of the other: on different sides of both where they cross.
+    arm = q[None, :] - p[:, None]
+    of_other = _sides(a[:, None, 0] * arm[..., 1] - a[:, None, 1] * arm[..., 0], a[:, None], size)
+    of_one = _sides(-(b[None, :, 0] * arm[..., 1] - b[None, :, 1] * arm[..., 0]), b[None, :], size)
+    cross = (of_other * np.roll(of_other, -1, axis=1) < 0) & (of_one * np.roll(of_one, -1, axis=0) < 0)
+    if not cross.any():
+        return None
+    i, j = np.argwhere(cross)[0]
+    share = (arm[i, j, 0] * b[j, 1] - arm[i, j, 1] * b[j, 0]) / (a[i, 0] * b[j, 1] - a[i, 1] * b[j, 0])
+    return origin + p[i] + share * a[i]
+
+
+def _sides(area: np.ndarray, along: np.ndarray, size: float) -> np.ndarray:
+    """−1, 0 on the line, or 1."""
+    return np.where(np.abs(area) <= 1e-12 * np.hypot(along[..., 0], along[..., 1]) * size, 0.0, np.sign(area))
+
+
+def point_in_both(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
+    """(2,) a point inside both of two loops that do not cross, beside the middle of an edge of one of them; None where
+    they are apart or only touch."""
+    for loop, against in ((one, other), (other, one)):
+        along = np.roll(loop, -1, axis=0) - loop
+        inwards = np.stack([-along[:, 1], along[:, 0]], axis=1) * np.sign(signed_area(loop))
+        for point in loop + 0.5 * along + 1e-6 * inwards:
+            if abs(winding_number([against], point)) > 0.5:
+                return point
+    return None

@@ -107,6 +107,21 @@ class State:
             contacts=np.empty(0, CONTACT),
         )
 
+    def refuse_misfit(self, blocks: Blocks) -> None:
+        """Raises ValueError for arrays that are not those of ``blocks``, or not finite."""
+        n = blocks.n_blocks
+        wanted = {"vertices": (blocks.n_vertices, 2), "velocity": (n, 6), "stress": (n, 3), "rotation": (n,),
+                  "crack_strain": (n, 3)}  # fmt: skip
+        for name, shape in wanted.items():
+            value = getattr(self, name)
+            if np.shape(value) != shape:
+                raise ValueError(
+                    f"the state's {name} has the shape {np.shape(value)}, but {n} blocks with {blocks.n_vertices} "
+                    f"vertices have {shape}"
+                )
+            if not np.isfinite(value).all():
+                raise ValueError(f"the state's {name} is not finite")
+
 
 @dataclass(frozen=True)
 class Event:

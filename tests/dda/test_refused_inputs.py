@@ -173,6 +173,27 @@ def test_what_is_not_as_it_must_be_is_refused_by_name(make, words):
         make()
 
 
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Loads(gravity=[0.0, -9.81]), "gravity must be a History, .* got a list"),
+        (lambda: EdgeTraction("top", np.zeros(2)), "'top' must be a History"),
+        (lambda: PointLoad(1, (0.5, 0.5), 1.0), "point load on block 1 must be a History"),
+        (lambda: BlockMotion(1, [0.0, 0.0, 0.0]), "motion of block 1 must be a History"),
+        (lambda: PointMotion(1, (0.5, 0.5), [0.0, 0.0]), "motion of a point of block 1 must be a History"),
+        (lambda: BaseMotion([0.0, 0.0]), "acceleration of the base must be a History"),
+    ],
+)
+def test_numbers_in_the_place_of_a_history_are_refused_by_name(make, words):
+    with pytest.raises(TypeError, match=words):
+        make()
+
+
+def test_an_angle_in_degrees_is_told_to_be_one():
+    with pytest.raises(ValueError, match=r"joint 'bed': friction angle .* got 1718.87° \(angles are in radians here\)"):
+        JointLaw("bed", friction_angle=30.0)
+
+
 def stepped(loads: Loads, *, rock: Material = ROCK, dt: float | None = None, **settings) -> State:
     blocks = two_blocks(names=["base", "square"])
     system = dda.BlockSystem(blocks, [rock], [JointLaw("joint", 0.5)], settings=DdaSettings(time_step=1e-3, **settings))

@@ -69,6 +69,33 @@ def test_bad_outlines_are_refused_by_name(loop, message):
         Blocks.from_polygons([SQUARE], edge_names=[[["a"]]])
 
 
+U = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]], dtype=float)
+WIDE, SMALL = np.array([[0, 0], [10, 0], [10, 10], [0, 10.0]]), np.array([[2, 2], [4, 2], [4, 4], [2, 4.0]])
+
+
+@pytest.mark.parametrize("far", [0.0, 1e7])
+@pytest.mark.parametrize(
+    ("loops", "message"),
+    [
+        ([WIDE, SMALL, SMALL + 1], "slab: holes 1 and 2 overlap at"),
+        ([WIDE, SMALL, 2.5 + 0.25 * SMALL], "slab: holes 1 and 2 overlap at"),
+        ([WIDE, SMALL + 3, SMALL, SMALL], "slab: holes 2 and 3 overlap at"),
+        ([WIDE, SMALL, SMALL[:3]], "slab: holes 1 and 2 overlap at"),
+        ([WIDE, SMALL * [2, 0.5], SMALL * [1, 1.5] - [-2, 2.5]], "slab: holes 1 and 2 overlap at"),
+        ([U, np.array([[0.5, 2], [2.5, 2], [2.5, 2.2], [0.5, 2.2]])], "slab: a hole reaches out of the outline at"),
+    ],
+    ids=["crossing", "inside", "twice", "half of it", "a cross", "over a notch"],
+)
+def test_holes_that_share_rock_or_leave_it_are_refused(loops, message, far):
+    with pytest.raises(ValueError, match=message):
+        Blocks.from_polygons([[loop + far for loop in loops]], names=["slab"])
+
+
+@pytest.mark.parametrize("shift", [(2, 0), (2, 2), (2, 1), (4, 3)], ids=["a side", "a corner", "part of a side", "apart"])
+def test_holes_that_only_touch_are_two(shift):
+    assert Blocks.from_polygons([[WIDE, SMALL, SMALL[::-1] + shift]]).areas() == pytest.approx(100 - 8)
+
+
 def test_motion_is_recovered_from_the_vertices():
     """An affine map per block, far from the origin, is found again to round-off."""
     rng = np.random.default_rng(3)

@@ -12,7 +12,6 @@ from geomech.bench.random_slopes import scene_text
 from geomech.bench.refusals import REASONS, reason_of
 from geomech.bench.slope_invariants import INVARIANTS
 from geomech.coupling import Coupling
-from geomech.coupling.elastic_range import ElasticRange
 from geomech.ddm.growth import advance
 from geomech.model import TIP, Blocks, Cracks, GrowthSettings, Material, Motion
 from geomech.scene import load_scene
@@ -147,7 +146,7 @@ def test_a_block_strained_beyond_elasticity_is_told_of_and_ends_the_run(caplog):
     """A warning as the strain passes a hundredth and whenever it has doubled, an error at a quarter; fixed blocks do
     not count."""
     blocks = Blocks.from_polygons([SQUARE - [0, 3], SQUARE], fixed=[True, False], names=["base", "rock"])
-    watch = ElasticRange()
+    watch = dda.ElasticRange()
 
     def strained(share):
         vertices = blocks.vertices.copy()
