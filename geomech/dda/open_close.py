@@ -6,8 +6,8 @@ Bonds, lost for good, break only when all else is right.
 
 Where the number of wrong contacts does not fall by half from one iteration to the next, or a combination of states
 returns, the `CentralPath` proposes states to go on from, unless contacts are few. If it is blocked, `RoundedLaws` do
-(for more blocks than a dense matrix holds), and if they fail too, rounds of `LaggedFriction`, slowly and surely (in
-statics, where a shorter step helps little, `ConvexRounds` before them). If these end without, the sliding contacts
+(for more blocks than a dense matrix holds; in statics, where a shorter step helps little, `ConvexRounds` before them),
+and if they fail too, rounds of `LaggedFriction`, slowly and surely. If these end without, the sliding contacts
 stick again and only the worst contact of each block is switched, and if a combination still returns, only the first
 (the least-index rule, which cannot cycle where the problem has one solution; Murty 1974). Laws that are curved are
 lines within an iteration, and the iteration goes on until lines and laws agree on the forces.
@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -67,7 +68,10 @@ _AHEAD, _LOOKED, _LONGER = 0.2, 5, 3
 _NEAR_ITS_END, _TO_ITS_END = 1e-6, 12
 #: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces
 #: change by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
-_PATIENCE, _CHANGE, _CLOSER, _NEARER, _SAME = 4, 2e-2, 0.2, 0.5, 1e-7
+#: Those of convex problems, twice as long, do so where they change less: as long as some of the friction lags, states are
+#: nearly always wrong.
+_PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
+_CONVEX_CHANGE, _NEARER = 5e-3, 0.5
 #: Iterations to go from such states to the end.
 _FINISH = 8
 
@@ -307,11 +311,13 @@ def _proposed(
 
 
 def _by_rounds(
-    rounds: LaggedFriction | ConvexRounds, closer: float, bonded: np.ndarray, offered: set[bytes], budget: int
-) -> Iterator[tuple[_States, int]]:
-    """States that ``rounds`` propose once their normal forces hardly change, then whenever they do ``closer`` times as
-    little, and the solutions spent since the last; at most ``budget`` in all. Raises `Unsettled`."""
-    told, bound = 0, _CHANGE
+    rounds: LaggedFriction | ConvexRounds, least: float, closer: float, bonded: np.ndarray, offered: set[bytes],
+    budget: int,
+) -> Iterator[tuple[_States | None, int]]:  # fmt: skip
+    """States that ``rounds`` propose once their normal forces change by less than ``least``, then whenever they do
+    ``closer`` times as little, and the solutions spent since the last; at most ``budget`` in all, None at the end.
+    Raises `Unsettled`."""
+    told, bound = 0, least
     try:
         for change in rounds.rounds():
             if change < bound:
@@ -322,60 +328,57 @@ def _by_rounds(
                     yield states, rounds.solutions - told
                     told = rounds.solutions
             if rounds.solutions > budget or change < _SAME:
-                return
+                break
     except np.linalg.LinAlgError as error:
         raise Unsettled(str(error)) from error
+    yield None, rounds.solutions - told
 
 
-def _lagged(
-    equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
-) -> Iterator[tuple[_States, int]]:
-    """States that rounds of lagged friction propose, and the solutions spent, see `_by_rounds`."""
-    of = equations
-    rounds = LaggedFriction(of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded)
-    return _by_rounds(rounds, _CLOSER, bonded, offered, budget)
-
-
-def _convex(
-    equations: _Equations, answer: _Answer, bonded: np.ndarray, offered: set[bytes], budget: int
-) -> Iterator[tuple[_States, int]]:
-    """As `_lagged`, by rounds of convex problems, whose solutions are those of their paths."""
-    of = equations
-    rounds = ConvexRounds(
-        of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, of.found.normal
-    )
-    return _by_rounds(rounds, _NEARER, bonded, offered, 2 * budget)
+def _by_stages(laws: RoundedLaws, bonded: np.ndarray, offered: set[bytes]) -> Iterator[tuple[_States | None, int]]:
+    """As `_by_rounds`, by the stages of laws rounded off."""
+    told = 0
+    try:
+        for state, direction in laws.stages():
+            states = _States(state, direction, bonded)
+            if states.key not in offered:
+                offered.add(states.key)
+                yield states, laws.solutions - told
+                told = laws.solutions
+    except np.linalg.LinAlgError as error:
+        raise Unsettled(str(error)) from error
+    yield None, laws.solutions - told
 
 
 def _slower(
     equations: _Equations, answer: _Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
 ) -> Iterator[tuple[_States, int]]:
-    """States that laws rounded off propose, from where the ``path`` was blocked, then those of `_lagged` (in
-    statics of `_convex` before; neither knows of lift), and the solutions spent since the last. Where the matrix is
-    dense a hundred solutions cost little, and blocks that topple one by one go the surer way at once. Raises
-    `Unsettled`."""
-    of, told = equations, 0
+    """States that laws rounded off propose, from where the ``path`` was blocked, then rounds of lagged friction, and
+    the solutions spent since the last (in statics, where the first hardly ever do, those of convex problems before;
+    rounds know nothing of lift). Where the matrix is dense a hundred solutions cost little, and blocks that topple one
+    by one go the surer way at once. Raises `Unsettled`."""
+    of, lift = equations, equations.springs.lift.any()
+    step = of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded
+
+    def by_laws():
+        return _by_stages(RoundedLaws(*step, path.unknowns, float(np.sqrt(path.epsilon))), bonded, offered)
+
+    def by_convex_rounds():
+        return _by_rounds(ConvexRounds(*step, of.found.normal), _CONVEX_CHANGE, _NEARER, bonded, offered, 2 * budget)
+
+    def by_lagged_friction():
+        return _by_rounds(LaggedFriction(*step), _CHANGE, _CLOSER, bonded, offered, budget)
+
     large = of.pattern.solver is not None
-    if large:
-        laws = RoundedLaws(
-            of.pattern, of.matrix, of.right, of.found, of.vectors, answer.springs, answer.gap, bonded, path.unknowns,
-            float(np.sqrt(path.epsilon)),
-        )  # fmt: skip
-        try:
-            for state, direction in laws.stages():
-                states = _States(state, direction, bonded)
-                if states.key not in offered:
-                    offered.add(states.key)
-                    yield states, laws.solutions - told
-                    told = laws.solutions
-        except np.linalg.LinAlgError as error:
-            raise Unsettled(str(error)) from error
-        told = laws.solutions - told
-    if of.springs.lift.any():
-        return
-    for rounds in (_convex, _lagged) if large and of.statics else (_lagged,):
-        for states, spent in rounds(equations, answer, bonded, offered, budget):
-            yield states, told + spent
+    ways = [
+        *([by_convex_rounds] if large and of.statics and not lift else []),
+        *([by_laws] if large else []),
+        *([by_lagged_friction] if not lift else []),
+    ]
+    told = 0
+    for states, spent in chain.from_iterable(way() for way in ways):
+        told += spent
+        if states is not None:
+            yield states, told
             told = 0
 
 

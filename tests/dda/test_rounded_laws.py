@@ -11,6 +11,7 @@ import pytest
 from geomech import dda
 from geomech.bench import block_scenes
 from geomech.dda import open_close
+from geomech.dda.lagged_friction import LaggedFriction
 from geomech.dda.rounded_laws import RoundedLaws
 from geomech.model import JointLaw, State
 
@@ -68,7 +69,7 @@ def settled_both_ways(monkeypatch, blocks, friction: float):
     asked = []
     stages = RoundedLaws.stages
     monkeypatch.setattr(open_close, "_proposed", lambda *_, **__: (None, 0))
-    monkeypatch.setattr(open_close, "_lagged", lambda *_: iter(()))
+    monkeypatch.setattr(LaggedFriction, "rounds", lambda self: iter(()))
     monkeypatch.setattr(RoundedLaws, "stages", lambda self: (asked.append(1), stages(self))[1])
     second = forces()
     assert asked
