@@ -192,6 +192,11 @@ class CentralPath:
         return self._blocked >= _BLOCKED
 
     @property
+    def stopped(self) -> bool:
+        """Whether contacts had to be centred again for the path to go on."""
+        return self._lone + self._again > 0
+
+    @property
     def arrived(self) -> bool:
         """Whether the path ended where only round-off is left to decide."""
         return self.ended and not self.epsilon > _END

@@ -66,6 +66,12 @@ _AHEAD, _LOOKED, _LONGER = 0.2, 5, 3
 #: One with ε below this is followed so many further whatever it took: states that hang by a hair come right at its very
 #: end. (In a static step of a wall of 10 000 bricks 800 of them still do at 1e-7, four at 1e-12, none at 1e-13.)
 _NEAR_ITS_END, _TO_ITS_END = 1e-6, 12
+#: From so many free blocks on, a step in motion is cut as soon as few contacts stop its path, which has then come to
+#: where no states are near that fit, somewhere in so large a system: half the step goes through. (A slope of 20 000
+#: blocks under sudden weight, 10 ms: stopped after 33 iterations and, followed further, nowhere after 600 s; its half
+#: takes 47.) Nor are states switched again where more than `_FEW_OF_ALL` are wrong: an iteration far from the right
+#: ones asks for factors in double precision, which of 100 000 blocks take 19 s and 2 GB more.
+MANY = 15_000
 #: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces
 #: change by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
 #: Those of convex problems, twice as long, do so where they change less: as long as some of the friction lags, states are
@@ -281,11 +287,12 @@ def _settled(equations: _Equations, states: _States, answer: _Answer, iterations
 
 
 def _proposed(
-    path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int, patient: bool
+    path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int, patient: bool, hurried: bool = False
 ) -> tuple[_States | None, int]:
     """States that the ``path`` proposes once nearly all contacts are decided, none of those ``offered`` already, or
     None if it ends or takes more than ``budget`` iterations; and the iterations spent. Unless ``patient`` a path that
-    is blocked has ended, and one that gets ahead, or is near its end, may take more. Raises `Unsettled`."""
+    is blocked has ended, and one that gets ahead, or is near its end, may take more. If ``hurried``, one that has been
+    stopped anywhere has ended. Raises `Unsettled`."""
     epsilons = []
     if not patient and path.epsilon < _NEAR_ITS_END:
         budget = max(budget, _TO_ITS_END)
@@ -297,7 +304,7 @@ def _proposed(
         epsilons.append(path.epsilon)
         few = _DECIDED * len(bonded)
         if not path.arrived:
-            if path.ended or (path.blocked and not patient):
+            if path.ended or (path.blocked and not patient) or (hurried and path.stopped):
                 return None, spent
             few = min(few, max(_LEFT, _LEFT_PART * len(bonded)))
         if undecided <= max(2, few) and path.missed < _BALANCED:
@@ -400,7 +407,7 @@ def settle(
     (n, 6, 6) and ``right`` (n, 6) are the blocks' own part, ``springs`` and ``gap`` those of this step (dashpots
     included). ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations,
     those along the central path included. Unless ``patient``, systems too large for a dense matrix are not asked for
-    by laws and rounds that take hundreds: a shorter step takes less.
+    by laws and rounds that take hundreds: a shorter step takes less, of `MANY` in motion at the first sign.
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
@@ -414,6 +421,7 @@ def settle(
     caution, fewest, tries = _ALL, np.inf, 0
     few, small = len(found) <= _FEW, pattern.solver is None
     cheap = small or pattern.solver.in_parts
+    hurried = not (patient or statics) and pattern.n >= MANY
     iteration, most = 0, max_iterations
     # Contacts (n,) that were wrong in the last iterations, when few were, and how often they were sought together.
     lately, joint, left = [], 0, _SOLUTIONS
@@ -450,7 +458,9 @@ def settle(
         seen.add(states.key)
         tries = 0 if number <= _FEWER * fewest else tries + 1
         fewest = min(fewest, number)
-        most_tries = _TRIES_OF_FEW if cheap and not few and number <= _FEW_OF_ALL * len(found) else _TRIES
+        most_tries = 0 if hurried else _TRIES
+        if not few and number <= _FEW_OF_ALL * len(found):
+            most_tries = _TRIES_OF_FEW if cheap else _TRIES
         stuck = caution == _ALL and (returned or tries > most_tries)
         if few or caution != _ALL or number > _SOUGHT:
             lately, joint = [], 0
@@ -479,11 +489,13 @@ def settle(
                     )
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration
-                proposal, spent = _proposed(path, states.bonded, offered, budget, small)
+                proposal, spent = _proposed(path, states.bonded, offered, budget, small, hurried)
                 iteration += spent
                 if spent > budget:
                     max_iterations += spent - max(budget, 0) + _FINISH
             seen.clear()
+            if proposal is None and hurried:
+                break
             if proposal is None and (patient or small):
                 if slower is None:
                     budget = _PATIENCE * max_iterations

@@ -16,7 +16,7 @@ from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
 from .moments import block_moments
-from .open_close import Unsettled
+from .open_close import MANY, Unsettled
 from .overlap import refuse_overlap
 from .rigid import with_rigid
 from .step import CrackResponse, NotConverged, StepResult
@@ -176,7 +176,8 @@ class BlockSystem:
         """Move ``state`` by ``dt`` (default: the settings' time step) under ``loads`` taken at the time that the scheme
         weighs them to (the end of the step in Shi's), or at ``load_time`` however short the step becomes. ``like``: the
         result of the same step with another ``crack``, from whose contact states iterations begin. ``hasty``: the first
-        `PATIENT_AFTER` cuts are made without trying the slow ways to contact states.
+        `PATIENT_AFTER` cuts are made without trying the slow ways to contact states, as those of `MANY` blocks in
+        motion always are.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
         again from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
@@ -184,6 +185,7 @@ class BlockSystem:
         holds them up in statics.
         """
         dt = self.settings.time_step if dt is None else float(dt)
+        hasty |= not self.scheme.static and len(self.moving) >= MANY
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
         self._stray_loads.refuse(loads)

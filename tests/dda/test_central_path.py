@@ -9,7 +9,8 @@ import pytest
 
 from geomech import dda
 from geomech.bench import block_scenes
-from geomech.dda import attempt
+from geomech.dda import attempt, open_close
+from geomech.dda import system as stepping
 from geomech.dda.central_path import CentralPath
 from geomech.dda.open_close import _proposed, settle
 from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
@@ -105,6 +106,49 @@ def test_a_path_near_its_end_is_followed_to_it_whatever_it_took(epsilon, propose
     proposal, spent = _proposed(Following(epsilon), np.zeros(1000, int), set(), 0, patient=False)
     assert (proposal is not None) == proposes
     assert spent == (8 if proposes else 0)
+
+
+def test_of_many_blocks_in_motion_a_step_whose_path_is_stopped_is_halved_at_once(monkeypatch):
+    """What comes out is the half step, to the bit; in statics, and of fewer blocks, the path is followed."""
+    blocks, asked = block_scenes.slope(300), []
+
+    def step(seconds, dynamic=True):
+        settings = block_scenes.settings(seconds, dynamic)
+        system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+        return system.step(State.at_rest(blocks), block_scenes.WEIGHT)
+
+    def stopped(path):
+        # Only the first one is.
+        asked.append(path)
+        return asked[0] is path
+
+    whole = step(0.02)
+    for module in (open_close, stepping):
+        monkeypatch.setattr(module, "MANY", 100)
+    half = step(0.01)
+    monkeypatch.setattr(CentralPath, "stopped", property(stopped))
+    result = step(0.02)
+    assert len({id(path) for path in asked}) > 1
+    assert whole.dt == 0.02 and result.dt == 0.01 and result.statistics["step_cuts"] == 1
+    assert np.array_equal(result.state.vertices, half.state.vertices)
+    asked.clear()
+    assert step(0.02, dynamic=False).dt == 0.02 and not asked
+
+
+@pytest.mark.slow
+def test_a_slope_of_twenty_thousand_blocks_takes_half_a_step_under_sudden_weight():
+    """Somewhere in so large a slope no states are near that fit 10 ms: the path is stopped there, and what was tried
+    after it came to nothing in 600 s of processor time."""
+    blocks = block_scenes.slope(20_000)
+    settings = block_scenes.settings(0.01)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+    result = system.step(State.at_rest(blocks), block_scenes.WEIGHT)
+    told = result.statistics
+    print(f"{told['open_close_iterations']} iterations, step of {result.dt:g} s, {told['unbalanced']:.1e} left")
+    assert result.dt in (0.005, 0.01) and told["unbalanced"] < 1e-9
+    # Falling and borne: nothing stands above its weight, nothing penetrates.
+    assert told["worst_penetration"] < 1e-5
+    assert np.abs(result.state.velocity[:, :2]).max() < 1.5 * block_scenes.GRAVITY * result.dt
 
 
 @pytest.mark.slow
