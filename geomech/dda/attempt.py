@@ -30,6 +30,7 @@ from .open_close import Settled, Unsettled, settle
 from .rigid import mean_stress
 from .step import CrackResponse, StepResult
 from .stopping import Stopped, dissipating, stop
+from .stretched import stretched
 from .time_integration import advance, assemble_blocks, turned
 from .viscous_boundary import QuietEdges
 
@@ -287,19 +288,19 @@ class Attempt:
     def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
         system = self.system
 
-        def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray) -> Settled:
-            most = system.settings.max_open_close_iterations
-            return settle(
-                pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved,
-                system.scheme.static, self.patient,
-            )  # fmt: skip
+        def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
+            def settled(contacts: ContactSet) -> Settled:
+                most = system.settings.max_open_close_iterations
+                return settle(
+                    pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved,
+                    system.scheme.static, self.patient,
+                )  # fmt: skip
 
-        if not system.allowed_penetration or not len(found):
-            stretch = found.stretch + found.swing
-            if stretch.any():
-                found = replace(found, shear=found.shear - springs.shear * stretch)
-            return solve(found, springs, gap)
+            return stretched(settled, contacts, stiff, start, stretch, curved) if stretch.any() else settled(contacts)
+
         found = replace(found, stretch=found.stretch + found.swing)
+        if not system.allowed_penetration or not len(found):
+            return solve(found, springs, gap, found.stretch)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
 
     def _increment(self, unknowns: np.ndarray) -> np.ndarray:
@@ -413,8 +414,12 @@ class Attempt:
         )  # fmt: skip
         new_stress, acceleration = self.new_stress, self.acceleration
         if len(system.rigid):
+            from_outside = load.copy()
+            if reaction is not None:
+                # What holds the strains of a rigid block is its stress.
+                from_outside[:, 3:] -= reaction[:, 3:]
             new_stress[system.rigid] = mean_stress(
-                system.rigid, rows, load, middle.moments, self.density, acceleration, self.carried[:, 2], self.turn,
+                system.rigid, rows, from_outside, middle.moments, self.density, acceleration, self.carried[:, 2], self.turn,
                 turn,
             )  # fmt: skip
         if scheme.mass_damping:

@@ -54,15 +54,15 @@ class _Mixing:
 
 
 def settle_augmented(
-    solve: Callable[[ContactSet, Springs, np.ndarray], Settled],
+    solve: Callable[[ContactSet, Springs, np.ndarray, np.ndarray], Settled],
     found: ContactSet,
     springs: Springs,
     gap: np.ndarray,
     held: tuple[np.ndarray, np.ndarray],
     tolerance: float,
 ) -> Settled:
-    """The settled step of ``found`` with multipliers; ``solve`` (contacts, springs, starting gaps) iterates open–close
-    states; ``springs`` and starting ``gap`` (n,) are those of the step, ``held`` (n,) twice says which contacts have
+    """The settled step of ``found`` with multipliers; ``solve`` (contacts, springs, starting gaps, stretch) iterates
+    open–close states; ``springs`` and starting ``gap`` (n,) are those of the step, ``held`` (n,) twice says which contacts have
     penalty springs, normal and shear. ``tolerance`` m.
 
     Raises `Unsettled` when the multipliers do not settle.
@@ -80,8 +80,8 @@ def settle_augmented(
             shear = np.where(held[1], _STIFFER, 1.0) * springs.shear
             springs, mixing = replace(springs, normal=springs.normal + more, shear=shear), _Mixing()
         normal, shear = multiplier[:n], multiplier[n:]
-        start = np.where(held[1], shear, unheld) - springs.shear * stretch
-        settled = solve(replace(found, shear=start), springs, gap - normal / springs.normal)
+        start = replace(found, shear=np.where(held[1], shear, unheld))
+        settled = solve(start, springs, gap - normal / springs.normal, stretch)
         iterations += settled.iterations
         closed = settled.state != OPEN
         pressed, drawn = closed & held[0], closed & held[1]

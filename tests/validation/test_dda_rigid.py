@@ -7,7 +7,19 @@ import pytest
 from block_problems import GRAVITY, WEIGHT, march, moved, rectangle, system_of, turned
 
 from geomech import dda
-from geomech.model import Blocks, Cracks, DdaSettings, Loads, Material, Problem, State
+from geomech.model import (
+    BlockMotion,
+    Blocks,
+    Cracks,
+    DdaSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    PointMotion,
+    Problem,
+    State,
+)
 from geomech.reference import block_motion as exact
 
 RIGID = Material("stone", 10e9, 0.25, density=2600.0, rigid=True)
@@ -40,6 +52,32 @@ def test_a_column_of_rigid_blocks_carries_the_stress_that_statics_say():
     # The springs alone give way: two at each joint, 40 E' each.
     springs = np.cumsum(weight * np.arange(n, 0, -1) / (80 * RIGID.plane_modulus))
     assert moved(system, found.state)[1:, 1] == pytest.approx(-springs, rel=1e-5)
+
+
+@pytest.mark.parametrize("moved_by", ["points", "springs", "centroid"])
+def test_a_rigid_platen_that_is_driven_bears_what_it_presses_with(moved_by):
+    """A platen 2 m × 0.5 m pressed on a block with F: σ A = F Δy between where it is pushed and where it pushes."""
+    rock = Material("rock", 10e9, 0.0, density=2600.0)
+    blocks = Blocks.from_polygons(
+        [rectangle(-1, -1, 2, 0), rectangle(0, 0, 1, 1), rectangle(-0.5, 1, 1.5, 1.5)],
+        fixed=[True, False, False], material=[0, 0, 1],
+    )  # fmt: skip
+    down = History(np.array([0.0, 1.0]), np.array([[0.0], [-1e-4]]))
+    at = [(x, 1.5) for x in (-0.5, 1.5)]
+    loads = {
+        "points": Loads(point_motions=tuple(PointMotion(2, p, down, (0.0, 1.0)) for p in at)),
+        "springs": Loads(point_motions=tuple(PointMotion(2, p, down, (0.0, 1.0), stiffness=1e13) for p in at)),
+        "centroid": Loads(
+            block_motions=(BlockMotion(2, down, ("v0",)), BlockMotion(2, History.constant([0.0, 0.0]), ("u0", "r0")))
+        ),
+    }[moved_by]
+    settings = DdaSettings(max_displacement_ratio=0.1)
+    system = dda.BlockSystem(blocks, [rock, RIGID], [JointLaw("joint", 0.5)], settings=settings)
+    result = system.step(State.at_rest(blocks), loads, 1.0)
+    force = -float(result.state.stress[1, 1]) * 1.0
+    assert force == pytest.approx(1e-4 * 10e9, rel=0.05)
+    depth = 0.25 if moved_by == "centroid" else 0.5
+    assert result.state.stress[2] == pytest.approx([0.0, -force * depth / 1.0, 0.0], rel=1e-4, abs=1.0)
 
 
 @pytest.mark.parametrize("dt", [1e-2, 1e-3])

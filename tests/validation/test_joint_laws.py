@@ -11,7 +11,18 @@ import pytest
 
 from geomech import dda
 from geomech.dda.curved_joints import rough_strength
-from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, Roughness, State
+from geomech.model import (
+    BlockMotion,
+    Blocks,
+    DdaSettings,
+    EdgeTraction,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Roughness,
+    State,
+)
 from geomech.reference import block_motion, joints
 
 YOUNGS_MODULUS, POISSON = 50e9, 0.25
@@ -235,6 +246,45 @@ def test_stiffness_from_the_slip_of_the_peak():
     assert shear[sticks] == pytest.approx(peak * moved[sticks] / rough.peak_slip, rel=1e-3)
     assert shear.max() == pytest.approx(peak, rel=0.02)
     assert not slip[sticks].any() and slip[-1] > 0
+
+
+@pytest.mark.parametrize("stiffness", [None, 2e10])
+@pytest.mark.parametrize("contact", ["penalty", "augmented"])
+@pytest.mark.parametrize("before", [0, 1])
+def test_given_motion_shears_a_joint_by_the_stiffness_of_its_pressure(stiffness, contact, before):
+    """S = τ_p ℓ x/δ_p of a block that is moved along by x, whether it was pressed on ``before`` or in the same step,
+    sliding beyond."""
+    rough = Roughness(10.0, 50e6, length=1.0, from_peak_slip=True)
+    law = JointLaw("rough", RESIDUAL, roughness=rough, normal_stiffness=stiffness)
+    blocks = Blocks.from_polygons(
+        [rectangle(-2, -1, 4, 0), rectangle(0, 0, 2, 1)], fixed=[True, False],
+        edge_names=[[[""] * 4], [["", "", "top", ""]]],
+    )  # fmt: skip
+    settings = DdaSettings(max_displacement_ratio=0.1, contact=contact)
+    system = dda.BlockSystem(blocks, [Material("rock", 1e13, 0.0)], [law], settings=settings)
+    way = np.array([0.0] * (before + 1) + [1e-3, 2e-3, 3e-3, 5e-3])
+    loads = Loads(
+        edge_tractions=(EdgeTraction("top", History.constant([0.0, -1e6])),),
+        block_motions=(
+            BlockMotion(1, History(np.arange(len(way)) * 1.0, way[:, None]), ("u0",)),
+            BlockMotion(1, History.constant([0.0]), ("r0",)),
+        ),
+    )
+    peak = 2.0 * joints.barton_strength(1e6, rough.jrc_in_place, rough.jcs_in_place, RESIDUAL)
+    state, energy = State.at_rest(blocks), dda.EnergyBudget()
+    for x in way[1:]:
+        result = system.step(state, loads, 1.0)
+        state, energy = result.state, energy.after(result.energy)
+        borne = abs(float(result.contacts["shear_force"].sum()))
+        if x < rough.peak_slip:
+            # Shear moves up to a third of the pressure from one end to the other, of which the strength is no straight
+            # line.
+            assert borne == pytest.approx(peak * x / rough.peak_slip, rel=0.01, abs=1.0)
+            assert not result.contacts["slip"].any()
+    # The slip that the shear spring does not take up, and the roughness that it wears.
+    slip = np.abs(result.contacts["slip"][result.contacts["length"] > 0])
+    assert slip == pytest.approx(way[-1] - rough.peak_slip, rel=0.2) and 0.9 * peak < borne < peak
+    assert abs(energy.residual) < 1e-3 * energy.turnover
 
 
 def test_hyperbolic_closure():
