@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.model import Blocks, DdaSettings, Excavation, History, JointLaw, Loads, Material, State
+from geomech.model import Blocks, DdaSettings, EdgeTraction, Excavation, History, JointLaw, Loads, Material, State
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 BASE = np.array([[-5.0, -1.0], [5.0, -1.0], [5.0, 0.0], [-5.0, 0.0]])
@@ -81,6 +81,19 @@ def test_what_is_crushed_is_told_and_ends_the_run(caplog):
     with pytest.raises(dda.NotConverged, match="block is strained by .* no linear elastic body"):
         list(dda.run(blocks, [ROCK], [JOINT], Loads(), MOVING, 0.01, state=thrown(blocks, 0.0, -1e4)))
     assert "block is strained by 1." in caplog.text
+
+
+def test_what_steps_crush_to_nothing_is_named():
+    names = [[[""] * 4], [["", "", "top", ""]]]
+    blocks = Blocks.from_polygons([BASE, SQUARE], fixed=[True, False], edge_names=names, names=["base", "block"])
+    loads = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.0, -1e9])),))
+    system = dda.BlockSystem(
+        blocks, [replace(ROCK, youngs_modulus=1e5)], [JOINT], settings=DdaSettings(max_displacement_ratio=1.0)
+    )
+    state = State.at_rest(blocks)
+    with pytest.raises(dda.NotConverged, match="'block' is crushed to nothing at t = "):
+        for _ in range(100):
+            state = system.step(state, loads).state
 
 
 @pytest.mark.parametrize(

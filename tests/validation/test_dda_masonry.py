@@ -152,7 +152,7 @@ def against_sofianos(span: float, ladder: list[int]) -> list[float]:
 def test_thrust_of_voussoirs_that_bend_is_sofianos(span):
     coarse, fine = against_sofianos(span, [2, 8])
     # Two courses bear at their outermost corners, as if rigid: w S²/(8 T). His fit is good to some hundredths.
-    assert coarse < -0.1 and abs(fine) < 0.025
+    assert coarse < -0.08 and abs(fine) < 0.025
 
 
 @pytest.mark.slow

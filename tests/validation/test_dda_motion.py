@@ -113,6 +113,7 @@ def test_friction_on_an_incline_converges_to_the_rigid_block(dt):
 def test_a_block_flatter_than_its_friction_angle_sticks_when_its_weight_is_put_on_at_once(dt):
     system, state, down = incline(np.radians(30), np.radians(35))
     end = march(system, state, WEIGHT, 60 * dt, dt)
+    print(f"35° on an incline of 30°, weight at once, dt = {dt:g} s: creeps {travel(system, end, down):.1e} m")
     # Not a millionth of the 0.5 m and more that it would slide without friction within a second, and at rest.
     assert abs(travel(system, end, down)) < 2e-6
     assert np.abs(end.velocity[1]).max() < 1e-3
@@ -130,6 +131,7 @@ def test_a_block_that_carries_its_weight_sticks_at_every_step(dt):
     before = travel(system, state, down)
     state.velocity[:] = 0.0
     end = march(system, state, WEIGHT, 200 * dt, dt)
+    print(f"35° on an incline of 30°, from rest, dt = {dt:g} s: creeps {travel(system, end, down) - before:.1e} m")
     assert travel(system, end, down) == pytest.approx(before, abs=1e-10)
     assert np.abs(end.velocity[1]).max() < 1e-6
 
@@ -285,6 +287,11 @@ def test_head_on_impact_keeps_momentum_and_gains_no_energy(dt):
     # Both blocks feel the same force at the same point: momentum is kept to the round-off of the penalty forces.
     assert mass @ state.velocity[:, :2] == pytest.approx(momentum, rel=1e-9)
     _, least = exact.plastic_impact_bounds((mass[0], mass[1]), (4.0, -1.0))
+    off = np.abs(mass @ state.velocity[:, :2] - momentum).max() / np.abs(momentum).max()
+    print(
+        f"head-on impact, dt = {dt:g} s: momentum {off:.1e}, energy {energies[-1] / start:.4f} of the start (plastic impact: "
+        f"{least / start:.4f}), at most {max(energies) / start:.9f}"
+    )
     assert 0.999 * least < energies[-1] <= start
     assert max(energies) <= start * (1 + 1e-9)
 
@@ -306,6 +313,8 @@ def test_a_wall_comes_to_rest_and_carries_its_weight():
     )
     rows = state.contacts[state.contacts["other"] == 0]
     weight = 2600.0 * GRAVITY * 6 * 2.5
+    carried = rows["normal_force"].sum() / weight - 1
+    print(f"wall at rest: weight carried {carried:+.1e}, kinetic energy {kinetic[-1] / max(kinetic):.1e} of the largest")
     assert rows["normal_force"].sum() == pytest.approx(weight, rel=1e-3)
     assert kinetic[-1] < 1e-3 * max(kinetic)
     assert max(kinetic[100:]) <= max(kinetic[:100])

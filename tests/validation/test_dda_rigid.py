@@ -46,6 +46,7 @@ def test_a_column_of_rigid_blocks_carries_the_stress_that_statics_say():
     weight = 2600.0 * GRAVITY * width * height
     mean = weight * (np.arange(n, 0, -1) - 0.5) / width
     assert found.state.stress[1:, 1] == pytest.approx(-mean, rel=1e-6)
+    print(f"column of rigid blocks: stress {np.abs(found.state.stress[1:, 1] / -mean - 1).max():.1e}")
     # No lateral force: what friction of corners that settle leaves is below a millionth.
     assert np.abs(found.state.stress[1:, [0, 2]]).max() < 1e-6 * mean[0]
     assert strained(system, found.state) < 1e-14
@@ -121,6 +122,8 @@ def test_rigid_and_elastic_blocks_meet_with_momentum_kept():
         result = system.step(state, Loads(), 2e-5)
         state, budget = result.state, budget.after(result.energy)
     assert state.velocity[0, 0] < state.velocity[1, 0]
+    off = np.abs(mass @ state.velocity[:, :2] - momentum).max() / np.abs(momentum).max()
+    print(f"rigid against elastic: momentum {off:.1e}, energy unaccounted for {budget.left_over():.1e}")
     assert mass @ state.velocity[:, :2] == pytest.approx(momentum, rel=1e-9)
     # The update of the geometry: the square of a strain of v/c = 2.5e-3.
     assert abs(budget.residual) < 6e-6 * budget.turnover
