@@ -372,7 +372,7 @@ class Attempt:
         end = Middle.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
         geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
         stopped = Stopped.of(
-            found, geometry, self.settled, self.slid, velocity, end.centroid, mass, self.dt, system.slack
+            found, geometry, self.settled, self.slid, velocity, end.centroid, mass, self.dt, system.rounding
         )
         if stopped is None:
             return

@@ -186,7 +186,7 @@ def _centroids(system: BlockSystem, state: State) -> np.ndarray:
 def rounding_force(system: BlockSystem) -> float:
     """What springs like the stiffest contacts' give for the rounding of coordinates, N/m."""
     modulus = max((m.plane_modulus for m in system.materials if not m.rigid), default=0.0)
-    return _PENALTY * modulus * system.slack
+    return _PENALTY * modulus * system.rounding
 
 
 def unbalanced_force(system: BlockSystem, result: StepResult) -> float:

@@ -50,3 +50,22 @@ def test_rows_filled_again_where_contacts_have_changed_are_those_of_all_filled_a
         assert np.array_equal(state.vertices, other.vertices)
         assert np.array_equal(state.contacts, other.contacts)
     assert not any(filled)
+
+
+@pytest.mark.parametrize("make", [block_scenes.wall, block_scenes.slope])
+def test_rounding_of_coordinates_changes_no_contact_of_blocks_at_rest(make):
+    blocks = make(500)
+    state = block_scenes.at_rest(blocks)
+    system = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(0.01))
+    for _ in range(30):
+        before = state
+        result = system.step(state, WEIGHT)
+        state = result.state
+        assert result.statistics["open_close_iterations"] == 1
+        # One substitution is as good as an answer from nothing.
+        assert result.statistics["unbalanced"] <= 1e-12
+    assert system.work.factorisations == 1
+    fresh = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=block_scenes.settings(0.01)).step(before, WEIGHT)
+    assert np.abs(fresh.state.vertices - state.vertices).max() <= 4.0 * system.rounding
+    force = np.abs(fresh.contacts["normal_force"]).max()
+    assert np.abs(fresh.contacts["normal_force"] - result.contacts["normal_force"]).max() <= 1e-11 * force
