@@ -28,17 +28,8 @@ from . import assembly
 from .contact_springs import Springs
 from .contact_states import moved
 from .contacts import ContactSet
-from .path_contacts import (
-    LEAST_LEFT,
-    SHORT_OF,
-    changes,
-    linearised,
-    nearer,
-    products,
-    pulls,
-    second_order,
-    undecided,
-)
+from .path_contacts import LEAST_LEFT, SHORT_OF
+from .path_steps import THREADED, PathSteps
 
 #: The bond of a contact that has slipped and not lost all cohesion: it may slide.
 SLIPPED = 2
@@ -49,9 +40,8 @@ _START, _LEAST_START = 100.0, 0.1
 #: Further correctors of a step at most, sought while it goes less far than this (with four, paths of slopes come to an
 #: end sooner; with none they take a quarter more iterations), …
 _CORRECTORS, _FAR = 3, 0.9
-#: … that bring products to within this factor of their target, for steps longer by a factor and an amount, and are
-#: worth while where a step gets so much of this.
-_SPREAD, _FARTHER, _FURTHER, _GAIN = 10.0, 1.2, 0.1, 0.1
+#: … for steps longer by a factor and an amount, and that are worth while where a step gets so much of this.
+_FARTHER, _FURTHER, _GAIN = 1.2, 0.1, 0.1
 #: So often contacts are centred again where steps have become short, with so much larger an ε than then (with the same
 #: one the path ends where it did).
 _AGAIN, _LARGER = 4, 10.0
@@ -64,8 +54,6 @@ _PASSED_ON = 3
 #: blocks that slides, steps for which all contacts were centred again, in vain, took 250 iterations and now take 40;
 #: with ε 100 times larger one in three still does.)
 _ALONE, _ALONE_FEW, _ALONE_FAR, _ALONE_LARGER, _ALONE_AGAIN = 0.005, 8, 0.3, 1000.0, 40
-#: A contact is undecided while its force and its gap, in units of its stiffness, differ by less than this factor.
-_CLEAR = 3.0
 #: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere, …
 _END, _STUCK = 1e-14, 1e-3
 #: … and so many in a row that are shorter than this, hardly.
@@ -144,6 +132,10 @@ class CentralPath:
         slipped = bonded == SLIPPED
         some, held = (np.flatnonzero(act & which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
         order = pattern.order
+        if pattern.n >= THREADED:
+            # Beyond what caches hold, in the order of their blocks: what contacts need of one another then lies near.
+            one, two = order[found.block[some]], order[found.other[some]]
+            some = some[np.argsort(np.maximum(one, two) * pattern.n + np.minimum(one, two), kind="stable")]
         self._some, self._held = some, held
 
         def at(rows: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -152,12 +144,14 @@ class CentralPath:
         self._at, self._held_at = at(some), at(held)
         self._all_at = at(np.concatenate([some, held])) if len(held) else self._at
         self._sides = assembly.sides_of(pattern.n, order, *self._all_at[:2])
+        blocks, others, _, directions = self._at
+        self._steps = PathSteps(pattern.n, order[blocks], order[others], directions, springs.lift[some])
         self._upper, self._lower, self._all_lift = (
             np.concatenate([array[some], array[held]]) for array in (pattern.upper, pattern.lower, springs.lift)
         )
         # Bonds are springs either way.
         self._bonds = springs.normal[held], springs.shear[held], gap[held], found.shear[held]
-        self._lift, self._kn, self._ks = springs.lift[some], springs.normal[some], springs.shear[some]
+        self._kn, self._ks = springs.normal[some], springs.shear[some]
         self._rise = np.zeros(len(some))
         slides = found.state[some] == SLIP
         friction = np.where(slides, springs.friction[some], springs.peak[some])
@@ -242,19 +236,18 @@ class CentralPath:
         """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
         if self.ended:
             return 0
-        pattern, kn, mu, rough, unit = self._pattern, self._kn, self._mu, self._rough, self._unit
-        numbers, missed, laws = linearised(
-            self._normal, self._width, self._slip, self._shear, self._g, self._s, kn, self._ks, mu, self._base, rough,
-            self._rise,
-        )  # fmt: skip
-        total = products(numbers, numbers, 0.0, rough, unit)
-        epsilon = total / float((1 + 2 * rough).sum())
-        residual = (self._right - pattern.without_contacts(self._matrix, self._unknowns)).ravel()
-        add_forces(residual, *self._at, self._normal, self._shear)
+        pattern, steps, unit = self._pattern, self._steps, self._unit
+        total = steps.linearise(
+            (self._normal, self._width, self._slip, self._shear, self._g, self._s),
+            (self._kn, self._ks, self._mu, self._base, self._rough, self._rise, unit),
+            (self._right - pattern.without_contacts(self._matrix, self._unknowns)).ravel(),
+        )
+        epsilon = total / float((1 + 2 * self._rough).sum())
+        residual, laws = steps.residual, steps.laws
         kn_held, ks_held, gap_held, before_held = self._bonds
-        springs = [laws[1], laws[2], laws[3], laws[4]]
+        springs = list(np.ascontiguousarray(laws.T[1:]))
         if len(kn_held):
-            held = moved(self._unknowns, *self._held_at, self._all_lift[len(kn) :])
+            held = moved(self._unknowns, *self._held_at, self._all_lift[len(self._kn) :])
             pulled, sheared = -kn_held * (gap_held + held[:, 0]), before_held - ks_held * held[:, 1]
             add_forces(residual, *self._held_at, pulled, sheared)
             none = np.zeros(len(kn_held))
@@ -264,39 +257,29 @@ class CentralPath:
             pattern, self._data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
             self._all_lift - climb, self._sides,
         )  # fmt: skip
-        solve = solution_of(pattern, self._data)
+        solution = solution_of(pattern, self._data)
 
-        def newton(goals):
-            """Changes of the unknowns, motions (n, 2) of contacts, changes of the six positive numbers and of S, and
-            how far they may go."""
-            pulled = pulls(goals, numbers, missed, laws, self._rise)
-            side = residual.copy()
-            add_forces(side, *self._at, pulled[0], pulled[2])
-            step = solve(side, WITHIN)
-            motion = moved(step, *self._at, self._lift)
-            return step, motion, *changes(goals, numbers, missed, pulled, motion, laws, kn, mu, rough, self._rise)
+        def solve(side: np.ndarray) -> np.ndarray:
+            return solution(side, WITHIN)
 
-        _, _, changed, _, far = newton(np.zeros((3, len(kn))))
-        left = products(numbers, changed, far, rough, unit) / total
-        target = epsilon * left**3 * unit
-        goals = second_order(target, changed)
-        step, motion, changed, d_shear, far = newton(goals)
+        steps.predict(solve)
+        steps.accept()
+        target = epsilon * (steps.products() / total) ** 3
+        far = steps.correct(solve, target)
+        steps.accept()
         for _ in range(_CORRECTORS):
             if far > _FAR:
                 break
             wanted = min(1.0, _FARTHER * far + _FURTHER)
-            tried_goals = nearer(goals, numbers, changed, wanted, target, _SPREAD)
-            tried = newton(tried_goals)
-            if tried[-1] < far + _GAIN * (wanted - far):
+            if steps.centre(solve, target, wanted) < far + _GAIN * (wanted - far):
                 break
-            goals, (step, motion, changed, d_shear, far) = tried_goals, tried
+            steps.accept()
+            far = steps.step.far
         alone = None
         if far < _SHORT and self._lone < _ALONE_AGAIN:
-            far, alone = self._without_few(numbers, changed, far)
-        self._unknowns += far * step
-        self._g, self._s = self._g + far * motion[:, 0], self._s + far * motion[:, 1]
-        self._normal, self._width, *slip = (numbers + far * changed)[:4]
-        self._shear, self._slip = self._shear + far * d_shear, np.stack(slip)
+            far, alone = self._without_few(steps.numbers.T, steps.step.changed.T, far)
+        self._unknowns += far * steps.step.unknowns
+        undecided = steps.go(far)
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
         if alone is not None:
             self._lone += 1
@@ -309,7 +292,7 @@ class CentralPath:
             self._centre(self.epsilon * unit)
             return len(self._g)
         self.ended = not (epsilon > _END and far > _STUCK)
-        return undecided(self._normal, self._width, self._slip, *self._left(), kn, self._ks, rough, _CLEAR)
+        return undecided
 
     def _without_few(self, numbers: np.ndarray, changed: np.ndarray, far: float) -> tuple[float, np.ndarray | None]:
         """How far the changes (6, n) may go but for few contacts, and these, (n,) True; ``far`` and None where they

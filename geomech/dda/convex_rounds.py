@@ -54,7 +54,7 @@ class ConvexRounds(CentralPath):
         self._solve()
         self._rise = np.zeros_like(friction)
         lag, ended, falls, failures = 1.0, 1.0, _FALLS, 0
-        known, motion = self._normal, self._motion()
+        known, motion = self._normal.copy(), self._motion()
         while failures < _FAILURES:
             self._mu, self._base = self._laws(known, lag)
             if not self._solve():
@@ -62,10 +62,10 @@ class ConvexRounds(CentralPath):
                     return
                 failures += 1
                 lag, falls = ended if lag < ended else min(1.0, lag / _FALLS), min(np.sqrt(falls), _SLOWLY)
-                self._unknowns, self._g, self._s = motion
+                self._unknowns, self._g, self._s = (part.copy() for part in motion)
                 continue
             change = float(np.linalg.norm(self._normal - known)) / max(float(np.linalg.norm(self._normal)), 1e-300)
-            known, motion, ended = self._normal, self._motion(), lag
+            known, motion, ended = self._normal.copy(), self._motion(), lag
             yield change if lag else 0.0
             lag = falls * lag if falls * lag > _NONE and change > _CLOSE else 0.0
             falls = max(_FALLS, falls**2)
@@ -85,7 +85,7 @@ class ConvexRounds(CentralPath):
 
     def _motion(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The motion at hand: that of blocks and what it makes of gaps and of motions along edges."""
-        return self._unknowns.copy(), self._g, self._s
+        return self._unknowns.copy(), self._g.copy(), self._s.copy()
 
     def _solve(self) -> bool:
         """Solve the problem at hand, from afar; whether it was."""
