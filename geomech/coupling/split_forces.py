@@ -21,6 +21,7 @@ import numpy as np
 from .. import dda
 from ..conventions import normal_of, traction
 from ..dda.bonded_faces import WHOLE
+from ..dda.force_rows import EDGE_FORCE
 from ..dda.overlap import REFUSED
 from ..model import OPEN, Blocks, Loads, State
 from ..model.blocks import STRAIGHT
@@ -164,10 +165,14 @@ def contacts_after(
     if not len(found) or (found is near and not cut):
         return state.contacts
     told = _Told.none(len(found))
+    loaded = {load.edge_name for load in acting.edge_tractions}
+    wet = np.zeros(0, EDGE_FORCE)
+    if cut and acting.water is not None:
+        alone = Loads(water=acting.water)
+        wet = system.load_map.rows(alone, state.time, np.ascontiguousarray(state.vertices), state.rotation)[1]
     for parent in cut:
         _tell_of_walls(told, found, split, parent, solutions[parent], float(state.rotation[parent]))
-        loaded = {load.edge_name for load in acting.edge_tractions}
-        _tell_of_divided_edges(told, found, split, before, parent, loads[parent], loaded)
+        _tell_of_divided_edges(told, found, split, before, parent, loads[parent], loaded, wet)
     return system.told(state, found, _contacts(system, found, told, blocks, np.isin(split.parent, cut)))
 
 
@@ -273,11 +278,18 @@ def _contact_at(rows, found, across: np.ndarray, edges: tuple[int, int]) -> int:
 
 
 def _tell_of_divided_edges(
-    told: _Told, found, split: Split, before: Blocks, parent: int, load: BoundaryLoad, loaded: set[str]
+    told: _Told,
+    found,
+    split: Split,
+    before: Blocks,
+    parent: int,
+    load: BoundaryLoad,
+    loaded: set[str],
+    wet: np.ndarray,
 ) -> None:
     """The traction from outside on edges of ``parent`` that mouths have divided, or that end at a vertex that is two
-    now, to the contacts on the sides that their parts are in. Where contacts and an edge ``load`` share a side the
-    traction is not theirs alone, and nothing is told."""
+    now, to the contacts on the sides that their parts are in, but for the water's, EDGE_FORCE rows ``wet``. Where
+    contacts and an edge ``load`` share a side the traction is not theirs alone, and nothing is told."""
     blocks, owner = split.blocks, split.blocks.vertex_block
     old_vertices = np.bincount(split.vertex_origin[split.vertex_origin >= 0], minlength=before.n_vertices)
     twice = old_vertices > 1
@@ -300,10 +312,24 @@ def _tell_of_divided_edges(
         neighbour = np.where(found.block[rows] == owner[side], found.other[rows], found.block[rows])
         place, force = _loads_on(load, *blocks.vertices[list(ends)])
         lumped = _turned(_shares(at, neighbour, place) @ force, rotation)
+        place, force = _water_on(wet[np.isin(wet["edge"], edges)], *split.state.vertices[list(ends)])
+        if len(place):
+            lumped -= _shares(at, neighbour, place) @ force
         sign = np.where(found.block[rows] == owner[side], 1.0, -1.0)
         told.force[rows] += sign[:, None] * lumped
         told.slip[rows] = found.slip[rows]
         told.known[rows] = True
+
+
+def _water_on(wet: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (k,) from 0 to 1 between ``a`` and ``b``, and the forces (k, 2) N there of EDGE_FORCE rows ``wet``, all in
+    current coordinates."""
+    gauss, weight = np.polynomial.legendre.leggauss(_IN_LOAD)
+    t = 0.5 * (gauss + 1)[:, None, None]
+    point = (1 - t) * wet["start"] + t * wet["end"]
+    length = np.hypot(*(wet["end"] - wet["start"]).T)[:, None]
+    force = 0.5 * weight[:, None, None] * length * ((1 - t) * wet["traction"][:, 0] + t * wet["traction"][:, 1])
+    return np.clip(_along(point.reshape(-1, 2), a, b)[0], 0.0, 1.0), force.reshape(-1, 2)
 
 
 def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -25,6 +25,7 @@ from geomech.model import (
     PointLoad,
     Problem,
     RunSettings,
+    WaterTable,
 )
 
 TENSION, COHESION = 2e6, 3e6
@@ -164,3 +165,12 @@ def test_nothing_moves_when_a_glued_block_is_cut(law, at, loads):
         assert went < 1e-12 * stretched
     # What is bent and sheared gives way by a little more in two parts.
     assert went < 0.03 * stretched
+
+
+def test_contacts_in_water_begin_with_what_they_bear_beside_it():
+    """Below a water table joints press, or here pull, by what the water leaves; the pressure of 30 m is as much again."""
+    under = replace(pulled(0.3e6), water=WaterTable(np.array([[0.0, 30.0]])))
+    whole, parts = before_and_after(PLAIN, 0.0, under)
+    assert on_top(parts) == pytest.approx(on_top(whole), abs=300)
+    result = parts.system.step(parts.state, parts.problem.loads, 1.0)
+    assert on_top(parts, result.contacts) == pytest.approx(on_top(whole), abs=300)
