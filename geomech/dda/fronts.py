@@ -3,7 +3,7 @@
 A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel
 of two blocks at a time,
 
-    Z = F_kk⁻¹,   U = Z F_k·,   F_ij ← F_ij − F_ik U_j,
+    Z = F_kk⁻¹,   U = −Z F_k·,   F_ij ← F_ij + F_ik U_j,
 
 and what is left of F_BB is added into its parent's front (Duff & Reid 1983). Arrays of the tree are those of
 `dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) chain the children of a front.
@@ -20,16 +20,35 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, types
 
-from .lanes import BYTES, load, load_first, numbers, store, store_first
+from .lanes import (
+    BYTES,
+    load,
+    load_first,
+    load_six,
+    minus_product,
+    numbers,
+    plus,
+    plus_product,
+    spread,
+    store,
+    store_first,
+    store_six,
+    zeros,
+)
+from .products import small_product
 
 #: Kept with the kernel that calls them only, for they are made of what stands in other files, too. Sums may be
 #: reordered and fused: the products of whole fronts are summed as BLAS likes, too.
 _jit = njit(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 
-#: Unknowns eliminated at a time; twelve to thirty keep BLAS as busy.
+#: Unknowns eliminated at a time.
 PANEL = 12
-#: What so many do to the rows and columns behind them is one product: longer ones keep BLAS busier.
-STRIP = 48
+#: What so many do to the rows and columns behind them is one product, of BLAS where these are many.
+STRIP = 96
+#: Rows in which a panel is inverted: whole registers of either precision.
+SIDE = 16
+#: Numbers of a product from which BLAS is quicker: they no longer lie in the second cache.
+LARGE = 300_000
 
 #: BLAS's general products, as Numba itself binds them for np.dot: here with strides, and added in place.
 _gemm = types.ExternalFunction(
@@ -43,49 +62,66 @@ _gemm = types.ExternalFunction(
 
 
 @_jit
-def _add_product(scale, a, b, keep, c):
-    """c ← keep c + scale a b for row-major slices; ``scale`` and ``keep`` (1,) of the same type."""
-    if c.shape[0] == 0 or c.shape[1] == 0:
-        return
-    size = c.itemsize
-    # Row-major arrays are their transposes to BLAS: cᵀ = bᵀaᵀ.
-    _gemm(
-        100 if size == 8 else 115, 78, 78, c.shape[1], c.shape[0], a.shape[1], scale.ctypes, b.ctypes,
-        b.strides[0] // size, a.ctypes, a.strides[0] // size, keep.ctypes, c.ctypes, c.strides[0] // size,
-    )  # fmt: skip
+def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):
+    """C ← A B, or C + A B to ``keep`` C: ``rows`` × k times k × n numbers, where in the arrays a, b and c each matrix
+    begins, and how far apart its rows are; ``units`` (2,) are 1 and 0."""
+    if rows * n < LARGE:
+        place = numbers(c)
+        small_product(place, at_c, row_c, numbers(a), at_a, row_a, numbers(b), at_b, row_b, rows, k, n, width, keep)
+    elif k > 0:
+        # Row-major arrays are their transposes to BLAS: cᵀ = bᵀaᵀ.
+        _gemm(
+            100 if c.itemsize == 8 else 115, 78, 78, n, rows, k, units[0:].ctypes, b[at_b:].ctypes, row_b,
+            a[at_a:].ctypes, row_a, units[0 if keep else 1 :].ctypes, c[at_c:].ctypes, row_c,
+        )  # fmt: skip
+    # What is found by its place is kept until here.
+    return len(a) + len(b) + len(c)
 
 
 @_jit
-def _invert(a, swapped):
-    """Invert ``a`` (n, n) in place, Gauss–Jordan with exchange of rows; False if it is singular."""
-    n = a.shape[0]
+def _invert(front, at, m, n, cell, others, swapped, width):
+    """Invert n × n numbers of a ``front`` with rows of m, from ``at`` on, in place: Gauss–Jordan with exchange of rows;
+    False if they are singular. ``cell`` (`SIDE`² + 1,) is room, ``others`` (`SIDE`²,) ones but for a diagonal of
+    zeros."""
+    whole, here, but = numbers(front), numbers(cell), numbers(others)
+    for i in range(n):
+        for q in range(0, SIDE, width):
+            store(here, SIDE * i + q, load_first(whole, at + i * m + q, min(max(n - q, 0), width)))
     for k in range(n):
-        pivot, largest = k, abs(a[k, k])
+        pivot, largest = k, abs(cell[SIDE * k + k])
         for i in range(k + 1, n):
-            if abs(a[i, k]) > largest:
-                pivot, largest = i, abs(a[i, k])
+            size = abs(cell[SIDE * i + k])
+            if size > largest:
+                pivot, largest = i, size
         if not (largest > 0.0 and largest < np.inf):
             return False
         swapped[k] = pivot
         if pivot != k:
-            for j in range(n):
-                a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
-        share = 1 / a[k, k]
-        a[k, k] = 1
-        for j in range(n):
-            a[k, j] *= share
+            for q in range(0, SIDE, width):
+                given = load(here, SIDE * k + q)
+                store(here, SIDE * k + q, load(here, SIDE * pivot + q))
+                store(here, SIDE * pivot + q, given)
+        cell[SIDE * SIDE] = 1 / cell[SIDE * k + k]
+        share = spread(here, SIDE * SIDE)
+        cell[SIDE * k + k] = 1
+        for q in range(0, SIDE, width):
+            store(here, SIDE * k + q, plus_product(zeros(here), share, load(here, SIDE * k + q)))
         for i in range(n):
             if i != k:
-                share = a[i, k]
-                a[i, k] = 0
-                for j in range(n):
-                    a[i, j] -= share * a[k, j]
+                share = spread(here, SIDE * i + k)
+                for q in range(0, SIDE, width):
+                    rest = plus_product(zeros(here), load(here, SIDE * i + q), load(but, SIDE * k + q))
+                    store(here, SIDE * i + q, minus_product(rest, share, load(here, SIDE * k + q)))
     for k in range(n - 1, -1, -1):
         pivot = swapped[k]
         if pivot != k:
             for i in range(n):
-                a[i, k], a[i, pivot] = a[i, pivot], a[i, k]
-    return True
+                cell[SIDE * i + k], cell[SIDE * i + pivot] = cell[SIDE * i + pivot], cell[SIDE * i + k]
+    for i in range(n):
+        for q in range(0, n, width):
+            store_first(whole, at + i * m + q, load(here, SIDE * i + q), min(n - q, width))
+    # What is found by its place is kept until here.
+    return len(front) + len(cell) + len(others) > 0
 
 
 @_jit
@@ -157,16 +193,18 @@ def _runs(met, own, begins):
 
 
 @_jit
-def _add_runs(here, added, met, begins, first, last, beside):
-    """Add to the row ``here`` of a front the runs from ``first`` to before ``last`` of a child's row ``added``; ``here``
-    begins with block ``beside``."""
+def _add_runs(into, at, added, begin, met, begins, first, last, width):
+    """Add to the row of a front whose first number is ``into[at]`` the runs from ``first`` to before ``last`` of a
+    child's row that begins with ``added[begin]``."""
     for r in range(first, last):
-        v, w = 6 * begins[r], 6 * begins[r + 1]
-        j = 6 * (met[begins[r]] - beside)
-        # Slices, for their indices need no check for a negative sign, which would keep loops from vectors.
-        into, what = here[j : j + w - v], added[v:w]
-        for c in range(w - v):
-            into[c] += what[c]
+        v, j = begin + 6 * begins[r], at + 6 * met[begins[r]]
+        n = 6 * (begins[r + 1] - begins[r])
+        while n >= 3 * width:
+            for q in range(0, 3 * width, width):
+                store(into, j + q, plus(load(into, j + q), load(added, v + q)))
+            j, v, n = j + 3 * width, v + 3 * width, n - 3 * width
+        for q in range(0, n, 6):
+            store_six(into, j + q, plus(load_six(into, j + q), load_six(added, v + q)))
 
 
 @_jit
@@ -193,74 +231,94 @@ def eliminate(
     space,
 ):
     """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
-    ``stack`` (n_fronts,): where S are left in the ``room``; ``units`` are 1, −1, 0; ``space`` as from
+    ``stack`` (n_fronts,): where S are left in the ``room``; ``units`` are 1 and 0; ``space`` as from
     `working_space`."""
-    one, minus, none = units[0:1], units[1:2], units[2:3]
-    front, panel, begins, swapped = space
+    front, panel, begins, cell, others, swapped = space
+    width = BYTES // front.itemsize
+    here, further = numbers(front), numbers(room)
     for f in range(first, last):
         if not touched[f]:
             continue
         own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
         p, b = 6 * own, 6 * far
         m = p + b
-        upper = front[: p * m].reshape((p, m))
-        lower = front[p * m : p * m + b * p].reshape((b, p))
-        rest = room[stack[f] : stack[f] + b * b].reshape((b, b))
+        # Rows of m of the own unknowns, then rows of p of the others; where F_BB is left.
+        lower, rest = p * m, stack[f]
         _clear(front[: p * m + b * p])
         for k in range(entries[f], entries[f + 1]):
             i, j = row[k], column[k]
             block = data[36 * entry[k] : 36 * entry[k] + 36]
+            to, apart = (6 * i * m + 6 * j, m) if i < own else (lower + 6 * (i - own) * p + 6 * j, p)
             for a in range(6):
-                here = (upper[6 * i + a] if i < own else lower[6 * (i - own) + a])[6 * j : 6 * j + 6]
+                into = front[to + a * apart : to + a * apart + 6]
                 for c in range(6):
-                    here[c] = block[6 * a + c]
+                    into[c] = block[6 * a + c]
         # What children leave in the rows and columns that are eliminated here; the rest of it below.
         g = child[f]
         while g >= 0:
             met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
-            left = room[stack[g] : stack[g] + n * n].reshape((n, n))
             runs, mine = _runs(met, own, begins)
             for u in range(len(met)):
-                i = met[u]
+                i, left = met[u], stack[g] + 6 * u * n
                 for a in range(6):
                     if i < own:
-                        _add_runs(upper[6 * i + a], left[6 * u + a], met, begins, 0, runs, 0)
+                        _add_runs(here, (6 * i + a) * m, further, left + a * n, met, begins, 0, runs, width)
                     else:
-                        _add_runs(lower[6 * (i - own) + a], left[6 * u + a], met, begins, 0, mine, 0)
+                        to = lower + (6 * (i - own) + a) * p
+                        _add_runs(here, to, further, left + a * n, met, begins, 0, mine, width)
             g = sibling[g]
         for begin in range(0, p, STRIP):
             stop = min(begin + STRIP, p)
             for start in range(begin, stop, PANEL):
                 end = min(start + PANEL, stop)
-                if not _invert(upper[start:end, start:end], swapped):
+                h, k, known = end - start, start - begin, begin * m + start
+                if k > 0:
+                    # What this strip's panels before do to the rows of this one, and to the columns below.
+                    small_product(
+                        here, start * m + start, m, here, start * m + begin, m, here, known, m, h, k, m - start, width,
+                        True,
+                    )  # fmt: skip
+                    small_product(
+                        here, end * m + start, m, here, end * m + begin, m, here, known, m, p - end, k, h, width, True
+                    )
+                    small_product(here, lower + start, p, here, lower + begin, p, here, known, m, b, k, h, width, True)
+                if not _invert(front, start * m + start, m, h, cell, others, swapped, width):
                     return False
-                right = panel[: (end - start) * (m - end)].reshape((end - start, m - end))
-                scaled = upper[start:end, end:]
-                for i in range(end - start):
-                    copied, given = right[i], scaled[i]
-                    for j in range(m - end):
-                        copied[j] = given[j]
-                _add_product(one, upper[start:end, start:end], right, none, scaled)
-                _add_product(minus, upper[end:stop, start:end], scaled, one, upper[end:stop, end:])
-                _add_product(minus, upper[stop:, start:end], scaled[:, : stop - end], one, upper[stop:, end:stop])
-                _add_product(minus, lower[:, start:end], scaled[:, : stop - end], one, lower[:, end:stop])
-            _add_product(minus, upper[stop:, begin:stop], upper[begin:stop, stop:], one, upper[stop:, stop:])
-            _add_product(minus, lower[:, begin:stop], upper[begin:stop, stop:p], one, lower[:, stop:])
+                for i in range(h):
+                    copied = panel[i * (m - end) : (i + 1) * (m - end)]
+                    given = front[(start + i) * m + end : (start + i + 1) * m]
+                    for j in range(len(copied)):
+                        copied[j] = -given[j]
+                small_product(
+                    here, start * m + end, m, here, start * m + start, m, numbers(panel), 0, m - end, h, h, m - end,
+                    width, False,
+                )  # fmt: skip
+            k, known = stop - begin, begin * m + stop
+            if stop < p:
+                _add_product(
+                    front, stop * m + begin, m, front, known, m, front, stop * m + stop, m, p - stop, k, m - stop, True,
+                    width, units,
+                )  # fmt: skip
+                _add_product(
+                    front, lower + begin, p, front, known, m, front, lower + stop, p, b, k, p - stop, True, width, units
+                )
         if p > 0:
-            _add_product(minus, lower, upper[:, p:], none, rest)
+            _add_product(front, lower, p, front, p, m, room, rest, b, b, p, b, False, width, units)
         else:
-            _clear(rest.reshape(b * b))
+            _clear(room[rest : rest + b * b])
         _leave(front, p, m, factors, at[f], back[f])
         g = child[f]
         while g >= 0:
             met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
-            left = room[stack[g] : stack[g] + n * n].reshape((n, n))
             runs, mine = _runs(met, own, begins)
             for u in range(begins[mine], len(met)):
+                i, left = 6 * (met[u] - own), stack[g] + 6 * u * n
                 for a in range(6):
-                    _add_runs(rest[6 * (met[u] - own) + a], left[6 * u + a], met, begins, mine, runs, own)
+                    to = rest + (i + a) * b - p
+                    _add_runs(further, to, further, left + a * n, met, begins, mine, runs, width)
             g = sibling[g]
-    return True
+    # What is found by its place is kept until here.
+    return len(room) + len(front) + len(panel) > 0
 
 
 @_jit
@@ -271,4 +329,6 @@ def working_space(pivots, reach, factors):
         p, b = 6 * (pivots[f + 1] - pivots[f]), 6 * (reach[f + 1] - reach[f])
         most, far, size = max(most, p + b), max(far, b), max(size, p * (p + 2 * b))
     front, panel = np.empty(size, factors.dtype), np.empty(PANEL * most, factors.dtype)
-    return front, panel, np.empty(far // 6 + 1, np.int64), np.empty(PANEL, np.int64)
+    cell, others = np.empty(SIDE * SIDE + 1, factors.dtype), np.ones(SIDE * SIDE, factors.dtype)
+    others[:: SIDE + 1] = 0
+    return front, panel, np.empty(far // 6 + 1, np.int64), cell, others, np.empty(PANEL, np.int64)

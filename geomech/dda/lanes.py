@@ -119,6 +119,34 @@ def load_first(typingctx, where, index, n):
 
 
 @intrinsic
+def load_six(typingctx, where, index):
+    """As `load_first` of six, which waits for none of what was written just beside them."""
+
+    def codegen(context, builder, signature, args):
+        dtype = signature.return_type.dtype
+        vector = _vector(dtype)
+        six = ir.VectorType(vector.element, 6)
+        these = builder.load(_address(builder, args, six), align=dtype.bitwidth // 8)
+        return builder.shuffle_vector(these, ir.Constant(six, None), _places([*range(6), *[6] * (vector.count - 6)]))
+
+    return Lanes(where.dtype)(where, types.intp), codegen
+
+
+@intrinsic
+def store_six(typingctx, where, index, value):
+    """As `store_first` of six; see `load_six`."""
+
+    def codegen(context, builder, signature, args):
+        vector = args[2].type
+        six = ir.VectorType(vector.element, 6)
+        these = builder.shuffle_vector(args[2], ir.Constant(vector, ir.Undefined), _places(range(6)))
+        builder.store(these, _address(builder, args, six), align=signature.args[2].dtype.bitwidth // 8)
+        return context.get_dummy_value()
+
+    return types.void(where, types.intp, value), codegen
+
+
+@intrinsic
 def store(typingctx, where, index, value):
     """Write the register ``value`` to the numbers from ``index`` on."""
 

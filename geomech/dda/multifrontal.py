@@ -177,7 +177,7 @@ class Factors:
         self._room = np.empty(self.tree.own_room_size if again else self.tree.stack_size, dtype)
         self._again, self._left = again, False
         self._passed = np.empty(6 * self.tree.reach[-1], dtype)
-        self._units = np.array([1.0, -1.0, 0.0], dtype)
+        self._units = np.array([1.0, 0.0], dtype)
 
     @property
     def single(self) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from .fronts import PANEL
-from .lanes import BYTES, copy, load, load_first, minus, numbers, plus, plus_product, store_first, sums, zeros
+from .lanes import BYTES, copy, load, load_first, load_six, minus, numbers, plus, plus_product, store_six, sums, zeros
 
 #: Not kept by themselves: what they are made of stands in other files, too.
 _jit = njit(fastmath=False, error_model="numpy", nogil=True)
@@ -64,20 +64,20 @@ def forward(first, last, out, pivots, reach, seat, at, child, sibling, factors, 
         while g >= 0:
             for u in range(reach[g], reach[g + 1]):
                 i = 6 * seat[u]
-                store_first(x, i, plus(load_first(x, i, 6), load_first(left, 6 * u, 6)), 6)
+                store_six(x, i, plus(load_six(x, i), load_six(left, 6 * u)))
             g = sibling[g]
         here = at[f]
         for start in range(0, p, PANEL):
             end = min(start + PANEL, p)
             for i in range(start, end, 6):
-                store_first(y, i - start, minus(load_first(x, i, 6), _six(rows, here, x, 0, start, width)), 6)
+                store_six(y, i - start, minus(load_six(x, i), _six(rows, here, x, 0, start, width)))
                 here += 6 * start
             for i in range(start, end, 6):
-                store_first(x, i, _six(rows, here, y, 0, end - start, width), 6)
+                store_six(x, i, _six(rows, here, y, 0, end - start, width))
                 here += 6 * (end - start)
         copy(x, 0, solution, 6 * pivots[f], p, width)
         for i in range(p, m, 6):
-            store_first(left, 6 * reach[f] + i - p, minus(load_first(x, i, 6), _six(rows, here, x, 0, p, width)), 6)
+            store_six(left, 6 * reach[f] + i - p, minus(load_six(x, i), _six(rows, here, x, 0, p, width)))
             here += 6 * p
     # What is read by its place is kept until here.
     return len(known) + len(part) + len(out) + len(passed) + len(factors)
@@ -94,12 +94,12 @@ def backward(first, last, out, pivots, reach, boundary, back, factors):
         m = p + 6 * n
         copy(solution, 6 * pivots[f], x, 0, p, width)
         for u in range(n):
-            store_first(x, p + 6 * u, load_first(solution, 6 * boundary[reach[f] + u], 6), 6)
+            store_six(x, p + 6 * u, load_six(solution, 6 * boundary[reach[f] + u]))
         here = back[f]
         for start in range(PANEL * ((p - 1) // PANEL), -1, -PANEL):
             end = min(start + PANEL, p)
             for i in range(start, end, 6):
-                store_first(x, i, minus(load_first(x, i, 6), _six(rows, here, x, end, m - end, width)), 6)
+                store_six(x, i, plus(load_six(x, i), _six(rows, here, x, end, m - end, width)))
                 here += 6 * (m - end)
         copy(x, 0, solution, 6 * pivots[f], p, width)
     return len(known) + len(out) + len(factors)

@@ -8,7 +8,7 @@ from scipy.sparse import bsr_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 
-from geomech.dda import block_solver, dissection, multifrontal, shared_tasks
+from geomech.dda import block_solver, dissection, fronts, lanes, multifrontal, shared_tasks
 from geomech.dda.block_solver import BlockSolver
 
 
@@ -169,6 +169,25 @@ def test_rough_solutions_have_the_residual_asked_for_and_leave_the_exact_ones_al
     # Beyond the range of single precision they are the exact ones.
     x = solver.rough_solution(1e50 * data.ravel())(right, 1e-4)
     assert np.abs(1e50 * x - exact).max() <= 1e-8 * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_products_of_parts_of_fronts_are_those_of_numpy(dtype):
+    rng = np.random.default_rng(3)
+    front = rng.normal(size=(720, 700)).astype(dtype)
+    units, width = np.array([1, 0], dtype), lanes.BYTES // front.itemsize
+    # Of whole registers and not, one and more; the last one is for BLAS.
+    for rows, k, n in ((6, 1, 1), (12, 7, 16), (6, 12, 18), (18, 12, 33), (12, 30, 64), (30, 5, 70), (660, 30, 660)):
+        a, b = front[24 : 24 + rows, :k], front[:k, 35 : 35 + n]
+        product = a.astype(float) @ b.astype(float)
+        for keep in (False, True):
+            c = front.copy() if keep else np.full_like(front, np.nan)
+            expected = c.astype(float)
+            expected[60 : 60 + rows, 40 : 40 + n] = product + (front[60 : 60 + rows, 40 : 40 + n] if keep else 0.0)
+            given = front.ravel(), 24 * 700, 700, front.ravel(), 35, 700, c.reshape(-1), 60 * 700 + 40, 700
+            fronts._add_product(*given, rows, k, n, keep, width, units)
+            # What lies beside them is as it was.
+            assert np.allclose(c, expected, rtol=0.0, atol=100 * np.finfo(dtype).eps, equal_nan=True)
 
 
 def test_result_does_not_depend_on_threads(monkeypatch):
