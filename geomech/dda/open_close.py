@@ -69,8 +69,8 @@ _NEAR_ITS_END, _TO_ITS_END = 1e-6, 12
 #: From so many free blocks on, a step in motion is cut as soon as few contacts stop its path, which has then come to
 #: where no states are near that fit, somewhere in so large a system: half the step goes through. (A slope of 20 000
 #: blocks under sudden weight, 10 ms: stopped after 33 iterations and, followed further, nowhere after 600 s; its half
-#: takes 47.) Nor are states switched again where more than `_FEW_OF_ALL` are wrong: an iteration far from the right
-#: ones asks for factors in double precision, which of 100 000 blocks take 19 s and 2 GB more.
+#: takes 43.) Nor are states switched at all where more than `_FEW_OF_ALL` are wrong: an iteration far from the right
+#: ones asks for factors in double precision, which of 100 000 blocks take 20 s and 2 GB more.
 MANY = 15_000
 #: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces
 #: change by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
@@ -458,7 +458,7 @@ def settle(
         seen.add(states.key)
         tries = 0 if number <= _FEWER * fewest else tries + 1
         fewest = min(fewest, number)
-        most_tries = 0 if hurried else _TRIES
+        most_tries = -1 if hurried else _TRIES
         if not few and number <= _FEW_OF_ALL * len(found):
             most_tries = _TRIES_OF_FEW if cheap else _TRIES
         stuck = caution == _ALL and (returned or tries > most_tries)
