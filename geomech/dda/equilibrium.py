@@ -116,7 +116,7 @@ def equilibrium(
             order = np.argsort(-speed, kind="stable")
             moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
             named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
-            reason += f"; {named}{' and others' if len(moving) > 5 else ''} move"
+            reason += f"; {named}{' and others' if len(moving) > 5 else ''} move{'s' if len(moving) == 1 else ''}"
         rest = replace(state, time=begin.time, velocity=np.zeros_like(state.velocity))
         rows = np.array(history, RELAXATION_STEP) if history else np.empty(0, RELAXATION_STEP)
         log.info("static equilibrium: %s (%d steps)", reason, len(rows))

@@ -96,6 +96,7 @@ SPOILT = [
     ("[run]", "[run]\nlongest_step_s = 3", "run.longest_step_s", 'belongs to stepping "events"', "run.stepping"),
     ("density_kg_m3 = 2500", "density_kg_m3 = 2500\nrigid = true", "materials.rock.rigid", "holds a crack", "rigid"),
     ("[run]", "[dda]\nnewmark = [0.2, 0.5]\n[run]", "dda.newmark", "not stable at every time step", "trapezoidal"),
+    ("[run]", "[dda]\nnewmark = [0.5, 0.5]\n[run]", "dda.newmark", "blocks that bounce gain energy", "trapezoidal"),
     (
         "[run]",
         "[dda]\nrayleigh_fractions = [0.02, 0.02]\n[run]",
