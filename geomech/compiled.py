@@ -1,7 +1,13 @@
-"""Kernels that are kept between runs, and compiled anew when anything that they call has changed, in whatever file.
+"""Kernels that are kept between runs, each with all that it calls.
 
 Numba keeps compiled code with a digest of the one file that a kernel stands in. What the kernel calls is part of its
-code, so that after an upgrade in which only that has changed the old code would be taken.
+code, so that after an upgrade in which only that has changed the old code would be taken: here the digest is of that
+too.
+
+Numba leaves the copies of what a kernel calls open to whoever loads code of the same name earlier. In the run that
+compiles that is what was called, compiled by itself; in runs that find the kernel compiled it is the kernel's own copy,
+which was optimised with it and fuses other products with sums: other last digits. Here they are the kernel's alone, and
+what only kernels call (`part`) is made machine code nowhere else.
 """
 
 from __future__ import annotations
@@ -14,14 +20,17 @@ from pathlib import Path
 from types import CodeType
 
 import numpy as np
+from llvmlite import binding as llvm
 from numba import config, njit
 from numba.core.caching import UserProvidedCacheLocator
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.dispatcher import Dispatcher
 
 
 def kept(**options) -> Callable:
-    """``njit(cache=True, **options)`` whose compiled code goes with the sources of all that the kernel calls within its
-    package."""
+    """``njit(cache=True, **options)`` for a kernel that Python calls: its compiled code goes with the sources of all
+    that it calls within its package, and calls nothing that is compiled elsewhere."""
 
     def compiled(function: Callable) -> Dispatcher:
         # Only while this one is declared: other packages' kernels are theirs. Where nothing can be written Numba has
@@ -30,11 +39,102 @@ def kept(**options) -> Callable:
         places = f"{__name__}.WithCalled,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator"
         config.CACHE_LOCATOR_CLASSES = places
         try:
-            return njit(cache=True, **options)(function)
+            return njit(cache=True, no_cfunc_wrapper=True, pipeline_class=_KernelCompiler, **options)(function)
         finally:
             config.CACHE_LOCATOR_CLASSES = before
 
     return compiled
+
+
+def part(**options) -> Callable:
+    """``njit(**options)`` for what kernels alone call: it is compiled with them."""
+
+    def compiled(function: Callable) -> Dispatcher:
+        made = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **options)(function)
+        # There is nothing that Python could call: it is told so, and nothing is put where it would be found.
+        made._insert = lambda *signature, **how: None
+        made._compile_for_args = functools.partial(_refuse, function.__qualname__)
+        return made
+
+    return compiled
+
+
+def _refuse(name: str, *args, **kwargs) -> None:
+    raise TypeError(f"{name} is part of kernels, which alone can call it")
+
+
+class _Kernel(JITCodeLibrary):
+    """Machine code that calls its own copies of what it was linked with."""
+
+    def _finalize_final_module(self) -> None:
+        # What other kernels are linked with stays as it was: they must find one copy, not one by each way to it.
+        self._shared_module = _for_linking(self._final_module)
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage == llvm.Linkage.linkonce_odr:
+                function.linkage = "internal"
+        super()._finalize_final_module()
+        here = {variable.name for variable in self._final_module.global_variables}
+        for name, environment in _environments(self).items():
+            if name in here:
+                self._codegen.set_env(name, environment)
+
+
+class _Part(JITCodeLibrary):
+    """Code to be linked with, of which no machine code is made."""
+
+    @property
+    def codegen(self) -> _Part:
+        return self
+
+    def set_env(self, name: str, environment) -> None:
+        """What the code takes from Python; told to the kernel that is linked with it."""
+        self.environment = name, environment
+
+    def finalize(self) -> None:
+        self._raise_if_finalized()
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalize_dynamic_globals()
+        self._shared_module = _for_linking(self._final_module)
+        self._finalized = True
+
+
+def _for_linking(module: llvm.ModuleRef) -> llvm.ModuleRef:
+    """A copy of which others take what they need, as `CPUCodeLibrary._get_module_for_linking` makes it."""
+    shared = module.clone()
+    for function in shared.functions:
+        if not function.is_declaration and function.linkage == llvm.Linkage.external:
+            function.linkage = "linkonce_odr"
+    return shared
+
+
+def _environments(library: JITCodeLibrary) -> dict:
+    """Those of the parts that a ``library`` was linked with, by name."""
+    found = {}
+    for linked in library._linking_libraries:
+        found |= _environments(linked)
+        if isinstance(linked, _Part):
+            found |= [linked.environment]
+    return found
+
+
+class _KernelCompiler(Compiler):
+    """Numba's own, into a `_Kernel`."""
+
+    library = _Kernel
+
+    def compile_extra(self, function: Callable):
+        if self.state.library is None:
+            self.state.library = self.library(self.state.targetctx.codegen(), function.__qualname__)
+            self.state.library.enable_object_caching()
+        return super().compile_extra(function)
+
+
+class _PartCompiler(_KernelCompiler):
+    """Numba's own, into a `_Part`."""
+
+    library = _Part
 
 
 class WithCalled(UserProvidedCacheLocator):

@@ -1,9 +1,12 @@
 """Compiled kernels must not lie in the package: what pip does not know of, it leaves behind."""
 
+import math
 import os
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 import geomech
 
@@ -76,7 +79,7 @@ def test_kernels_that_call_into_other_files_are_stamped_by_those_too():
 
     from numba.core.dispatcher import Dispatcher
 
-    from geomech.compiled import WithCalled, compiled_in
+    from geomech.compiled import WithCalled, _KernelCompiler, compiled_in
 
     reaching, kernels, constants = 0, 0, set()
     for package in ("dda", "ddm", "coupling", "model"):
@@ -84,6 +87,8 @@ def test_kernels_that_call_into_other_files_are_stamped_by_those_too():
             for value in vars(importlib.import_module(module.name)).values():
                 if isinstance(value, Dispatcher) and value.__module__ == module.name and value._cache.cache_path:
                     kernels += 1
+                    # Else what it calls may be another's code, see below.
+                    assert issubclass(value._compiler.pipeline_class, _KernelCompiler), value
                     files, taken = compiled_in(value.py_func)
                     constants |= set(taken)
                     if files - {value.py_func.__code__.co_filename}:
@@ -92,3 +97,58 @@ def test_kernels_that_call_into_other_files_are_stamped_by_those_too():
     assert kernels > 20 and reaching > 5
     # Numbers of other files are a part of the stamp by their value.
     assert "geomech.ddm.kernels.WIDTH" in constants
+
+
+def test_a_kernel_calls_its_own_copies_only(tmp_path):
+    """What is open to code of the same name that was loaded earlier is other code in the run that compiles than in all
+    later ones. A part that is called from two places stays a function; only Python's way in may be seen from outside."""
+    (tmp_path / "parts_of.py").write_text(
+        "import numpy as np\nfrom geomech.compiled import kept, part\n"
+        "@part(error_model='numpy')\ndef long(x):\n"
+        "    for k in range(len(x)):\n"
+        + "        x[k] = np.sin(x[k]) * np.cos(x[k]) + np.exp(-x[k]) ** 1.5\n" * 12  # too long to be inlined
+        + "    return x.sum()\n"
+        "@kept(error_model='numpy')\ndef twice(x):\n    return long(x) + long(x)\n"
+    )
+    code = (
+        "import numpy as np, parts_of\n"
+        "print(parts_of.twice(np.full(3, 0.5)))\n"
+        "cached, = parts_of.twice.overloads.values()\n"
+        "print([f.name for f in cached.library.get_defined_functions() if 'linkonce' in str(f.linkage)])\n"
+        "print(sum('long' in f.name for f in cached.library.get_defined_functions()))\n"
+        "try:\n    parts_of.long(np.ones(3))\n"
+        "except TypeError as error:\n    print(error)\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), str(Path(geomech.__file__).resolve().parents[1])])
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    total, open_to_others, own, refused = done.stdout.splitlines()
+    x, expected = [0.5] * 3, 0.0
+    for _ in range(2):
+        for _ in range(12):
+            x = [math.sin(v) * math.cos(v) + math.exp(-v) ** 1.5 for v in x]
+        expected += sum(x)
+    assert float(total) == pytest.approx(expected, rel=1e-14)
+    assert open_to_others == "[]" and int(own) == 1
+    assert "kernels" in refused
+    assert [file.name.split("-")[0] for file in (tmp_path / "kernels").rglob("*.nbi")] == ["parts_of.twice"]
+
+
+@pytest.mark.slow
+def test_the_run_that_compiles_gives_the_same_bits_as_later_ones(tmp_path):
+    """Influence of two cracks on each other: its kernel calls parts whose products may be fused with sums."""
+    code = (
+        "import numpy as np\n"
+        "from geomech import ddm\n"
+        "from geomech.model import Cracks, Material\n"
+        "lines = [np.array([[0.0, 0.0], [1e-2, 3e-3]]), np.array([[2e-3, 4e-3], [9e-3, 1e-2]])]\n"
+        "body = ddm.Body([], Cracks.from_polylines(lines), Material('rock', 17e9, 0.21, k_ic=2e6))\n"
+        "solution = body.solve(ddm.BodyLoad(remote_stress=np.array([1e6, 2e6, 5e5])))\n"
+        "print(solution.tips.tobytes().hex(), solution.stress(np.array([[1e-2, 2e-2], [4e-3, 3e-3]])).tobytes().hex())"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    runs = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True).stdout
+        for _ in range(3)
+    ]
+    assert runs[0] == runs[1] == runs[2]

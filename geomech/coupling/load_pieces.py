@@ -9,12 +9,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..compiled import part
 from ..model import Blocks
 
 #: Of what kernels call, and nobody else.
-jit = njit(error_model="numpy", nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+jit = part(error_model="numpy", nogil=True)
 
 #: Two edges belong to one joint face when their directions differ by less than this.
 FACE_ANGLE = math.radians(10.0)

@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
-from ..compiled import kept
+from ..compiled import kept, part
 from ..model import OPEN, SLIP, STICK
 from .block_solver import BlockSolver
 from .shared_tasks import add_at_once, await_value, crew
@@ -117,7 +116,7 @@ def sparse_pattern(
     )
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def contact_vectors(block, other, geometry, order, moments):
     """(n, 2, 12): relative motion of vertex and edge along the normal and along the edge, per unit of the unknowns.
 
@@ -149,7 +148,7 @@ def contact_vectors(block, other, geometry, order, moments):
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def sides_of(n, order, block, other):
     """The sides of contacts that each of ``n`` blocks with unknowns has: (n + 1,) where they begin in (k,), 2 c for the
     vertex of contact c and 2 c + 1 for its edge, ascending."""
@@ -174,7 +173,7 @@ def sides_of(n, order, block, other):
     return start[: n + 1], side
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
+@part(fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
 def _add_block(data, first, stride, push, drag, pull, across):
     """Add the 6 × 6 of ``push`` ⊗ ``pull`` + ``drag`` ⊗ ``across`` (6,) to the block that begins at ``first``. (Written
     out and inlined, a row summed before it is stored: half of the time of loops.)"""
@@ -187,7 +186,7 @@ def _add_block(data, first, stride, push, drag, pull, across):
         here[0], here[1], here[2], here[3], here[4], here[5] = h0, h1, h2, h3, h4, h5
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 def _fill_rows(
     first, last, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
     normal, shear, slope, lift,
@@ -239,7 +238,7 @@ def _fill_shared(
     await_value(told, 0, shares)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _fill_again(
     most, held, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
     normal, shear, slope, lift,
@@ -298,7 +297,7 @@ def assemble(
     crew().share(_fill_shared, claimed, told, SHARE, *sides, data, matrix, *at, *laws)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _springs(
     right, base_right, block, other, order, vectors, state, direction, gap, normal, shear, friction, sliding, lift,
     shear0,

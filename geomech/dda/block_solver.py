@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
 from ..compiled import kept
 from .directions import Directions
@@ -25,7 +24,7 @@ from .multifrontal import Factors
 from .shared_tasks import add_at_once, await_value, crew
 from .work import Work
 
-_jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+_jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
 #: The largest residual of a solution, relative to the largest force in the right-hand side (blocks at rest leave 3e-8 of
 #: it, the rounding of coordinates times stiff springs), …
@@ -55,7 +54,7 @@ SINGLE = 4000
 SHARED, SHARE = 4000, 512
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+@kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 def _multiply_rows(first, last, data, pointer, columns, x, out):
     """A x for the rows of 6×6 blocks from ``first`` to before ``last``. (Written out, for only whole sums of six become
     vector instructions: four times as fast as loops.)"""

@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 
 #: Bonds of a CONTACT row: whole, and cracked from its edge, so that it holds only while it is pressed.
@@ -84,7 +84,7 @@ def on_lines(
     return some[by_face], start, along[by_face]
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _on_one_line(first, last, swapped, geometry):
     """Number of the face of each contact (n,), and where it lies along it (m), the contacts ordered by pairs of
     blocks."""
@@ -112,7 +112,7 @@ def _on_one_line(first, last, swapped, geometry):
     return face, along
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def check_faces(
     start,
     rows,

@@ -21,8 +21,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .contact_springs import Springs
@@ -64,7 +64,7 @@ _BLOCKED, _SHORT = 5, 0.05
 WITHIN = 1e-5
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 def add_forces(right, block, other, order, vectors, normal, shear):
     """Add to ``right`` (6 n,) the forces ``normal`` and ``shear`` (n_contacts,) on the blocks."""
     for c in range(block.shape[0]):

@@ -4,11 +4,11 @@ times as often, and NumPy copies what has fields at a tenth of the speed of memo
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept
 from ..model import CONTACT, OPEN
 
-_jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+_jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
 
 @_jit

@@ -13,8 +13,8 @@ smaller penetration carries the contact; each is stored as the other's *partner*
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from .near_pairs import boxes
 
 # Corners and edges that interpenetrate by less than this angle (sine, about 3°) still count as touching face to face.
@@ -34,14 +34,14 @@ _NEARER = 1e-2
 _MATING = 0.9986
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _dot_to(vertices, origin, target, nx, ny):
     """Component along (nx, ny) of the unit vector from one vertex to another."""
     dx, dy = vertices[target, 0] - vertices[origin, 0], vertices[target, 1] - vertices[origin, 1]
     return (dx * nx + dy * ny) / np.sqrt(dx * dx + dy * dy)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _against(vertices, next_vertex, previous_vertex, vertex, edge):
     """Vertex against edge: (by how much its neighbours point away from the edge, as a sine, outward normal x, y, gap,
     distance along, length)."""
@@ -57,7 +57,7 @@ def _against(vertices, next_vertex, previous_vertex, vertex, edge):
     return away, ty, -tx, px * ty - py * tx, px * tx + py * ty, length
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, window):
     """Whether a ``vertex`` outside an edge of the normal (nx, ny) by this ``gap``, with neighbours outside as well, may
     be turned to it though one is nearer, in a step in which corners come nearer by the ``window`` at most."""
@@ -69,7 +69,7 @@ def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, wi
     return True
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _nearer(vertices, here, one, other):
     """Whether vertex ``here`` is nearer to vertex ``one`` than to the ``other``."""
     ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
@@ -77,7 +77,7 @@ def _nearer(vertices, here, one, other):
     return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _meet(vertices, next_vertex, previous_vertex, v, w):
     """Whether two corners are each other's: neither is nearer to a neighbour of the other along its outline."""
     return not (
@@ -88,7 +88,7 @@ def _meet(vertices, next_vertex, previous_vertex, v, w):
     )
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
     """Whether an edge with this ``gap`` is what ``vertex`` meets at a corner, rather than the corner's ``other``
     edge."""
@@ -96,7 +96,7 @@ def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
     return away < -_ANGLE or gap >= beside
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _place(keys, key):
     """Where ``key`` stands in the sorted ``keys``, −1 if nowhere."""
     low, high = 0, keys.shape[0]
@@ -109,7 +109,7 @@ def _place(keys, key):
     return low if low < keys.shape[0] and keys[low] == key else -1
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _add(table, count, first, vertex, edge):
     """Row of (vertex, edge) among the rows from ``first`` on, appended if new; ``table`` must have room."""
     for row in range(first, count):
@@ -122,7 +122,7 @@ def _add(table, count, first, vertex, edge):
     return count
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _join_partners(table, row, other):
     for column in (2, 3):
         if table[row, column] == other:
@@ -151,7 +151,7 @@ def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, pairs, w
         room *= 2
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, window, old_keys):
     """Fill ``table`` with the contacts of ``pairs`` and return their number, or −1 when it has no room for them.
 
@@ -302,7 +302,7 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
     return count
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def describe_contacts(
     table, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
 ):

@@ -9,8 +9,8 @@ elastic-plastic spring, under which exactly one of the states fits a given motio
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from ..model import OPEN, SLIP, STICK
 
 #: Strengths are known to this part of themselves; slip, which is counted from the step's start, to this part of the
@@ -19,10 +19,10 @@ _KNOWN, _OF_SLIP = 1e-9, 1e-3
 
 
 #: Products may be fused into sums.
-_jit = njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)
+_jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 
-@njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
+@part(fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
 def _move(unknowns, block, other, order, vectors, c):
     """Motion of contact ``c`` along the normal and along the edge. (Inlined: to call it takes twice as long as the
     sums.)"""
@@ -70,7 +70,7 @@ def contact_forces(
     return forces
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def check_states(
     forces,
     partner,

@@ -9,9 +9,10 @@ restarts, and what nearly singular parts of A cost one right side its successors
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-_jit = njit(cache=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+from ..compiled import kept
+
+_jit = kept(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
 
 
 @_jit

@@ -10,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from ..compiled import kept, part
 
 #: Blocks in a leaf of the dissection: smaller ones cost more calls, larger ones more arithmetic (measured on walls).
 LEAF = 10
@@ -64,7 +65,7 @@ class Tree:
     above: np.ndarray
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _best_cut(order, pointer, neighbour, place, least):
     """(price, k, whether the first part gives the separator) of the cheapest cut of the blocks in ``order`` into the
     first k and the rest, neither below ``least``; ``place`` (n,) is room, −1 all over, and left so."""
@@ -98,7 +99,7 @@ def _best_cut(order, pointer, neighbour, place, least):
     return price, at, mine
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _meets(order, at, mine, pointer, neighbour, place):
     """(m,) whether each block in ``order`` is of the first ``at`` (or, not ``mine``, of the rest) and meets one on the
     other side."""
@@ -151,7 +152,7 @@ def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> t
     return fronts, np.array(parent, dtype=np.int64)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _seat(number, front, pivots, reach, boundary):
     """Where a block stands in a front: its own first, then its boundary."""
     if number < pivots[front + 1]:
@@ -160,7 +161,7 @@ def _seat(number, front, pivots, reach, boundary):
     return pivots[front + 1] - pivots[front] + np.searchsorted(met, number)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _reached(blocks, rank, pivots, parent, pointer, neighbour):
     """``reach``, ``boundary`` and ``seat`` of a `Tree`; ``blocks`` (n,) in the order of elimination."""
     n_fronts = len(parent)
@@ -197,7 +198,7 @@ def _reached(blocks, rank, pivots, parent, pointer, neighbour):
     return reach, boundary[:top].copy(), seat
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _places(row, column, entry, entries, pivots, reach, boundary):
     """Where the rows and columns of the matrix blocks ``entry`` (…,), given by their blocks' numbers, stand in their
     fronts."""

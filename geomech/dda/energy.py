@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from ..model import OPEN, SLIP
 
 log = logging.getLogger(__name__)
@@ -71,7 +71,7 @@ class StepEnergy(NamedTuple):
         return self.kinetic + self.elastic + self.contact
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _product(first, second, b, c, d, area, xx, yy, xy):
     """∫ u·w of two first-order fields with unknowns ``first[b]`` and ``second[b]``, whose strains c and d stand apart,
     over a block of these moments."""
@@ -84,13 +84,13 @@ def _product(first, second, b, c, d, area, xx, yy, xy):
     return total
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _push(stiffness, gap, limit):
     """Normal force (N) of a contact's spring, straight or of Bandis' hyperbolic closure."""
     return -stiffness * gap / (1.0 + gap / limit)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _stored(stiffness, gap, limit, bonded):
     """Energy (J/m) of a contact's normal spring; apart, only a bonded one has any."""
     if gap > 0.0 and bonded == 0:
@@ -101,7 +101,7 @@ def _stored(stiffness, gap, limit, bonded):
     return stiffness * limit * limit * (-closed - np.log1p(-closed))
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def sliding(vectors, unknowns, order, block, other, way=1):
     """(n,) m: motion of every contact along its edge, or across it (``way`` 0), from ``vectors`` (n, 2, 12) and scaled
     ``unknowns`` (n_free, 6)."""
@@ -115,7 +115,7 @@ def sliding(vectors, unknowns, order, block, other, way=1):
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def step_energies(
     increment,
     old_velocity,

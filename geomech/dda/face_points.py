@@ -36,8 +36,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept
 from ..model import OPEN
 from .bonded_faces import WITHOUT_GAPS, BondedFaces, on_lines
 from .contact_springs import Springs
@@ -302,7 +302,7 @@ class FacePoints:
         return replace(self, part=self.part + way, went=np.where(off[:, None], way, self.went), stride=stride)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def give_by_bending(owner, across, point, vertices, following, start, modulus, bends):
     """(m, 2): what the block ``owner`` (m,) turns by (rad/(N m)) behind the face across the normal ``across`` (m, 2)
     through ``point`` (m, 2), h / (E' I / 2h) with its second moment I along the face and the distance h from its

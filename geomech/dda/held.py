@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import kept
 
 #: Loads on a lone block whose resultant is below this part of their size are in balance: it strains by less, and loads
 #: that balance on the undeformed block miss by about its strain on the deformed one.
@@ -29,7 +30,7 @@ def with_rigid_motion(held: np.ndarray | None) -> np.ndarray:
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def hold(held, matrix, right, vectors, block, other, order):
     """Take the unknowns ``held`` (n_blocks, 6) out of the equations, in place: their rows say that they are zero.
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import kept
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def imbalance(
     matrix,
     right,

@@ -18,8 +18,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 from . import assembly, contact_states
 from .central_path import acting
@@ -154,7 +154,7 @@ def _solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[[np.nd
     return lambda right: dgetrs(factors, pivots, right)[0]
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _unit_force(size, block, other, order, vectors, contact, axis):
     """(size,) the generalised force of 1 N of a contact along its normal (``axis`` 0) or its edge (1)."""
     out = np.zeros(size)
@@ -202,7 +202,7 @@ def _solved(q: np.ndarray, m: np.ndarray) -> np.ndarray | None:
     return None
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _pivoted(q, m, most, round_off):
     """Lemke's pivots: the basic variables (n,), w as 0 … n − 1, z from n on, and whether the artificial one has left.
     Of rows that tie, the one whose artificial leaves, else the one of the largest pivot."""

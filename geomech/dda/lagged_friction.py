@@ -16,8 +16,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from ..model import OPEN, SLIP, STICK
 from . import assembly
 from .contact_set import ContactSet
@@ -30,7 +30,7 @@ _WAY = 0.5
 _SOLUTIONS, _HALVINGS = 30, 14
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _pushes(contact, gap, bonded, partner, rounding):
     """Whether a contact pushes (or, bonded, pulls) at the gaps of all, ``gap`` (n,): of two corners' lines the one less
     deep in, where both are crossed. ``partner`` (n, k), −1 for none."""
@@ -47,7 +47,7 @@ def _pushes(contact, gap, bonded, partner, rounding):
     return True
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _all_pushing(gap, bonded, partner, rounding):
     """(n,) of `_pushes`."""
     out = np.empty(gap.shape[0], np.bool_)
@@ -56,7 +56,7 @@ def _all_pushing(gap, bonded, partner, rounding):
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _slope(t, start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear, gaps):
     """How the energy changes along a step, at its part ``t``; ``gaps`` (n,) is scratch. See `LaggedFriction._way`."""
     n = gap.shape[0]
@@ -71,7 +71,7 @@ def _slope(t, start, curved, gap, trial, apart, along, strength, bonded, partner
     return found
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _least_energy(start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear):
     """The part of a step at which the energy is least, by halving; arguments as for `_slope`."""
     gaps = np.empty(gap.shape[0])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from ..model import Blocks, EdgeTraction, LinearProfile, Loads, WaterTable
 from .basis import material_weights
 from .force_rows import EDGE_FORCE, POINT_FORCE
@@ -184,7 +184,7 @@ def generalised(points: np.ndarray, edges: np.ndarray, centroid: np.ndarray) -> 
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _add(row, x, y, fx, fy):
     row[0] += fx
     row[1] += fy
@@ -194,7 +194,7 @@ def _add(row, x, y, fx, fy):
     row[5] += 0.5 * (y * fx + x * fy)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _gather(out, centroid, point_block, point, force, edge_block, start, end, traction):
     """Add to ``out`` (n_blocks, 6) the generalised forces about ``centroid`` (n_blocks, 2) of forces at points, and of
     linear tractions: ∫ t and ∫ x ⊗ t are those of the forces L (2t₀ + t₁)/6 and L (t₀ + 2t₁)/6 at the ends."""

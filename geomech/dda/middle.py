@@ -22,12 +22,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from .basis import displacement_matrix
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _affine(increment, part):
     """(n_blocks, 6): displacement of the centroid and gradient, row by row, of ``part`` of the motion that `advance`
     makes of ``increment`` (n_blocks, 6)."""
@@ -42,7 +42,7 @@ def _affine(increment, part):
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _moved(points, owner, affine, centroid):
     out = np.empty_like(points)
     for i in range(points.shape[0]):
@@ -53,7 +53,7 @@ def _moved(points, owner, affine, centroid):
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _contacts(geometry, block, other, affine, centroid, turn, edge):
     """As `Middle.contacts`; ``edge`` (n, 2) m, the edges as vectors."""
     out = geometry.copy()
@@ -78,7 +78,7 @@ def _contacts(geometry, block, other, affine, centroid, turn, edge):
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _to_start(xx, yy, xy, moment, affine, turn):
     """What forces F at arms x, Σ x ⊗ F with this symmetric part and ``moment``, do to strains on the axes of the start:
     the symmetric part of G⁻¹ (Σ x ⊗ F) R, arms and forces as the block's own, unturned and unstrained, has them."""
@@ -90,7 +90,7 @@ def _to_start(xx, yy, xy, moment, affine, turn):
     return (gyy * a - gxy * d) / size, (gxx * e - gyx * b) / size, 0.5 * (gyy * b - gxy * e + gxx * d - gyx * a) / size
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _strains_back(vectors, block, other, geometry, size, affine, turn):
     """As `Middle.turn_back`; ``size`` (n_blocks,) m is √area."""
     for k in range(vectors.shape[0]):
@@ -108,7 +108,7 @@ def _strains_back(vectors, block, other, geometry, size, affine, turn):
                 v[at + 3], v[at + 4], v[at + 5] = _to_start(v[at + 3], v[at + 4], v[at + 5], moment, affine[b], turn[b])
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _rows_back(rows, owner, affine, turn):
     """Bring the strain columns of ``rows`` (n, 6) of the blocks ``owner`` (n,) to the start, in place."""
     for k in range(rows.shape[0]):

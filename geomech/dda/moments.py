@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import kept
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def block_moments(vertices, next_vertex, vertex_start):
     """(n_blocks, 6): area, centroid x and y, and ∫x², ∫y², ∫xy about the centroid; m², m, m⁴.
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
 from ..compiled import kept
 from .blas_threads import blas_threads
@@ -20,7 +19,7 @@ from .fronts import eliminate, places, working_space
 from .shared_tasks import add_at_once, await_value, crew
 from .substitution import backward, forward
 
-_jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+_jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
 #: Blocks from which they are factored, and solutions substituted, on all cores.
 THREADED, THREADED_SOLUTION = 500, 4000

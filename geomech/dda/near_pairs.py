@@ -9,8 +9,8 @@ from __future__ import annotations
 import time
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept
 from .work import Work
 
 #: Pairs are sought within this many times the window of contacts: wide enough to last some steps of the largest motion
@@ -18,7 +18,7 @@ from .work import Work
 _REACH = 2.0
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _sweep_strips(box, fixed, reach, order, first, last, start, members, pairs):
     """Number of pairs whose boxes are nearer than ``reach``, written to ``pairs`` as far as it has room.
 

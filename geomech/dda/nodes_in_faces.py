@@ -13,7 +13,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..compiled import kept
 from ..model import OPEN
@@ -43,7 +42,7 @@ class NodesInFaces(NamedTuple):
         return _heirs(parent, state, self.node, self.neighbours)
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _left(borne, node, neighbours, share):
     out = borne.copy()
     for k in range(node.shape[0]):
@@ -54,7 +53,7 @@ def _left(borne, node, neighbours, share):
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _heirs(parent, state, node, neighbours):
     out = parent.copy()
     for k in range(node.shape[0]):

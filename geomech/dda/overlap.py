@@ -5,8 +5,8 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from ..model import Blocks
 
 log = logging.getLogger(__name__)
@@ -17,7 +17,7 @@ REFUSED = 1e-3
 REPORTED = 1e-6
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _depth_inside(x, y, vertices, next_vertex, first, last):
     """How far (x, y) lies inside the polygon with the edges from ``first`` to ``last``; 0 outside. m."""
     winding = 0
@@ -39,7 +39,7 @@ def _depth_inside(x, y, vertices, next_vertex, first, last):
     return np.sqrt(least) if winding != 0 else 0.0
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _depth_crossing(vertices, next_vertex, e, f):
     """Least distance of the ends of two edges from each other's line where they cross, else 0. m."""
     least = np.inf
@@ -56,7 +56,7 @@ def _depth_crossing(vertices, next_vertex, e, f):
     return least
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
     """How deep the blocks ``a`` and ``b`` overlap, m; 0 if they do not. ``start`` (n_blocks + 1,) their first vertices,
     ``box`` (n_blocks, 4) least x, y and greatest x, y, ``centroid`` (n_blocks, 2)."""
@@ -84,7 +84,7 @@ def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
     return depth
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _worst_pair(vertices, next_vertex, start, box, order, centroid, size):
     """(block, other, depth) of the overlap that is deepest relative to the smaller block's size; (−1, −1, 0) for
     none."""

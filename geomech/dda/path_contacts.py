@@ -8,11 +8,13 @@ for with one every index is asked whether it counts from the end.)
 
 from __future__ import annotations
 
-from numba import njit, uintp
+from numba import uintp
+
+from ..compiled import kept
 
 # Sums in their order: told that they may be taken in another, LLVM makes vectors of several contacts' records, at three
 # times the time.
-_jit = njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)
+_jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
 
 #: No step goes farther than this part of the way to where a force or a gap vanishes.
 SHORT_OF = 0.99

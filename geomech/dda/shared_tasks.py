@@ -14,10 +14,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
+
+from ..compiled import part
 
 #: Looks at what another thread is to finish, before this one sleeps for so many microseconds between them: where more
 #: threads want to run than there are cores, the other may have none.
@@ -45,7 +47,7 @@ def add_at_once(typingctx, array, index, value):
     return types.int64(array, types.intp, types.int64), codegen
 
 
-@njit(cache=True, nogil=True)
+@part(nogil=True)
 def await_value(array, index, value):
     """Wait until ``array[index]`` is ``value``."""
     looks = 0

@@ -34,8 +34,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from ..conventions import rotate_stress
 from ..model import DdaSettings
 
@@ -141,7 +141,7 @@ def turned(rates: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return out
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _invert(first, second, out):
     """(3, 3) inverse of the sum of two symmetric positive matrices, by cofactors."""
     a, b, c = first[0, 0] + second[0, 0], first[0, 1] + second[0, 1], first[0, 2] + second[0, 2]
@@ -155,7 +155,7 @@ def _invert(first, second, out):
             out[k, m] /= determinant
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def assemble_blocks(
     order,
     moments,
@@ -254,7 +254,7 @@ def assemble_blocks(
     return matrix, right, tangent, stress0
 
 
-@njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def advance(
     increment,
     carried,

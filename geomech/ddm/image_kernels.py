@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernels import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _jit, _sort
+from .kernels import _CLASSES, _ROW, _TERMS, _TILE, _first_moment, _jit, _part, _sort
 from .lanes import (
     WIDTH,
     angle,
@@ -54,7 +54,7 @@ _B, _D, _T, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH, 8 * WIDTH
 _ROOM = (MAX_ORDER + 2) * _STEP
 
 
-@_jit
+@_part
 def _third(kind, zp, zm, b, d):
     """A_0''' from A_0' and A_0'': what comes of differentiating the closed forms of `kernels`."""
     if kind == 3:
@@ -71,7 +71,7 @@ def _third(kind, zp, zm, b, d):
     return (0.25 * (i1 * i1) - 0.75 * d) / s - 0.25 * (i1 * i1 * i1)
 
 
-@_jit
+@_part
 def _moments(kind, distance, zp, zm, highest, table, w):
     """A_k and three derivatives for k = 0 … highest, eight points of one class, into ``w``, ``_STEP`` numbers an
     order."""

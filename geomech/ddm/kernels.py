@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..compiled import kept
+from ..compiled import kept, part
 from .lanes import (
     WIDTH,
     angle,
@@ -73,9 +73,10 @@ _ROW = _TILE + WIDTH
 _B, _D, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH
 
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
+_part = part(fastmath=False, error_model="numpy", nogil=True)
 
 
-@_jit
+@_part
 def _square_root(z):
     """The principal root, above or below its cut by the sign of Im z."""
     r = root(norm(z))
@@ -84,7 +85,7 @@ def _square_root(z):
     return both(less(re(z), 0.0, small, large), signed(less(re(z), 0.0, large, small), im(z)))
 
 
-@_jit
+@_part
 def _first_moment(kind, zp, zm):
     """A_0, A_0', A_0'' in closed form; ``zp``, ``zm`` are ζ + 1 and ζ − 1.
 
@@ -124,7 +125,7 @@ def _first_moment(kind, zp, zm):
     return a, b, d
 
 
-@_jit
+@_part
 def _moments(kind, distance, zp, zm, order, table, w):
     """A_k, A_k', A_k'' for k = 0 … order, eight points of one class, into ``w``, ``_STEP`` numbers an order."""
     z = 0.5 * (zp + zm)
@@ -188,7 +189,7 @@ def moments(kind, xp, xm, y, order, table, a, b, d):
             d[i, k] = complex(w[at + _D], w[at + _D + WIDTH])
 
 
-@_jit
+@_part
 def _sort(points, first, n, start, end, e, tol, side, tile, chosen, count):
     """Points ``first`` … + n in the frame of element ``e``, lengths in half lengths c, sorted by distance.
 

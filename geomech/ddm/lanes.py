@@ -31,9 +31,11 @@ import math
 import operator
 
 from llvmlite import ir
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
+
+from ..compiled import part
 
 WIDTH = 8
 
@@ -275,9 +277,9 @@ def load_complex(typing, array, at):
 @intrinsic
 def store(typing, array, at, x):
     def code(context, builder, sig, args):
-        found = [part for part in _split(builder, sig.args[2], args[2]) if part is not None]
-        for place, part in zip(_at(builder, args[1], len(found)), found):
-            builder.store(part, _address(context, builder, sig.args[0], args[0], place), align=8)
+        found = [half for half in _split(builder, sig.args[2], args[2]) if half is not None]
+        for place, half in zip(_at(builder, args[1], len(found)), found):
+            builder.store(half, _address(context, builder, sig.args[0], args[0], place), align=8)
         return context.get_dummy_value()
 
     return types.none(array, types.intp, x), code
@@ -386,7 +388,7 @@ _LN2_HIGH = 0.693147180369123816490
 _LN2_LOW = 1.90821492927058770002e-10
 
 
-@njit(error_model="numpy")
+@part(error_model="numpy")
 def log(x):
     m, n = _parts(x)
     f = (m - 1.0) / (m + 1.0)
@@ -401,7 +403,7 @@ def log(x):
     return n * _LN2_HIGH + ((2.0 * f) * (s * u) + n * _LN2_LOW + 2.0 * f)
 
 
-@njit(error_model="numpy")
+@part(error_model="numpy")
 def log1p(x):
     whole = 1.0 + x
     return log(whole) + (x - (whole - 1.0)) / whole
@@ -410,7 +412,7 @@ def log1p(x):
 _EIGHTH = math.tan(math.pi / 8)
 
 
-@njit(error_model="numpy")
+@part(error_model="numpy")
 def angle(y, x):
     ay, ax = size(y), size(x)
     low, high = less(ay, ax, ay, ax), less(ay, ax, ax, ay)

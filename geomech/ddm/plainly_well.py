@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from ..compiled import kept
+from ..compiled import kept, part
 
 #: A new segment that is nearer than this part of the extent to what it shares no node with is looked at closely.
 CLEAR = 1e-6
@@ -17,6 +17,7 @@ SPREAD = math.cos(math.radians(11.0))
 DIGITS = 0.5e-5
 
 _jit = kept(error_model="numpy", nogil=True)
+_part = part(error_model="numpy", nogil=True)
 
 
 @_jit
@@ -80,7 +81,7 @@ def plainly_well(nodes, segments, surface, aperture, fresh, edges, n_rock, outli
     return True
 
 
-@_jit
+@_part
 def _in_rock(x, y, edges, n_rock, outlined):
     """By the even–odd rule."""
     odd = False
@@ -91,7 +92,7 @@ def _in_rock(x, y, edges, n_rock, outlined):
     return odd == outlined
 
 
-@_jit
+@_part
 def _apart(ax, ay, bx, by, cx, cy, dx, dy, near):
     """Whether two segments, a to b and c to d, are farther apart than ``near``."""
     if (
@@ -114,7 +115,7 @@ def _apart(ax, ay, bx, by, cx, cy, dx, dy, near):
     )
 
 
-@_jit
+@_part
 def _off(px, py, ax, ay, bx, by):
     """From a point to a segment."""
     dx, dy = bx - ax, by - ay

@@ -9,8 +9,8 @@ of it, at 3° 2e-7).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import kept, part
 from . import shapes
 
 #: Longest element in units of its distance to another one. Its density then still converges like 3.5^−p.
@@ -36,10 +36,11 @@ HOPELESS = 8.0
 #: Most unknowns of a mesh that halving has made more than four times as large.
 MOST_UNKNOWNS = 20000
 
-_jit = njit(cache=True, fastmath=False, error_model="numpy", nogil=True)
+_jit = kept(fastmath=False, error_model="numpy", nogil=True)
+_part = part(fastmath=False, error_model="numpy", nogil=True)
 
 
-@_jit
+@_part
 def _distance_squared(px, py, ax, ay, bx, by):
     """From a point to a segment."""
     dx, dy = bx - ax, by - ay
