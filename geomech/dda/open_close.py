@@ -307,7 +307,8 @@ def _proposed(
             if path.ended or (path.blocked and not patient) or (hurried and path.stopped):
                 return None, spent
             few = min(few, max(_LEFT, _LEFT_PART * len(bonded)))
-        if undecided <= max(2, few) and path.missed < _BALANCED:
+        # Where no load comes to in so short a time, contacts neither bear nor part: round-off decides.
+        if (undecided <= max(2, few) or (hurried and path.arrived)) and path.missed < _BALANCED:
             states = _States(*path.states(), bonded)
             if states.key not in offered:
                 offered.add(states.key)

@@ -135,6 +135,21 @@ def test_of_many_blocks_in_motion_a_step_whose_path_is_stopped_is_halved_at_once
     assert step(0.02, dynamic=False).dt == 0.02 and not asked
 
 
+def test_many_blocks_that_no_wave_has_reached_need_not_decide_what_touches(monkeypatch):
+    """In 1 ms the base is felt a few blocks up; above, all fall together, and contacts neither bear nor part."""
+    for module in (open_close, stepping):
+        monkeypatch.setattr(module, "MANY", 100)
+    blocks = block_scenes.slope(2500)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(1e-3))
+    result = system.step(State.at_rest(blocks), block_scenes.WEIGHT)
+    assert result.dt == 1e-3 and result.statistics["unbalanced"] < 1e-9
+    corner = blocks.vertices[blocks.vertex_start[:-1]]
+    # Away from the foot and the back, which are held.
+    far = (corner[:, 1] > 15.0) & (corner[:, 0] < corner[:, 0].max() - 15.0)
+    fall = -block_scenes.GRAVITY * result.dt
+    assert far.sum() > 100 and result.state.velocity[far, 1] == pytest.approx(fall, rel=1e-3)
+
+
 @pytest.mark.slow
 def test_a_slope_of_twenty_thousand_blocks_takes_half_a_step_under_sudden_weight():
     """Somewhere in so large a slope no states are near that fit 10 ms: the path is stopped there, and what was tried
