@@ -25,7 +25,8 @@ from ..compiled import part
 #: threads want to run than there are cores, the other may have none.
 _LOOKS, _SLEEP = 2000, 50
 #: Where a thread has done nothing for more than this part of the time, cores are busy with other things, and so many
-#: times it does all tasks alone: to wait for others to get a core takes many times as long as the work.
+#: times it does all tasks of that kind alone: to wait for others to get a core takes many times as long as the work. (Of
+#: other kinds it does not: a product that has waited a millisecond would send the next factorisations to one core.)
 _IDLE, _ALONE = 0.5, 20
 
 _usleep = types.ExternalFunction("usleep", types.intc(types.uint32))
@@ -63,13 +64,14 @@ class Crew:
     def __init__(self, number: int) -> None:
         self.number = number
         self._pool = ThreadPoolExecutor(max(self.number, 1), thread_name_prefix="geomech-dda")
-        self._alone = 0
+        self._alone: dict[Callable, int] = {}
 
     def share(self, work: Callable, *given) -> None:
         """Let ``work(*given)`` claim tasks on all cores until none are left; it returns to the caller when all are
         done. Threads that come when no task is left return at once: they are not waited for."""
-        if self._alone or not self.number:
-            self._alone = max(self._alone - 1, 0)
+        alone = self._alone.get(work, 0)
+        if alone or not self.number:
+            self._alone[work] = max(alone - 1, 0)
             work(*given)
             return
         began, busy = time.perf_counter(), time.thread_time()
@@ -81,7 +83,7 @@ class Crew:
                 thread.cancel()
         took, worked = time.perf_counter() - began, time.thread_time() - busy
         if took - worked > _IDLE * took:
-            self._alone = _ALONE
+            self._alone[work] = _ALONE
 
 
 @cache

@@ -22,7 +22,9 @@ from geomech.model import OPEN, Bolt, JointLaw, State
         (1000, {}, 35),
         # Bonds that break round by round: 412 and 495 where the path lets them yield and knows of none that holds.
         (200, {"cohesion": 20e3}, 170),
-        (200, {"cohesion": 20e3, "tensile_strength": 10e3}, 170),
+        # (Of 200 such blocks some 500 bonds are left when the path stops, on this side or that of states that stand as
+        # the last digits fall, and the step may be halved.)
+        (150, {"cohesion": 20e3, "tensile_strength": 10e3}, 170),
     ],
     ids=["no cohesion", "cohesion", "bonds"],
 )
