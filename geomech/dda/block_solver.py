@@ -5,7 +5,7 @@ again; where blocks have hardly moved, none. What is kept so, or factored in sin
 residuals (`directions`), which bring them down to round-off.
 
 Chosen by measurement, on the last equations of walls of 990 and 10 010 bricks under sudden weight (CPU of one core for
-a factorisation and a substitution, ms): these factors 6.5 + 1.1 and 178 + 19, in single precision 4 + 0.6 and 98 + 11;
+a factorisation and a substitution, ms): these factors 7.2 + 0.4 and 194 + 7, in single precision 4.2 + 0.2 and 102 + 3.6;
 PARDISO of MKL 2026 11 to 19 + 6 and 245 to 478 + 61; an incomplete factorisation with GMRES 234 and 5400; smoothed
 aggregation (pyamg 5, six fields an aggregate) and block Jacobi do not come to 1e-10 in 500 iterations.
 """
@@ -282,8 +282,7 @@ class BlockSolver:
                 return found
         self.factor(data)
         if self._factors.single:
-            found = self._iterate(data, right, within, target, self._factors)
-            return found
+            return self._iterate(data, right, within, target, self._factors)
         x, told = self.substitute(right), False
         for _ in range(REFINEMENTS):
             rest = right - self.multiply(data, x)

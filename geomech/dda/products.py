@@ -24,6 +24,17 @@ def _put(c, at, sum_, n, width, keep):
 
 
 @_jit
+def _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, n, width, keep):
+    """`_put` of six rows, ``row_c`` apart."""
+    _put(c, at, s0, n, width, keep)
+    _put(c, at + row_c, s1, n, width, keep)
+    _put(c, at + 2 * row_c, s2, n, width, keep)
+    _put(c, at + 3 * row_c, s3, n, width, keep)
+    _put(c, at + 4 * row_c, s4, n, width, keep)
+    _put(c, at + 5 * row_c, s5, n, width, keep)
+
+
+@_jit
 def _two_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
     """Six rows of C in two registers, of the second ``n``."""
     s0 = s1 = s2 = s3 = s4 = s5 = t0 = t1 = t2 = t3 = t4 = t5 = zeros(c)
@@ -38,19 +49,8 @@ def _two_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
         s3, s4, s5 = plus_product(s3, x, v), plus_product(s4, y, v), plus_product(s5, z, v)
         t3, t4, t5 = plus_product(t3, x, w), plus_product(t4, y, w), plus_product(t5, z, w)
         a0, a1, a2, a3, a4, a5, at_b = a0 + 1, a1 + 1, a2 + 1, a3 + 1, a4 + 1, a5 + 1, at_b + row_b
-    _put(c, at, s0, width, width, keep)
-    _put(c, at + row_c, s1, width, width, keep)
-    _put(c, at + 2 * row_c, s2, width, width, keep)
-    _put(c, at + 3 * row_c, s3, width, width, keep)
-    _put(c, at + 4 * row_c, s4, width, width, keep)
-    _put(c, at + 5 * row_c, s5, width, width, keep)
-    at += width
-    _put(c, at, t0, n, width, keep)
-    _put(c, at + row_c, t1, n, width, keep)
-    _put(c, at + 2 * row_c, t2, n, width, keep)
-    _put(c, at + 3 * row_c, t3, n, width, keep)
-    _put(c, at + 4 * row_c, t4, n, width, keep)
-    _put(c, at + 5 * row_c, t5, n, width, keep)
+    _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, width, width, keep)
+    _put_six(c, at + width, row_c, t0, t1, t2, t3, t4, t5, n, width, keep)
 
 
 @_jit
@@ -65,12 +65,7 @@ def _one_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
         s2, s3 = plus_product(s2, spread(a, a2), v), plus_product(s3, spread(a, a3), v)
         s4, s5 = plus_product(s4, spread(a, a4), v), plus_product(s5, spread(a, a5), v)
         a0, a1, a2, a3, a4, a5, at_b = a0 + 1, a1 + 1, a2 + 1, a3 + 1, a4 + 1, a5 + 1, at_b + row_b
-    _put(c, at, s0, n, width, keep)
-    _put(c, at + row_c, s1, n, width, keep)
-    _put(c, at + 2 * row_c, s2, n, width, keep)
-    _put(c, at + 3 * row_c, s3, n, width, keep)
-    _put(c, at + 4 * row_c, s4, n, width, keep)
-    _put(c, at + 5 * row_c, s5, n, width, keep)
+    _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, n, width, keep)
 
 
 @_jit
