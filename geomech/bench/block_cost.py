@@ -4,7 +4,7 @@ for.
 Steps of 10 ms from rest under sudden weight, as many as some seconds have room for (one at least); the cost of an
 open–close iteration, one set of contact states or one step of the central path, is that of the step over its
 iterations. Settled steps go on from where static ones have brought the blocks to rest. Beside them the share of the
-contact search, the memory of the process, the exponents of the cost, iterative solutions of the last equations, which
+contact search, the memory of the process, the exponents of the cost, other solutions of the last equations, which
 are told by time against residual, and errors against closed forms.
 """
 
@@ -24,7 +24,15 @@ import numpy as np
 from ..model import Blocks, JointLaw, State
 from ..output.summary import write_json
 from . import block_scenes
-from .block_iteration import TOLERANCES, Iterated, block_jacobi, two_levels
+from .block_iteration import (
+    TOLERANCES,
+    Iterated,
+    block_jacobi,
+    factored_anew,
+    pardiso,
+    pardiso_available,
+    two_levels,
+)
 from .block_scenes import FRICTION, GRAVITY, JOINT, ROCK, WEIGHT
 from .figures import Measured, stopwatch
 
@@ -35,6 +43,8 @@ SIZES = (100, 1000, 10_000)
 #: Blocks up to which the last equations are solved iteratively too (block Jacobi takes minutes beyond), in a quick run
 #: and else.
 ITERATED = 100, 1000
+#: Blocks up to which other direct solutions of them are measured.
+DIRECTLY = 20_000
 #: CPU seconds from which on no further step is begun, in a quick run and else; blocks beyond which walls only are
 #: stepped, and only when asked for: the first step of 100 000 bricks takes 26 iterations, 112 s of CPU and 3.3 GiB,
 #: that of a slope of so many, halved twice, 350 s by the clock and 5.6 GiB.
@@ -161,7 +171,8 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
     }  # fmt: skip
     write_json(FOLDER / "cost_of_size.json", written)
     draw(costs, SHI, FOLDER / "cost_of_size.png")
-    draw_solvers(iterated, FOLDER / "solvers.png")
+    curves = {(row["scene"], row["blocks"]) for row in iterated if row["iterations"] > 1}
+    draw_solvers([row for row in iterated if (row["scene"], row["blocks"]) in curves], FOLDER / "solvers.png")
     times = {
         f"{c.scene}, {c.blocks} blocks: {what}": getattr(c, what)
         for c in costs
@@ -248,13 +259,17 @@ def _measured(
         counts["shares"] / max(1, counts["factorisations"]),
         _imbalance(blocks, system, result),
     )
-    if not also_iterated:
-        return cost, []
     centroid, area = result.forces.centroid[free], result.forces.area[free]
     x = solver.solve(data, right)
     residual = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
+    direct = [Iterated("direct", 1, cost.solution, residual, x)]
+    if n_free <= DIRECTLY:
+        direct.append(factored_anew(solver, centroid, data, right))
+        direct += [pardiso(solver, data, right)] if pardiso_available() else []
+    if not also_iterated:
+        return cost, direct
     return cost, [
-        Iterated("direct", 1, cost.solution, residual, x),
+        *direct,
         *(block_jacobi(solver, data, right, tolerance) for tolerance in TOLERANCES),
         *(two_levels(solver, centroid, np.sqrt(area), data, right, tolerance) for tolerance in TOLERANCES),
     ]
@@ -371,6 +386,8 @@ def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict],
         f"{1e3 * row['seconds']:10.1f} ms   {row['residual']:.0e}"
         for row in iterated
     ]
+    if not pardiso_available():
+        lines.append("  PARDISO of MKL is one where it is installed: pip install 'geomech[pardiso]' (a gigabyte)")
     lines += ["", "errors against closed forms"]
     lines += [f"  {name:<88}{value:8.1e}" for name, value in errors.items()]
     return "\n".join(lines)

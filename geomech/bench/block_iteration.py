@@ -1,13 +1,18 @@
-"""Iterative solutions of a step's equations, to be measured beside the direct one of `geomech.dda`.
+"""Other solutions of a step's equations, to be measured beside the direct one of `geomech.dda`: iterative ones, and the
+direct one of PARDISO (in Intel's MKL) where ``pip install 'geomech[pardiso]'`` has brought it.
 
 Friction that slides makes the equations unsymmetric, so both iterate on the unsymmetric matrix: stabilised biconjugate
 gradients (van der Vorst 1992) behind the blocks' own 6×6 inverses, and GMRES behind two levels of domains: overlapping
 ones solved directly in single precision (restricted additive Schwarz; Cai & Sarkis 1999) after one coarse field of six
 unknowns, the motion of a first-order block, for every few blocks.
+
+Direct solutions are told with what a set of contacts costs whose springs have all changed: factors and substitutions,
+the order of elimination at hand (it holds while the list of contacts stands).
 """
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,6 +36,43 @@ class Iterated:
     seconds: float
     residual: float
     solution: np.ndarray
+
+
+def pardiso_available() -> bool:
+    """Whether pypardiso, and with it MKL, is installed: ``pip install 'geomech[pardiso]'``."""
+    return importlib.util.find_spec("pypardiso") is not None
+
+
+def factored_anew(solver: BlockSolver, points: np.ndarray, data: np.ndarray, right: np.ndarray) -> Iterated:
+    """As `geomech.dda` does where nothing is left of another set of contacts; ``points`` (n, 2) m are the blocks'
+    centroids."""
+    rows = np.repeat(np.arange(solver.n), np.diff(solver.pointer))
+    another = BlockSolver(points, rows, solver.columns)
+    another.factor(data)  # finds its memory
+    spent_on = stopwatch()
+    another.factor(data)
+    x = another.solve(data, right)
+    return _told("direct, all factored anew", solver, data, right, x, 1, spent_on())
+
+
+def pardiso(solver: BlockSolver, data: np.ndarray, right: np.ndarray) -> Iterated:
+    """By PARDISO of MKL, for real unsymmetric matrices, on all cores; its ordering is no part of the time."""
+    from pypardiso import PyPardisoSolver
+    from scipy.sparse import bsr_matrix
+
+    size = len(right)
+    matrix = bsr_matrix((data.reshape(-1, 6, 6), solver.columns, solver.pointer), shape=(size, size)).tocsr()
+    method = PyPardisoSolver()
+    try:
+        method.factorize(matrix)
+        spent_on = stopwatch()
+        method.set_phase(22)  # numbers alone, in the order found before
+        method._call_pardiso(matrix, right)
+        method.set_phase(33)
+        x = method._call_pardiso(matrix, right)
+        return _told("PARDISO of MKL", solver, data, right, x, 1, spent_on())
+    finally:
+        method.free_memory(everything=True)
 
 
 def block_jacobi(

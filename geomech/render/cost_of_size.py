@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-_STYLES = (("#1f6f8b", "o"), ("#588157", "s"), ("#c8553d", "^"), ("#8e6c8a", "D"))
+_STYLES = (("#1f6f8b", "o"), ("#588157", "s"), ("#c8553d", "^"), ("#8e6c8a", "D"), ("#c9a227", "v"))
 
 
 class Measured(Protocol):
