@@ -291,8 +291,9 @@ class ContactFinder:
         a, b = self._edge_name[edge], self._edge_name[mate]
         law = self._law_of[a, b]
         if (law == _UNKNOWN).any():
-            names = self._edge_names
-            for i, j in {(int(i), int(j)) for i, j in zip(a, b, strict=True)}:
+            names, met = self._edge_names, np.zeros(self._law_of.shape, bool)
+            met[a, b] = True
+            for i, j in np.argwhere(met & (self._law_of == _UNKNOWN)).tolist():
                 index = self._joint_index(names[i], names[j])
                 if index is not None and not 0 <= index < self._n_joints:
                     raise ValueError(

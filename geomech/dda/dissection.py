@@ -65,7 +65,7 @@ class Tree:
     above: np.ndarray
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _best_cut(order, pointer, neighbour, place, least):
     """(price, k, whether the first part gives the separator) of the cheapest cut of the blocks in ``order`` into the
     first k and the rest, neither below ``least``; ``place`` (n,) is room, −1 all over, and left so."""
@@ -99,7 +99,7 @@ def _best_cut(order, pointer, neighbour, place, least):
     return price, at, mine
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+@part(fastmath=False, error_model="numpy", nogil=True)
 def _meets(order, at, mine, pointer, neighbour, place):
     """(m,) whether each block in ``order`` is of the first ``at`` (or, not ``mine``, of the rest) and meets one on the
     other side."""
@@ -117,39 +117,89 @@ def _meets(order, at, mine, pointer, neighbour, place):
     return out
 
 
-def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """The blocks of every front and (n_fronts,) its parent, in postorder; ``points`` (n, 2) lie where the blocks do.
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
+    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent. ``orders``
+    (k, n), overwritten: all blocks in order across each direction, ``across`` the ones that small parts are cut
+    across; the direction square to number d is d + k/2, or that of d − k/2 turned round."""
+    k, n = orders.shape
+    place, side = np.full(n, -1), np.empty(n, np.int64)
+    room = np.empty(n, np.int64)
+    blocks, begins, parent = np.empty(n, np.int64), np.zeros(2 * n + 2, np.int64), np.full(2 * n + 1, -1)
+    # Parts to be divided, as ranges of every order; and separators, as ranges and the number of their children: −1 for
+    # what is still to be divided.
+    work, waiting, done, ended = np.empty((2 * n + 8, 3), np.int64), 1, np.empty(2 * n + 1, np.int64), 0
+    work[0, 0], work[0, 1], work[0, 2] = 0, n, -1
+    fronts = 0
+    while waiting > 0:
+        waiting -= 1
+        first, last, children = work[waiting]
+        m = last - first
+        if children >= 0 or m <= leaf:
+            for _ in range(children):
+                ended -= 1
+                parent[done[ended]] = fronts
+            blocks[begins[fronts] : begins[fronts] + m] = orders[0, first:last]
+            done[ended] = fronts
+            ended += 1
+            begins[fronts + 1] = begins[fronts] + m
+            fronts += 1
+            continue
+        least = max(1, int(least_part * m))
+        best, price, at, mine = -1, np.inf, 0, True
+        for d in range(k):
+            if m >= large or across[d]:
+                here, begin, whose = _best_cut(orders[d, first:last], pointer, neighbour, place, least)
+                if here < price or best < 0:
+                    best, price, at, mine = d, here, begin, whose
+        order = orders[best, first:last]
+        cut = _meets(order, at, mine, pointer, neighbour, place)
+        halves = np.zeros(3, np.int64)
+        for q in range(m):
+            side[order[q]] = 2 if cut[q] else (0 if q < at else 1)
+            halves[side[order[q]]] += 1
+        one, two = first + halves[0], first + halves[0] + halves[1]
+        # Every order goes on in each of the three by itself.
+        for d in range(k):
+            if m >= large or across[d]:
+                to_first, to_second, to_cut = first, one, two
+                room[:m] = orders[d, first:last]
+                for q in range(m):
+                    b = room[q]
+                    if side[b] == 0:
+                        orders[d, to_first] = b
+                        to_first += 1
+                    elif side[b] == 1:
+                        orders[d, to_second] = b
+                        to_second += 1
+                    else:
+                        orders[d, to_cut] = b
+                        to_cut += 1
+        # A separator is eliminated from one end to the other.
+        if best + k // 2 < k:
+            orders[0, two:last] = orders[best + k // 2, two:last]
+        else:
+            orders[0, two:last] = orders[best - k // 2, two:last][::-1].copy()
+        work[waiting, 0], work[waiting, 1], work[waiting, 2] = two, last, (halves[0] > 0) + (halves[1] > 0)
+        waiting += 1
+        for begin, end in ((first, one), (one, two)):
+            if end > begin:
+                work[waiting, 0], work[waiting, 1], work[waiting, 2] = begin, end, -1
+                waiting += 1
+    return blocks, begins[: fronts + 1].copy(), parent[:fronts].copy()
+
+
+def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent (n_fronts,), in
+    postorder; ``points`` (n, 2) lie where the blocks do, ``pointer`` and ``neighbour`` say which meet.
 
     Cut across one of several directions, where the separator, the smaller of the two rows of blocks along the cut, is
     smallest: bricks are many to a metre upwards and few along a course.
     """
-    place = np.full(len(points), -1)
-    fronts: list[np.ndarray] = []
-    parent: list[int] = []
-    # (blocks, None) is still to be divided, (separator, number of children) is a front whose children are done.
-    work: list[tuple[np.ndarray, int | None]] = [(np.arange(len(points)), None)]
-    done: list[int] = []
-    while work:
-        blocks, children = work.pop()
-        if children is None and len(blocks) > LEAF:
-            least = max(1, int(_LEAST * len(blocks)))
-            directions = _MANY if len(blocks) >= _LARGE else _TWO
-            orders = [blocks[at] for at in np.argsort(points[blocks] @ directions, axis=0, kind="stable").T]
-            cuts = [_best_cut(order, pointer, neighbour, place, least) for order in orders]
-            best = min(range(len(cuts)), key=lambda k: cuts[k][0])
-            order, (_, at, mine), (x, y) = orders[best], cuts[best], directions[:, best]
-            cut = _meets(order, at, mine, pointer, neighbour, place)
-            halves = [half for half in (order[:at][~cut[:at]], order[at:][~cut[at:]]) if len(half)]
-            row = order[cut]
-            work.append((row[np.argsort(points[row] @ (-y, x), kind="stable")], len(halves)))
-            work += [(half, None) for half in halves]
-            continue
-        for _ in range(children or 0):
-            parent[done.pop()] = len(fronts)
-        done.append(len(fronts))
-        fronts.append(blocks)
-        parent.append(-1)
-    return fronts, np.array(parent, dtype=np.int64)
+    directions = _MANY if len(points) >= _LARGE else _TWO
+    across = np.abs(directions).max(axis=0) > 1.0 - 1e-9
+    orders = np.ascontiguousarray(np.argsort(points @ directions, axis=0, kind="stable").T)
+    return _dissected(orders, pointer, neighbour, LEAF, _LARGE, _LEAST, across)
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
@@ -215,12 +265,10 @@ def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
     column."""
     n = len(points)
     pointer = np.searchsorted(rows, np.arange(n + 1))
-    fronts, parent = dissect(points, pointer, columns)
-    n_fronts = len(fronts)
-    blocks = np.concatenate(fronts)
+    blocks, pivots, parent = dissect(points, pointer, columns)
+    n_fronts = len(parent)
     rank = np.empty(n, np.int64)
     rank[blocks] = np.arange(n)
-    pivots = np.cumsum([0, *map(len, fronts)])
     reach, boundary, seat = _reached(blocks, rank, pivots, parent, pointer, columns)
     own, far = np.diff(pivots), np.diff(reach)
     row, column = rank[rows], rank[columns]

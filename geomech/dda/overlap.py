@@ -8,6 +8,7 @@ import numpy as np
 
 from ..compiled import kept, part
 from ..model import Blocks
+from .near_pairs import boxes, near_pairs
 
 log = logging.getLogger(__name__)
 
@@ -85,20 +86,16 @@ def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _worst_pair(vertices, next_vertex, start, box, order, centroid, size):
-    """(block, other, depth) of the overlap that is deepest relative to the smaller block's size; (−1, −1, 0) for
-    none."""
+def _worst_pair(vertices, next_vertex, start, box, pairs, centroid, size):
+    """(block, other, depth) of the one of the ``pairs`` (k, 2) that overlaps deepest relative to the smaller block's
+    size; (−1, −1, 0) for none."""
     worst_a, worst_b, worst, worst_share = -1, -1, 0.0, 0.0
-    n = start.shape[0] - 1
-    for p in range(n):
-        for q in range(p + 1, n):
-            a, b = min(order[p], order[q]), max(order[p], order[q])
-            if box[order[q], 0] >= box[order[p], 2]:
-                break
-            depth = depth_of_pair(vertices, next_vertex, start, box, centroid, a, b)
-            smaller = min(size[a], size[b])
-            if depth > worst_share * smaller:
-                worst_a, worst_b, worst, worst_share = a, b, depth, depth / smaller
+    for k in range(len(pairs)):
+        a, b = pairs[k]
+        depth = depth_of_pair(vertices, next_vertex, start, box, centroid, a, b)
+        smaller = min(size[a], size[b])
+        if depth > worst_share * smaller:
+            worst_a, worst_b, worst, worst_share = a, b, depth, depth / smaller
     return worst_a, worst_b, worst
 
 
@@ -106,12 +103,11 @@ def deepest_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -
     """The two blocks that overlap most at ``vertices`` (−1, −1 for none), by how much, m, and over the smaller one's
     size, √area; ``moments`` (n_blocks, ≥ 3) with area and centroid first."""
     start = np.ascontiguousarray(blocks.vertex_start, np.int64)
-    first = start[:-1]
-    box = np.hstack([np.minimum.reduceat(vertices, first), np.maximum.reduceat(vertices, first)])
+    box = boxes(vertices, start[:-1])
     size = np.sqrt(moments[:, 0])
     a, b, depth = _worst_pair(
         np.ascontiguousarray(vertices), np.ascontiguousarray(blocks.next_vertex, np.int64), start, box,
-        np.argsort(box[:, 0], kind="stable"), np.ascontiguousarray(moments[:, 1:3]), size,
+        near_pairs(box, np.zeros(len(box), bool), 0.0), np.ascontiguousarray(moments[:, 1:3]), size,
     )  # fmt: skip
     return a, b, depth, depth / min(size[a], size[b]) if a >= 0 else 0.0
 
