@@ -13,6 +13,7 @@ import numpy as np
 from ..compiled import kept, part
 from ..model import OPEN, SLIP, STICK
 from .block_solver import BlockSolver
+from .lanes import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
 from .shared_tasks import add_at_once, await_value, crew
 
 #: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
@@ -173,48 +174,77 @@ def sides_of(n, order, block, other):
     return start[: n + 1], side
 
 
-@part(fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
-def _add_block(data, first, stride, push, drag, pull, across):
-    """Add the 6 × 6 of ``push`` ⊗ ``pull`` + ``drag`` ⊗ ``across`` (6,) to the block that begins at ``first``. (Written
-    out and inlined, a row summed before it is stored: half of the time of loops.)"""
-    u0, u1, u2, u3, u4, u5 = pull[0], pull[1], pull[2], pull[3], pull[4], pull[5]
-    t0, t1, t2, t3, t4, t5 = across[0], across[1], across[2], across[3], across[4], across[5]
-    for a in range(6):
-        here, p, d = data[first + a * stride : first + a * stride + 6], push[a], drag[a]
-        h0, h1, h2 = here[0] + p * u0 + d * t0, here[1] + p * u1 + d * t1, here[2] + p * u2 + d * t2
-        h3, h4, h5 = here[3] + p * u3 + d * t3, here[4] + p * u4 + d * t4, here[5] + p * u5 + d * t5
-        here[0], here[1], here[2], here[3], here[4], here[5] = h0, h1, h2, h3, h4, h5
+@part(error_model="numpy", nogil=True)
+def _put_block(where, at, stride, r0, r1, r2, r3, r4, r5):
+    """Write six rows of six, ``stride`` apart."""
+    store_six(where, at, r0)
+    store_six(where, at + stride, r1)
+    store_six(where, at + 2 * stride, r2)
+    store_six(where, at + 3 * stride, r3)
+    store_six(where, at + 4 * stride, r4)
+    store_six(where, at + 5 * stride, r5)
 
 
-@kept(fastmath={"contract"}, error_model="numpy", nogil=True)
+@part(error_model="numpy", nogil=True)
+def _add_pair(room, pull, across, r0, r1, r2, r3, r4, r5):
+    """The rows r and the 6 × 6 of push ⊗ ``pull`` + drag ⊗ ``across``, whose push and drag lie at 0 and 8 of the
+    ``room``."""
+    r0 = plus_product(plus_product(r0, spread(room, 0), pull), spread(room, 8), across)
+    r1 = plus_product(plus_product(r1, spread(room, 1), pull), spread(room, 9), across)
+    r2 = plus_product(plus_product(r2, spread(room, 2), pull), spread(room, 10), across)
+    r3 = plus_product(plus_product(r3, spread(room, 3), pull), spread(room, 11), across)
+    r4 = plus_product(plus_product(r4, spread(room, 4), pull), spread(room, 12), across)
+    r5 = plus_product(plus_product(r5, spread(room, 5), pull), spread(room, 13), across)
+    return r0, r1, r2, r3, r4, r5
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
 def _fill_rows(
     first, last, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
     normal, shear, slope, lift,
 ):  # fmt: skip
     """Fill the rows of blocks from ``first`` to before ``last``, see `assemble`; ``start`` and ``side`` from
-    `sides_of`. What is done for a block is its own: rows are the same to the bit whoever fills them."""
-    push, drag, pull, across = np.empty(6), np.empty(6), np.empty(12), np.empty(12)
+    `sides_of`. What is done for a block is its own: rows are the same to the bit whoever fills them.
+
+    A block's own 6 × 6, and that of the neighbour whose contacts are gone through, stay in registers."""
+    buffer = np.empty(16)
+    room, into, given, along = numbers(buffer), numbers(data), numbers(matrix), numbers(vectors)
+    kns, kss, frictions, rises = numbers(normal), numbers(shear), numbers(slope), numbers(lift)
     for b in range(first, last):
         data[begins[b] : begins[b + 1]] = 0.0
-        own, step = diagonal[b], stride[b]
-        for a in range(6):
-            here = data[own + a * step : own + a * step + 6]
-            for m in range(6):
-                here[m] = matrix[b, a, m]
+        step, at = stride[b], 36 * b
+        d0, d1, d2 = load_six(given, at), load_six(given, at + 6), load_six(given, at + 12)
+        d3, d4, d5 = load_six(given, at + 18), load_six(given, at + 24), load_six(given, at + 30)
+        p0 = p1 = p2 = p3 = p4 = p5 = zeros(into)
+        at_hand = -1
         for q in range(start[b], start[b + 1]):
             c, at = side[q] >> 1, 6 * (side[q] & 1)
-            kn, ks, friction, rise = normal[c], shear[c], slope[c], lift[c]
-            if kn == 0.0 and ks == 0.0:
+            if normal[c] == 0.0 and shear[c] == 0.0:
                 continue
-            n, t = vectors[c, 0], vectors[c, 1]
-            for a in range(6):
-                push[a], drag[a] = kn * (n[at + a] + friction * t[at + a]), ks * t[at + a]
-            for a in range(12):
-                pull[a], across[a] = n[a] - rise * t[a], t[a]
-            _add_block(data, own, step, push, drag, pull[at : at + 6], across[at : at + 6])
+            n, t = load_six(along, 24 * c + at), load_six(along, 24 * c + 12 + at)
+            rise = spread(rises, c)
+            push = product(spread(kns, c), plus_product(n, spread(frictions, c), t))
+            store(room, 0, push)
+            store(room, 8, product(spread(kss, c), t))
+            pull = minus_product(n, rise, t)
+            d0, d1, d2, d3, d4, d5 = _add_pair(room, pull, t, d0, d1, d2, d3, d4, d5)
             if (order[other[c]] if at == 0 else order[block[c]]) >= 0:
                 their = upper[c] if at == 0 else lower[c]
-                _add_block(data, their, step, push, drag, pull[6 - at : 12 - at], across[6 - at : 12 - at])
+                if their != at_hand:
+                    if at_hand >= 0:
+                        _put_block(into, at_hand, step, p0, p1, p2, p3, p4, p5)
+                    at_hand = their
+                    # What contacts before have made of it, for they need not stand together.
+                    p0, p1 = load_six(into, their), load_six(into, their + step)
+                    p2, p3 = load_six(into, their + 2 * step), load_six(into, their + 3 * step)
+                    p4, p5 = load_six(into, their + 4 * step), load_six(into, their + 5 * step)
+                n, t = load_six(along, 24 * c + 6 - at), load_six(along, 24 * c + 18 - at)
+                p0, p1, p2, p3, p4, p5 = _add_pair(room, minus_product(n, rise, t), t, p0, p1, p2, p3, p4, p5)
+        if at_hand >= 0:
+            _put_block(into, at_hand, step, p0, p1, p2, p3, p4, p5)
+        _put_block(into, diagonal[b], step, d0, d1, d2, d3, d4, d5)
+    # What is found by its place is kept until here.
+    return len(buffer) + len(data) + len(matrix) + len(vectors) + len(normal) + len(shear) + len(slope) + len(lift)
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)

@@ -206,6 +206,16 @@ def minus(typingctx, a, b):
 
 
 @intrinsic
+def product(typingctx, a, b):
+    """a b."""
+
+    def codegen(context, builder, signature, args):
+        return builder.fmul(*args)
+
+    return a(a, b), codegen
+
+
+@intrinsic
 def plus_product(typingctx, total, a, b):
     """``total`` + a b, fused where the processor can."""
 
