@@ -186,8 +186,8 @@ class BlockSystem:
         motion always are.
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
-        again from ``state``, which is never changed; ``result.dt`` says what was done. Raises `NotConverged` after
-        ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved, or when nothing
+        again from ``state``, which is never changed; ``result.dt`` says what was done, and the log why contacts wanted a
+        shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved, or when nothing
         holds them up in statics.
         """
         dt = self.settings.time_step if dt is None else float(dt)
@@ -217,7 +217,7 @@ class BlockSystem:
                 # (In motion the step's arcs are those that the velocity foresees.)
                 found = found.along(*like.arcs)
         reason, before, broken = "", np.inf, np.zeros(0, np.int64)
-        cuts = 0
+        cuts, asked, failed = 0, dt, ""
         while True:
             try:
                 attempt = Attempt(
@@ -226,7 +226,7 @@ class BlockSystem:
                 )  # fmt: skip
                 result, largest = attempt.result(), attempt.largest
             except Unsettled as failure:
-                reason = f"{failure}{self.finder.where(found, failure.contact)}"
+                failed = reason = f"{failure}{self.finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
             else:
                 bonded = result.contacts["bonded"]
@@ -243,11 +243,13 @@ class BlockSystem:
                     unseen = self._turned_in(attempt, result, _WINDOW * limit)
                     if unseen and cuts < self.settings.max_step_cuts:
                         cuts, dt = cuts + 1, 0.5 * dt
-                        log.debug("step at t = %g s cut to %.4g s: %s", state.time, dt, unseen)
+                        failed = unseen
                         continue
                     if unseen:
                         log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, unseen)
                     self._refuse_crushed(result.state)
+                    if failed:
+                        log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
                     return result
                 reason = f"a vertex moves {largest:.3g} m, the limit is {limit:.3g} m"
                 if largest > 0.9 * before:
