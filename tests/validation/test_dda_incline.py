@@ -105,8 +105,8 @@ def test_a_block_pushed_up_the_incline_comes_to_rest_and_stays():
     assert max(errors) < 3e-4
 
 
-@pytest.mark.parametrize(("base_deg", "between_deg"), [(20, 45), (20, 10), (24, 26), (27, 15), (35, 10), (40, 35)])
-def test_stacked_blocks_slide_each_at_its_own_rate(base_deg, between_deg):
+def stacked(base_deg, between_deg, youngs_modulus=50e9) -> tuple[np.ndarray, np.ndarray]:
+    """Ways down the slope (2,) of a block and of one on top of it in 0.3 s, m, and those of rigid ones."""
     polygons = [
         turned(p, SLOPE) for p in (rectangle(-6, -1, 9, 0), rectangle(4, 0, 7, 1), rectangle(5, 1, 6, 2))
     ]  # fmt: skip
@@ -114,16 +114,31 @@ def test_stacked_blocks_slide_each_at_its_own_rate(base_deg, between_deg):
     joints = [JointLaw("base", np.radians(base_deg)), JointLaw("between", np.radians(between_deg))]
     system = system_of(
         polygons, joints, names=names, joint_index=lambda a, b: 0 if "slope" in (a, b) else 1,
-        rock=Material("rock", 50e9, 0.0, density=2600.0),
+        rock=Material("rock", youngs_modulus, 0.0, density=2600.0),
     )  # fmt: skip
     end = march(system, State.at_rest(system.blocks), WEIGHT, 0.3, 2e-3)
-    lower, upper = 0.5 * 0.3**2 * np.array(
-        exact.stacked_accelerations(SLOPE, np.radians(base_deg), np.radians(between_deg), (3.0, 1.0))
-    )  # fmt: skip
-    got = moved(system, end)[1:] @ DOWN
+    expected = exact.stacked_accelerations(SLOPE, np.radians(base_deg), np.radians(between_deg), (3.0, 1.0))
+    return moved(system, end)[1:] @ DOWN, 0.5 * 0.3**2 * np.array(expected)
+
+
+@pytest.mark.parametrize(("base_deg", "between_deg"), [(20, 45), (20, 10), (24, 26), (27, 15), (35, 10), (40, 35)])
+def test_stacked_blocks_slide_each_at_its_own_rate(base_deg, between_deg):
+    got, (lower, upper) = stacked(base_deg, between_deg)
     print(f"φ {base_deg}° under {between_deg}°: {got[0]:.6f} {got[1]:.6f} m, should be {lower:.6f} {upper:.6f}")
     # Weight put on at once: micrometres of elastic shear and start.
     assert got == pytest.approx([lower, upper], abs=1e-5)
+
+
+@pytest.mark.parametrize(("base_deg", "between_deg"), [(20, 45), (20, 10)])
+def test_stacked_blocks_converge_to_rigid_ones(base_deg, between_deg):
+    errors = []
+    for youngs_modulus in (5e9, 50e9, 500e9):
+        got, expected = stacked(base_deg, between_deg, youngs_modulus)
+        errors.append(np.abs(got / expected - 1))
+    orders = np.log10(np.array(errors[:-1]) / errors[1:])
+    print(f"φ {base_deg}° under {between_deg}°, E = 5, 50, 500 GPa: {np.array(errors)}, order in 1/E {orders.round(2)}")
+    # What is left is the elastic shear that the weight put on at once makes.
+    assert orders == pytest.approx(np.ones((2, 2)), abs=0.02)
 
 
 def column(slenderness: float, friction: float):
@@ -188,6 +203,7 @@ def test_columns_tilt_and_slide_as_rigid_ones_to_second_order(slenderness_deg, f
         off.append(np.array([toe, state.rotation[1]]) - expected)
         print(f"dt = {1e3 * dt:g} ms: toe off by {off[-1][0]:.1e} m, tilt by {off[-1][1]:.1e} of {expected[1]:.2e}")
     off = np.abs(off)
+    print("order", np.log2(off[0] / off[1]).round(2))
     assert off[0].max() < 1e-3 * expected[1]
     # Second order, and a fifth of a micrometre of elastic give.
     assert (off[1] < 0.27 * off[0] + 2e-7).all()

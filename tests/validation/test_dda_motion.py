@@ -137,16 +137,21 @@ def test_a_block_that_carries_its_weight_sticks_at_every_step(dt):
 
 
 def test_friction_stops_a_pushed_block_where_it_should():
-    errors = []
-    for dt in (4e-3, 2e-3, 1e-3):
-        system, state, _ = incline(0.0, np.radians(30), speed=1.0, poisson=0.0)
-        end = march(system, state, WEIGHT, 0.3, dt)
-        distance = travel(system, end, np.array([-1.0, 0.0]))
-        errors.append(abs(distance / exact.stopping_distance(1.0, np.radians(30)) - 1))
-    print(f"stopping distance, dt 4, 2, 1 ms: {np.array(errors)}, order {np.log2(np.divide(errors[:-1], errors[1:])).round(2)}")
-    # First order at least: the step in which it stops is the only one that is not exact.
-    assert errors[-1] < 1e-3
-    assert errors[-1] < errors[0]
+    """Every step is exact but that in which it stops: of what it would go there, ½ μ g dt² at most, it goes a part."""
+    braking, errors = GRAVITY * np.tan(np.radians(30)), []
+    for dt in (16e-3, 8e-3, 4e-3):
+        n, off = round(0.1 / dt), []
+        for part in (0.1, 0.35, 0.6, 0.85):  # of a step, at which it stops
+            speed = braking * dt * (n + part)
+            system, state, _ = incline(0.0, np.radians(30), speed=speed, poisson=0.0, youngs_modulus=1e12, ratio=1.0)
+            end = march(system, state, WEIGHT, (n + 4) * dt, dt)
+            distance = travel(system, end, np.array([-1.0, 0.0]))
+            off.append(abs(distance - exact.stopping_distance(speed, np.radians(30))))
+        errors.append(max(off))
+        assert errors[-1] < 0.2 * 0.5 * braking * dt**2
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    print(f"stopping distance, dt 16, 8, 4 ms: {np.array(errors)} m, order {orders.round(2)}")
+    assert orders == pytest.approx([2.0, 2.0], abs=0.05)
 
 
 def test_time_integration_is_newmarks_with_the_amplification_that_shi_has():
