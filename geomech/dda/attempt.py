@@ -28,6 +28,7 @@ from .loads import AppliedForces, Inertia, generalised
 from .middle import Middle
 from .open_close import Settled, Unsettled, settle
 from .rigid import mean_stress
+from .rounding import tell_felt, undecided_gaps
 from .step import CrackResponse, StepResult
 from .stopping import Stopped, dissipating, stop
 from .stretched import stretched
@@ -175,7 +176,7 @@ class Attempt:
             if held is not None and self.n_free:
                 hold(held, self.matrix, self.right, vectors, found.block, found.other, order)
             if not self.n_free:
-                zero = np.zeros(len(found))
+                zero, self.slack = np.zeros(len(found)), np.full(len(found), self.system.rounding)
                 settled = Settled(
                     np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
                 )
@@ -287,12 +288,22 @@ class Attempt:
 
     def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
         system = self.system
+        # Loads at which contacts change are sought in statics, and known to the rounding.
+        slack = self.slack = (
+            np.full(len(found), system.rounding)
+            if system.scheme.static
+            else undecided_gaps(system.rounding, right, pattern.order, found.block, found.other, springs.normal)
+        )
+        if not system.rounding_told:
+            system.rounding_told = True
+            weight = np.where(system.fixed, np.inf, system.mass * np.hypot(*self.gravity))
+            tell_felt(system.rounding, weight, found.block, found.other, springs.normal, system.finder.names)
 
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
             def settled(contacts: ContactSet) -> Settled:
                 most = system.settings.max_open_close_iterations
                 return settle(
-                    pattern, matrix, right, contacts, vectors, stiff, start, system.slack, most, curved,
+                    pattern, matrix, right, contacts, vectors, stiff, start, slack, most, curved,
                     system.scheme.static, self.patient,
                 )  # fmt: skip
 
@@ -471,7 +482,7 @@ class Attempt:
         }
         reserve = reserves(
             settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs,
-            system.slack,
+            self.slack,
         )  # fmt: skip
         return StepResult(
             new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, found.arcs,

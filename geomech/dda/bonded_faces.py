@@ -152,9 +152,9 @@ def check_faces(
             capacity += peak[c] * force + hold[c] + cohesion[c]
             firm += cohesion[c] + hold[c]
             strength += tension[c] if bonded[c] == WHOLE else 0.0
-            least = max(least, normal[c] * slack)
-            sheared = max(sheared, 1e-3 * shear[c] * slack)
-            pulls = pulls or -force > normal[c] * slack
+            least = max(least, normal[c] * slack[c])
+            sheared = max(sheared, 1e-3 * shear[c] * slack[c])
+            pulls = pulls or -force > normal[c] * slack[c]
             out = out or state[c] != STICK
         if not intact:
             continue
@@ -175,7 +175,7 @@ def check_faces(
             c = rows[k]
             if strength == 0.0 and pulls:
                 # Corners that press wait for those that open.
-                if -forces[c, 0] <= normal[c] * slack:
+                if -forces[c, 0] <= normal[c] * slack[c]:
                     new_state[c], new_bonded[c], violation[c] = STICK, bonded[c], 0.0
                 continue
             new_state[c], new_bonded[c], violation[c] = STICK, bonded[c], 0.0

@@ -95,7 +95,7 @@ def check_states(
 
     Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on
     a corner holds until it has slid off by its ``reach`` (n,) m; lines that its vertex was ``behind`` (n,) as the step
-    began are not those by which it comes in. ``slack`` (m) is the round-off of coordinates: gaps below it decide
+    began are not those by which it comes in. Gaps below the ``slack`` (n,) m, the round-off of coordinates, decide
     nothing, nor does what they make of friction.
     """
     n = state.shape[0]
@@ -104,7 +104,7 @@ def check_states(
     for c in range(n):
         gap, slide = forces[c, 2], forces[c, 3]
         if state[c] == OPEN:
-            if gap >= -slack or behind[c]:
+            if gap >= -slack[c] or behind[c]:
                 continue
             inside = True
             for k in range(2):
@@ -114,7 +114,7 @@ def check_states(
                 if p < 0:
                     continue
                 lesser = forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
-                if forces[p, 2] >= -slack or state[p] != OPEN or (lesser and not behind[p]):
+                if forces[p, 2] >= -slack[p] or state[p] != OPEN or (lesser and not behind[p]):
                     inside = False
             if inside:
                 violation[c] = -normal[c] * gap
@@ -131,20 +131,20 @@ def check_states(
         for k in range(2):
             p = partner[c, k]
             out = out or (p >= 0 and forces[p, 2] > reach[c] and gap < 0.0)
-        if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack or out:
+        if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c] or out:
             new_state[c], new_bonded[c] = OPEN, 0
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:
             strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
             excess = abs(forces[c, 1]) - strength
-            if excess > _KNOWN * strength + (_OF_SLIP * shear[c] + peak[c] * normal[c]) * slack:
+            if excess > _KNOWN * strength + (_OF_SLIP * shear[c] + peak[c] * normal[c]) * slack[c]:
                 new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
                 new_direction[c] = np.sign(forces[c, 1])
                 violation[c] = excess
         elif friction[c] > 0.0 or sliding[c] > 0.0:
             strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
             trial = direction[c] * (shear0[c] - shear[c] * slide)
-            if strength - trial > _KNOWN * strength + (_OF_SLIP * shear[c] + friction[c] * normal[c]) * slack:
+            if strength - trial > _KNOWN * strength + (_OF_SLIP * shear[c] + friction[c] * normal[c]) * slack[c]:
                 # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
                 new_state[c] = STICK
                 violation[c] = strength - trial
@@ -154,8 +154,8 @@ def check_states(
 def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> np.ndarray:
     """(n,) N: how far contacts in these states are from leaving them, linear in the load while all states stand. Open
     ones: the force that closing their gap would make; sticking ones: what is left of their strength, or of what presses
-    them; sliding ones the latter. They leave them where `check_states` says so, beyond what the rounding ``slack`` (m)
-    of coordinates makes of forces: that is where nothing is left."""
+    them; sliding ones the latter. They leave them where `check_states` says so, beyond what the rounding ``slack``
+    (n,) m of coordinates makes of forces: that is where nothing is left."""
     rounding = springs.normal * slack
     pull = np.where(bonded == 1, springs.tension, 0.0)
     lifts = normal_force + pull * (1.0 + _KNOWN) + rounding

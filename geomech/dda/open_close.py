@@ -179,7 +179,7 @@ class _Equations:
     vectors: np.ndarray
     springs: Springs
     gap: np.ndarray
-    slack: float
+    slack: np.ndarray
     curved: CurvedJoints | None
     statics: bool
 
@@ -398,7 +398,7 @@ def settle(
     vectors: np.ndarray,
     springs: Springs,
     gap: np.ndarray,
-    slack: float,
+    slack: np.ndarray,
     max_iterations: int,
     curved: CurvedJoints | None = None,
     statics: bool = False,
@@ -406,7 +406,7 @@ def settle(
 ) -> Settled:
     """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix``
     (n, 6, 6) and ``right`` (n, 6) are the blocks' own part, ``springs`` and ``gap`` those of this step (dashpots
-    included). ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations,
+    included), ``slack`` (n_contacts,) m the gaps that decide nothing. ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations,
     those along the central path included. Unless ``patient``, systems too large for a dense matrix are not asked for
     by laws and rounds that take hundreds: a shorter step takes less, of `MANY` in motion at the first sign.
 

@@ -19,6 +19,7 @@ from .moments import block_moments
 from .open_close import MANY, Unsettled
 from .overlap import refuse_overlap
 from .rigid import with_rigid
+from .rounding import rounding_of
 from .step import CrackResponse, NotConverged, StepResult
 from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
@@ -37,13 +38,6 @@ _BLOCK_SHARE = 0.1
 _AIM = 0.99
 #: A hasty step that has been cut so often takes its time.
 PATIENT_AFTER = 3
-#: Gaps are rounded to this part of the largest coordinate, …
-_ROUNDING = 5e-16
-#: … and below so many times that decide nothing in motion: what rounding leaves of one step the next goes on from.
-#: (Walls and slopes of 1 000 to 40 000 blocks at rest have a contact in every third to every step that oversteps the
-#: rounding, by 1.3 times it at most, and the equations are solved once more for it.) Loads at which contacts change are
-#: sought in statics, and known to the rounding.
-_WANDERS = 4.0
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
 
@@ -60,8 +54,8 @@ class BlockSystem:
     ``compliance`` (3, 3) of each block, ``held`` (what is held of its motion), ``rigid`` (indices), the ``finder`` of
     contacts and the ``load_map``; and anew when blocks are ``taken_out``: which ones are ``fixed``, ``moving``
     (indices), which of them ``turns``, and ``free``, the number of a block among those that move, −1 for the others.
-    ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``rounding`` (m) is that of coordinates,
-    ``slack`` (m) what it makes of blocks at rest in motion's steps: less is no motion.
+    ``allowed_penetration`` (m) is zero where penalty springs hold alone; ``rounding`` (m) is that of coordinates:
+    less is no motion; what it makes of blocks' weights is told once.
 
     Raises ValueError when there are no blocks, materials or joints are missing, a block has no area, or one that moves
     has no mass in a dynamic run.
@@ -117,8 +111,7 @@ class BlockSystem:
         self._refuse_massless()
         self.mass = self.density * areas
         self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
-        self.rounding = _ROUNDING * float(np.abs(vertices).max())
-        self.slack = self.rounding if self.scheme.static else _WANDERS * self.rounding
+        self.rounding, self.rounding_told = rounding_of(vertices), False
         self.step_limit = min(
             self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
         )

@@ -9,7 +9,7 @@ from geomech import dda
 from geomech.bench import block_scenes
 from geomech.bench.block_scenes import JOINT, ROCK, WEIGHT
 from geomech.dda import assembly
-from geomech.model import SLIP, State
+from geomech.model import SLIP, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 
 @pytest.mark.parametrize("make", [block_scenes.wall, block_scenes.slope])
@@ -69,3 +69,24 @@ def test_rounding_of_coordinates_changes_no_contact_of_blocks_at_rest(make):
     assert np.abs(fresh.state.vertices - state.vertices).max() <= 4.0 * system.rounding
     force = np.abs(fresh.contacts["normal_force"]).max()
     assert np.abs(fresh.contacts["normal_force"] - result.contacts["normal_force"]).max() <= 1e-11 * force
+
+
+def test_a_pebble_far_from_the_origin_slides_and_is_told_of_its_rounding(caplog):
+    # Springs feel the last digits of coordinates: what they make of a millimetre of rock at 60 m is half its weight.
+    slope, side = np.radians(30.0), 1e-3
+    turn = np.array([[np.cos(slope), np.sin(slope)], [-np.sin(slope), np.cos(slope)]])
+    base = np.array([[-60.0, -10.0], [60.0, -10.0], [60.0, 0.0], [-60.0, 0.0]])
+    pebble = np.array([[4.0, 0.0], [4.0 + side, 0.0], [4.0 + side, side], [4.0, side]])
+    blocks = Blocks.from_polygons([base @ turn, pebble @ turn], fixed=[True, False])
+    system = dda.BlockSystem(
+        blocks, [Material("rock", 10e9, 0.25, density=2600.0)], [JointLaw("joint", friction_angle=np.radians(15.0))],
+        settings=DdaSettings(dynamic_factor=1.0, time_step=1e-3),
+    )  # fmt: skip
+    state = State.at_rest(blocks)
+    while state.time < 0.05:
+        state = system.step(state, Loads(gravity=History.constant([0.0, -9.81]))).state
+    slid = (state.vertices - blocks.vertices)[4:].mean(axis=0) @ -turn[0]
+    exact = 0.5 * 9.81 * (np.sin(slope) - np.cos(slope) * np.tan(np.radians(15.0))) * state.time**2
+    # A few of the block's own shortenings, ρ g h²/E = 2.6e-12 m, beside 3.3 mm.
+    assert abs(slid - exact) < 1e-6 * exact
+    assert [r.levelname for r in caplog.records if "put the origin near" in r.message] == ["WARNING"]
