@@ -161,8 +161,10 @@ class BlockSolver:
         self._rough: Factors | None = None
         self._beside: BlockSolver | None = None
         self._rough_serves = True
-        # Those of rough solutions serve until the next matrix, whatever is solved between.
-        self._directions, self._shown = (Directions(6 * self.n, most) for most in (max(TRIES, TRIES_OF_FEW), TRIES))
+        self._directions = Directions(6 * self.n, max(TRIES, TRIES_OF_FEW))
+        # Those of rough solutions serve until the next matrix, whatever is solved between, but of so many blocks that
+        # this takes other factors, too: of 100 000 they would be 160 MB.
+        self._shown = Directions(6 * self.n, TRIES, self._directions if self.n >= SINGLE else None)
         #: ``shares``: factorisations, one that was done in part as that part.
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}

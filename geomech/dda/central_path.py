@@ -107,7 +107,8 @@ def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
 
 class CentralPath:
     """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which
-    hold, ``forces`` (n,) N normal forces of the size to be expected.
+    hold, ``forces`` (n,) N normal forces of the size to be expected, ``room`` gives each iteration the flat
+    matrix to fill; without, it takes its own.
 
     Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins. ``missed``:
     what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
@@ -125,6 +126,7 @@ class CentralPath:
         gap: np.ndarray,
         bonded: np.ndarray,
         forces: np.ndarray,
+        room: Callable[[], np.ndarray] | None = None,
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
@@ -172,7 +174,7 @@ class CentralPath:
         # Blocks without load share a little of the others'; without any, any unit will do.
         load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
         self._unit = load * load / self._kn
-        self._data = np.empty(pattern.size)
+        self._room = room
         self._unknowns = np.zeros(right.size)
         # Motions: what makes the gap and the motion along the edge 0 where no force acts.
         self._g, self._s = gap[some], -found.shear[some] / self._ks
@@ -253,11 +255,12 @@ class CentralPath:
             none = np.zeros(len(kn_held))
             springs = [np.concatenate(pair) for pair in zip(springs, (kn_held, ks_held, none, none), strict=True)]
         stiff, stiff_along, slope, climb = springs
+        data = np.empty(pattern.size) if self._room is None else self._room()
         assembly.assemble(
-            pattern, self._data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
+            pattern, data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
             self._all_lift - climb, self._sides,
         )  # fmt: skip
-        solution = solution_of(pattern, self._data)
+        solution = solution_of(pattern, data)
 
         def solve(side: np.ndarray) -> np.ndarray:
             return solution(side, WITHIN)

@@ -71,11 +71,17 @@ def _largest(values):
 
 
 class Directions:
-    """Room for ``most`` directions of ``size`` unknowns; ``number`` are known."""
+    """Room for ``most`` directions of ``size`` unknowns, of which ``number`` are known; or the first ``most`` of the
+    room of others, ``sharing``: what one of the two adds, the other has forgotten."""
 
-    def __init__(self, size: int, most: int) -> None:
-        # Memory is taken as directions come.
-        self._directions, self._products = np.empty((most, size)), np.empty((most, size))
+    def __init__(self, size: int, most: int, sharing: Directions | None = None) -> None:
+        self._sharing = sharing
+        if sharing is None:
+            # Memory is taken as directions come.
+            self._directions, self._products = np.empty((most, size)), np.empty((most, size))
+        else:
+            self._directions, self._products = sharing._directions[:most], sharing._products[:most]
+            sharing._sharing = self
         self.number = 0
 
     def __len__(self) -> int:
@@ -95,5 +101,7 @@ class Directions:
         forgotten where there is no room."""
         if self.number == len(self):
             self.forget()
+        if self._sharing is not None:
+            self._sharing.forget()
         self.number += 1
         return _include(direction, product, self._directions, self._products, self.number - 1, x, rest)

@@ -49,10 +49,11 @@ def settled_together(
     vectors: np.ndarray,
     springs: Springs,
     gap: np.ndarray,
+    room: Callable[[], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """``state`` and ``direction`` (n,) with those of the contacts ``which`` (n,) bool, none of them bonded, that fit
-    each other while all others stand; None where none are found. The rest as for `settle`. Raises
-    numpy.linalg.LinAlgError."""
+    each other while all others stand; None where none are found. The rest as for `settle`, ``room`` as for
+    `CentralPath`. Raises numpy.linalg.LinAlgError."""
     stands = acting(found.partner, gap)
     alone = which.copy()
     for column in found.partner.T:
@@ -62,7 +63,7 @@ def settled_together(
     rows = np.flatnonzero(which & stands)
     if not len(rows):
         return None
-    data, side = np.empty(pattern.size), np.empty(6 * pattern.n)
+    data, side = np.empty(pattern.size) if room is None else room(), np.empty(6 * pattern.n)
     assembly.assemble_contacts(
         pattern, data, side, matrix, right, pattern.upper, pattern.lower, found.block, found.other, pattern.order,
         vectors, state, direction, gap, springs.normal, springs.shear, springs.friction, springs.sliding, springs.lift,

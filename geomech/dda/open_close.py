@@ -190,6 +190,11 @@ class _Equations:
         self._force = float(np.abs(self.right).max(initial=0.0))
         self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
 
+    def room(self) -> np.ndarray:
+        """The flat matrix, for others to fill until the next answer: one of 100 000 blocks takes 200 MB."""
+        self._held = None
+        return self._data
+
     def together(self, which: np.ndarray, states: _States, answer: _Answer, budget: int) -> tuple[_States | None, int]:
         """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in
         common at a time; where none are found, as the ``answer`` calls for. And the solutions spent; None where they
@@ -208,7 +213,8 @@ class _Equations:
                     spent += cost
                     try:
                         proposal = settled_together(
-                            group, states.state, states.direction, self.pattern, self.matrix, self.right, *fixed
+                            group, states.state, states.direction, self.pattern, self.matrix, self.right, *fixed,
+                            self.room,
                         )
                     except np.linalg.LinAlgError:
                         # In statics nothing else may hold their blocks.
@@ -486,7 +492,8 @@ def settle(
             if slower is None:
                 if path is None or not np.array_equal(path.bonded, states.bonded):
                     path = CentralPath(
-                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded, normal_force
+                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded, normal_force,
+                        equations.room,
                     )
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration

@@ -212,6 +212,8 @@ class BlockSystem:
         reason, before, broken = "", np.inf, np.zeros(0, np.int64)
         cuts, asked, failed = 0, dt, ""
         while True:
+            # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
+            attempt = result = None
             try:
                 attempt = Attempt(
                     self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
