@@ -147,6 +147,7 @@ class BlockSolver:
     ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
     triangles and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree``
     already planned for the same pattern. ``counts`` tells what was done; ``work`` counts it beside that of other solvers.
+    ``single_only``: a matrix beyond factors in single precision is given up, not factored in double.
     """
 
     def __init__(self, points: np.ndarray, rows: np.ndarray, columns: np.ndarray, tree: Tree | None = None):
@@ -160,7 +161,7 @@ class BlockSolver:
         self._has_factors = False
         self._rough: Factors | None = None
         self._beside: BlockSolver | None = None
-        self._rough_serves = True
+        self._rough_serves, self.single_only = True, False
         self._directions = Directions(6 * self.n, max(TRIES, TRIES_OF_FEW))
         # Those of rough solutions serve until the next matrix, whatever is solved between, but of so many blocks that
         # this takes other factors, too: of 100 000 they would be 160 MB.
@@ -211,8 +212,14 @@ class BlockSolver:
             if x is not None:
                 return x
             # Beyond single precision, as many sets of states are that are far from the right ones.
-            self._hold(np.float64)
+            self._go_on_in_double()
         return self._solved(data, right, within, target)
+
+    def _go_on_in_double(self) -> None:
+        """Raises numpy.linalg.LinAlgError if that is not wanted."""
+        if self.single_only:
+            raise np.linalg.LinAlgError("the block system is beyond single precision")
+        self._hold(np.float64)
 
     def _hold(self, dtype: type) -> None:
         """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.4
@@ -240,21 +247,23 @@ class BlockSolver:
                 factors.factor(data)
                 self._count(1.0)
         except np.linalg.LinAlgError:
-            self._rough_serves = False
+            self._rough_serves = self.single_only
             return exactly
 
         known = self._shown
         known.forget()
+        # Those of `solve` are left to it: whoever kept them here would keep them beside double ones that follow.
+        own = None if factors is self._factors else factors
 
         def solution(right: np.ndarray, within: float) -> np.ndarray:
             if self._rough_serves:
                 x, rest = np.zeros(len(right)), right.copy()
                 target = within * float(np.abs(right).max(initial=0.0))
-                if self._follow(data, x, rest, known.project(x, rest), target, factors, known, TRIES):
+                if self._follow(data, x, rest, known.project(x, rest), target, own or self._factors, known, TRIES):
                     return x
-                self._rough_serves = False
+                self._rough_serves = self.single_only
             if self._factors.single:
-                self._hold(np.float64)
+                self._go_on_in_double()
             return self.solve(data, right, within)
 
         return solution

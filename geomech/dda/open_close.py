@@ -69,8 +69,11 @@ _NEAR_ITS_END, _TO_ITS_END = 1e-6, 12
 #: From so many free blocks on, a step in motion is cut as soon as few contacts stop its path, which has then come to
 #: where no states are near that fit, somewhere in so large a system: half the step goes through. (A slope of 20 000
 #: blocks under sudden weight, 10 ms: stopped after 33 iterations and, followed further, nowhere after 126 s of processor
-#: time; its half takes 43. Six steps of one of 4 000: 18 s, 98 s where paths are followed further.) Nor are states switched at all where more than `_FEW_OF_ALL` are wrong: an iteration far from the right
-#: ones asks for factors in double precision, which of 100 000 blocks take 20 s and 2 GB more.
+#: time; its half takes 43. Six steps of one of 4 000: 18 s, 98 s where paths are followed further.) Nor are states
+#: switched at all where more than `_FEW_OF_ALL` are wrong, nor any solved for that are beyond factors in single
+#: precision, as those far from the right ones are: double ones of 100 000 blocks take 20 s and 1.6 GB more. (A slope of
+#: so many, 5 ms: the states at the end of its path left no residual below a twentieth in sixteen directions; factored in
+#: double, they led nowhere either.)
 MANY = 3_000
 #: Rounds of lagged friction take so many times the iterations otherwise allowed, and propose states when normal forces
 #: change by less than the first part of the largest, then whenever they do by so much less, until they stay the same.
@@ -80,6 +83,12 @@ _PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
 _CONVEX_CHANGE, _NEARER = 5e-3, 0.5
 #: Iterations to go from such states to the end.
 _FINISH = 8
+
+
+def hurries(patient: bool, statics: bool, n: int) -> bool:
+    """Whether a step of ``n`` free blocks is cut at the first sign that it does not settle, see `MANY`; arguments as for
+    `settle`."""
+    return not (patient or statics) and n >= MANY
 
 
 @dataclass(frozen=True, eq=False)
@@ -428,7 +437,7 @@ def settle(
     caution, fewest, tries = _ALL, np.inf, 0
     few, small = len(found) <= _FEW, pattern.solver is None
     cheap = small or pattern.solver.in_parts
-    hurried = not (patient or statics) and pattern.n >= MANY
+    hurried = hurries(patient, statics, pattern.n)
     iteration, most = 0, max_iterations
     # Contacts (n,) that were wrong in the last iterations, when few were, and how often they were sought together.
     lately, joint, left = [], 0, _SOLUTIONS

@@ -1,0 +1,125 @@
+"""What solvers of many blocks hold at once: factors of one matrix in one precision."""
+
+import weakref
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.bench import block_scenes
+from geomech.dda import assembly, block_solver, dissection, open_close
+from geomech.dda import system as stepping
+from geomech.dda.block_solver import BlockSolver
+from geomech.dda.multifrontal import Factors
+from geomech.model import Blocks, State
+
+
+@pytest.fixture
+def alive(monkeypatch):
+    """As of 100 000 blocks: how many `Factors` are alive whenever some are made, and whether these are single."""
+    for module, name, value in (
+        (block_solver, "SINGLE", 0), (dissection, "KEPT", 0), (assembly, "DENSE_BLOCKS", 0), (open_close, "MANY", 0),
+        (stepping, "MANY", 0),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, value)
+    made, told, factor = weakref.WeakSet(), [], Factors.factor
+
+    def watched(self, *given):
+        made.add(self)
+        told.append((len(made), self.single))
+        return factor(self, *given)
+
+    monkeypatch.setattr(Factors, "factor", watched)
+    return told
+
+
+def column_on_springs(n: int):
+    """Points, pattern and data of n blocks, each on a spring of its own and on one to the next."""
+    number = np.arange(n)
+    keys = np.unique(np.concatenate([number * (n + 1), number[:-1] * (n + 1) + 1, number[1:] * (n + 1) - 1]))
+    rows, columns = keys // n, keys % n
+    data = np.where((rows == columns)[:, None, None], 3.0, -1.0) * np.eye(6)
+    return np.stack([number, 0 * number], axis=1).astype(float), rows, columns, data.ravel()
+
+
+def serves_only_in_double(monkeypatch):
+    """Nothing that single precision leaves is brought down."""
+    follow = BlockSolver._follow
+
+    def failing(self, data, x, rest, largest, target, factors, *others):
+        return not factors.single and follow(self, data, x, rest, largest, target, factors, *others)
+
+    monkeypatch.setattr(BlockSolver, "_follow", failing)
+
+
+@pytest.mark.parametrize("rough", [False, True])
+def test_single_factors_are_gone_before_double_ones_are_made(alive, monkeypatch, rough):
+    solver, right = BlockSolver(*(at := column_on_springs(200))[:3]), np.random.default_rng(1).normal(size=1200)
+    expected = solver.solve(at[3], right)
+    assert solver._factors.single
+    serves_only_in_double(monkeypatch)
+    x = solver.rough_solution(at[3])(right, 1e-9) if rough else solver.solve(at[3], right)
+    assert alive[0] == (1, True) and alive[-1] == (1, False) and set(alive) == {alive[0], alive[-1]}
+    assert x == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_a_solver_of_single_precision_only_gives_up_and_goes_on(alive, monkeypatch):
+    *pattern, data = column_on_springs(200)
+    solver, right = BlockSolver(*pattern), np.random.default_rng(1).normal(size=1200)
+    expected, solver.single_only = solver.solve(data, right), True
+    with monkeypatch.context() as patched:
+        serves_only_in_double(patched)
+        for solve in (solver.solve, lambda *given: solver.rough_solution(data)(right, 1e-9)):
+            with pytest.raises(np.linalg.LinAlgError, match="single precision"):
+                solve(data, right)
+    with pytest.raises(np.linalg.LinAlgError, match="single precision"):
+        # Beyond its range, too.
+        solver.rough_solution(1e50 * data)(right, 1e-9)
+    x = solver.rough_solution(data)(right, 1e-9)
+    assert solver._factors.single and np.abs(x - expected).max() < 1e-7
+    assert np.array_equal(solver.solve(data, right), expected)
+
+
+def test_of_many_blocks_in_motion_a_step_beyond_single_precision_is_cut(alive, monkeypatch):
+    blocks = block_scenes.slope(80)
+
+    def step(seconds, dynamic=True):
+        settings = block_scenes.settings(seconds, dynamic)
+        system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+        return system.step(State.at_rest(blocks), block_scenes.WEIGHT), system._sparse[1].solver
+
+    half = step(0.005)[0]
+    solved, asked = BlockSolver._solved, []
+
+    def beyond(self, *given):
+        # The first matrix is.
+        asked.append(self)
+        return None if len(asked) == 1 else solved(self, *given)
+
+    monkeypatch.setattr(BlockSolver, "_solved", beyond)
+    result, solver = step(0.01)
+    assert (result.dt, result.statistics["step_cuts"]) == (0.005, 1) and solver._factors.single
+    assert np.array_equal(result.state.vertices, half.state.vertices)
+    assert set(alive) == {(1, True)}
+    asked.clear()
+    del result, solver
+    # In statics a shorter step helps little.
+    assert step(0.01, dynamic=False)[0].dt == 0.01
+    assert set(alive) == {(1, True), (1, False)}
+
+
+def test_a_solver_is_gone_before_one_of_more_contacts_factors(alive):
+    """A static step that moves farther than was asked for is tried again with contacts from farther away: here with those
+    of bricks that stand 0.1 µm apart."""
+    blocks, made = block_scenes.wall(80), []
+    corners = blocks.vertices.reshape(-1, 4, 2) - [5e-8, 0.0] * np.array([[-1], [1], [1], [-1]])
+    settings = replace(block_scenes.settings(1.0, dynamic=False), max_displacement_ratio=1e-9)
+    blocks = Blocks.from_polygons(list(corners), fixed=blocks.fixed.tolist())
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+    find = system.finder.find
+    system.finder.find = lambda *given, **named: made.append(find(*given, **named)) or made[-1]
+    system.step(State.at_rest(blocks), block_scenes.WEIGHT)
+    pairs = [set(zip(found.block.tolist(), found.other.tolist(), strict=True)) for found in made]
+    assert len(pairs) > 1 and pairs[-1] > pairs[0]
+    assert {number for number, _ in alive} == {1}
