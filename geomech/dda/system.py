@@ -15,7 +15,7 @@ from .contact_set import ContactSet
 from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
-from .moments import block_moments
+from .moments import block_moments, fastest_vertex
 from .open_close import MANY, Unsettled
 from .overlap import refuse_overlap
 from .rigid import with_rigid
@@ -318,11 +318,7 @@ class BlockSystem:
         """``dt`` shortened where the velocity alone would carry a vertex beyond the limit."""
         if not carried.any():
             return dt
-        v = carried[self.owner]
-        x, y = vertices[:, 0] - moments[self.owner, 1], vertices[:, 1] - moments[self.owner, 2]
-        vx = v[:, 0] - v[:, 2] * y + v[:, 3] * x + 0.5 * v[:, 5] * y
-        vy = v[:, 1] + v[:, 2] * x + v[:, 4] * y + 0.5 * v[:, 5] * x
-        speed = float(np.sqrt(np.max(vx * vx + vy * vy)))
+        speed = float(fastest_vertex(carried, vertices, self.vertex_start, moments))
         g = float(np.hypot(*loads.gravity.at(time + dt)))
         # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
         limit *= _AIM

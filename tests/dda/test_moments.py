@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
+from geomech.dda.moments import fastest_vertex
 from geomech.model import Blocks
 
 
@@ -18,6 +19,20 @@ def test_rectangle_and_triangle_have_their_textbook_moments():
     # b h, b³h/12, bh³/12, 0; for the right triangle bh/2, b³h/36, bh³/36, −b²h²/72.
     expected = [[8, 2, 1, 4**3 * 2 / 12, 4 * 2**3 / 12, 0], [9, 1, 2, 27 * 6 / 36, 3 * 216 / 36, -9 * 36 / 72]]
     assert moments(blocks) == pytest.approx(np.array(expected), rel=1e-14, abs=1e-14)
+
+
+def test_the_fastest_vertex_is_that_of_the_unknowns_rates():
+    blocks = Blocks.from_polygons([np.array([[0, 0], [4, 0], [4, 2], [0, 2.0]]) + [6.0 * k, k] for k in range(5)])
+    m = moments(blocks)
+    rates = np.random.default_rng(2).normal(size=(5, 6))
+    rates[3] = 0.0
+    v = [
+        np.linalg.norm(dda.displacement_matrix(vertex, m[b, 1:3]) @ rates[b])
+        for b, vertex in zip(blocks.vertex_block, blocks.vertices)
+    ]
+    found = fastest_vertex(rates, blocks.vertices, blocks.vertex_start, m)
+    assert found == pytest.approx(max(v), rel=1e-14)
+    assert fastest_vertex(0 * rates, blocks.vertices, blocks.vertex_start, m) == 0.0
 
 
 def test_a_hole_is_taken_out():

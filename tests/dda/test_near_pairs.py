@@ -6,8 +6,16 @@ import pytest
 from geomech import dda
 from geomech.bench.block_scenes import GRAVITY, JOINT, ROCK, WEIGHT, settings, wall
 from geomech.dda import near_pairs as module
-from geomech.dda.near_pairs import NearPairs, near_pairs
+from geomech.dda.near_pairs import NearPairs, boxes, near_pairs
 from geomech.model import State
+
+
+def test_boxes_hold_their_blocks_and_no_more():
+    rng = np.random.default_rng(1)
+    polygons = [rng.normal(size=(n, 2)) for n in (3, 4, 1, 7)]
+    first = np.array([0, 3, 7, 8])
+    expected = [[*p.min(axis=0), *p.max(axis=0)] for p in polygons]
+    assert np.array_equal(boxes(np.concatenate(polygons), first), expected)
 
 
 @pytest.mark.parametrize("spread", [1.0, 30.0, 1e4])
