@@ -35,6 +35,14 @@ def wall(n: int) -> Blocks:
     return Blocks.from_polygons(polygons, fixed=[True] + [False] * (len(polygons) - 1))
 
 
+def with_loose_brick(blocks: Blocks) -> Blocks:
+    """A wall's ``blocks``, and a brick that lies on the middle of it, the last of them."""
+    polygons = [blocks.vertices[a:b] for a, b in pairwise(blocks.vertex_start)]
+    top, x = blocks.vertices[:, 1].max(), math.floor(0.5 * (blocks.vertices[:, 0].max() - 1)) + 0.3
+    polygons.append(_rectangle(x, top, x + 1, top + 0.5))
+    return Blocks.from_polygons(polygons, fixed=[*blocks.fixed, False])
+
+
 def slope(n: int) -> Blocks:
     """About ``n`` blocks of a 60° slope between two joint sets: bedding that dips 20° into the rock and cross joints at
     right angles from bed to bed, blocks of 1 × 1 m; those at its foot and back are fixed."""

@@ -41,8 +41,10 @@ _ALL, _SOME, _WORST, _FIRST = 0, 1, 2, 3
 _FEWER = 0.55
 #: … or for so many iterations although it does not, more where no more than this part of the contacts is wrong (on a
 #: slope that slides, an iteration takes a fifth of one of the path, of which forty may lead nowhere; not where blocks
-#: are so many that both factor all of the matrix).
-_TRIES, _TRIES_OF_FEW, _FEW_OF_ALL = 1, 4, 0.02
+#: are so many that both factor all of the matrix). More of the contacts of `MANY` blocks, whose path may be in vain.
+#: (One brick that slides on a wall of 10 000 shakes a fiftieth to a twentieth of them loose: a step of 10 ms takes seven
+#: iterations then, where the path stopped, and its half took 24.)
+_TRIES, _TRIES_OF_FEW, _FEW_OF_ALL, _FEW_OF_MANY = 1, 4, 0.02, 0.05
 #: If no more than this many contacts are still wrong then, only some are switched, while that helps or for so many
 #: iterations.
 _LITTLE, _MORE = 12, 5
@@ -475,7 +477,7 @@ def settle(
         tries = 0 if number <= _FEWER * fewest else tries + 1
         fewest = min(fewest, number)
         most_tries = -1 if hurried else _TRIES
-        if not few and number <= _FEW_OF_ALL * len(found):
+        if not few and number <= (_FEW_OF_MANY if hurried and cheap else _FEW_OF_ALL) * len(found):
             most_tries = _TRIES_OF_FEW if cheap else _TRIES
         stuck = caution == _ALL and (returned or tries > most_tries)
         if few or caution != _ALL or number > _SOUGHT:

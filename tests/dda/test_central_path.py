@@ -150,6 +150,27 @@ def test_many_blocks_that_no_wave_has_reached_need_not_decide_what_touches(monke
     assert far.sum() > 100 and result.state.velocity[far, 1] == pytest.approx(fall, rel=1e-3)
 
 
+def test_one_brick_that_slides_on_many_at_rest_asks_for_no_path(monkeypatch):
+    """It shakes loose a twentieth of the contacts of 1 500 bricks: the paths stopped, and steps were cut twelve times
+    in ten."""
+    for module in (open_close, stepping):
+        monkeypatch.setattr(module, "MANY", 1000)
+    blocks = block_scenes.with_loose_brick(block_scenes.wall(1500))
+    state = block_scenes.at_rest(blocks)
+    velocity = state.velocity.copy()
+    velocity[-1, 0] = 0.4
+    state = dataclasses.replace(state, velocity=velocity)
+    system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01))
+    took, cuts = [], []
+    for _ in range(5):
+        result = system.step(state, block_scenes.WEIGHT)
+        state = result.state
+        took.append(result.statistics["open_close_iterations"])
+        cuts.append(result.statistics["step_cuts"])
+    print(f"iterations {took}, cuts {cuts}")
+    assert not any(cuts[1:]) and max(took[1:]) < 10
+
+
 @pytest.mark.slow
 def test_a_slope_of_twenty_thousand_blocks_takes_half_a_step_under_sudden_weight():
     """Somewhere in so large a slope no states are near that fit 10 ms: the path is stopped there, and what was tried

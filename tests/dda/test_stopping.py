@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -99,10 +98,7 @@ def test_what_would_gain_energy_is_cut():
 def test_what_a_sliding_brick_shakes_is_not_stopped_by_itself(monkeypatch):
     # A brick slides on a wall and stops. What it shakes of the bricks' contacts at their strength, by 1e-11 m, was
     # stopped in nearly every step, for three more solutions of all equations and the same motion.
-    wall = block_scenes.wall(60)
-    polygons = [wall.vertices[a:b] for a, b in pairwise(wall.vertex_start)]
-    blocks = Blocks.from_polygons([*polygons, rectangle(2.3, 5.5, 3.3, 6.0)], fixed=[True] + [False] * (len(polygons)))
-    assert wall.vertices[:, 1].max() == 5.5
+    blocks = block_scenes.with_loose_brick(block_scenes.wall(60))
     start, thrown, solved = block_scenes.at_rest(blocks), 0.4, []
     velocity = start.velocity.copy()
     velocity[-1, 0] = thrown
