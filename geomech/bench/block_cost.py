@@ -380,7 +380,10 @@ def _table(costs: list[Cost], exponents: dict[str, float], iterated: list[dict],
                 f"  {c.blocks:8d} blocks {1e3 * c.iteration:9.2f} ms {said}"
                 + (f"  (goal {1e3 * goal:g} ms by the clock, here {1e3 * c.by_the_clock:.2f})" if goal else "")
             )
-    lines += ["", "the last equations solved in other ways, set-up included (residual over right side)"]
+    lines += [
+        "",
+        "the last equations solved in other ways, with set-up but for orders of elimination (residual over right side)",
+    ]
     lines += [
         f"  {row['scene']:<13}{row['blocks']:8d}  {row['method']:<24}{row['iterations']:6d} iterations"
         f"{1e3 * row['seconds']:10.1f} ms   {row['residual']:.0e}"

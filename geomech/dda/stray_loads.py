@@ -1,4 +1,5 @@
-"""Loads on blocks that are not there, or at points that their block does not hold: refused before a step."""
+"""Loads on blocks or edges that are not there, at points that their block does not hold, or that could do nothing where
+they are: refused before a step."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..model import GROUND, Blocks, Loads
+from ..model import GROUND, BaseMotion, Blocks, Loads, ViscousBoundary
 from ..model.polygon import distance_to_edges, winding_number
 from .bolts import labels
 
@@ -26,8 +27,12 @@ class StrayLoads:
         self._reach = _OF_DRAWING * float(np.ptp(blocks.vertices, axis=0).max()) if blocks.n_vertices else 0.0
 
     def refuse(self, loads: Loads) -> None:
-        """Raises ValueError naming the load whose block is not there, or does not hold its point."""
-        seen = loads.point_loads, loads.point_motions, loads.block_motions, loads.bolts, loads.base
+        """Raises ValueError naming the load whose block is not there, or does not hold its point; for ground that
+        shakes no fixed block, and for dashpots on edges that no moving block has."""
+        seen = (
+            loads.point_loads, loads.point_motions, loads.block_motions, loads.bolts, loads.base,
+            loads.viscous_boundaries,
+        )  # fmt: skip
         if len(seen) == len(self._seen) and all(a is b for a, b in zip(seen, self._seen)):
             return
         for what, block in self._on_blocks(loads):
@@ -37,6 +42,10 @@ class StrayLoads:
             if key not in self._held:
                 self._refuse_outside(what, block, np.asarray(at, dtype=float))
                 self._held.add(key)
+        if loads.base is not None and loads.base.frame == "ground":
+            self._refuse_unshaken(loads.base)
+        for boundary in loads.viscous_boundaries:
+            self._refuse_idle(boundary)
         self._seen = seen
 
     @staticmethod
@@ -72,4 +81,28 @@ class StrayLoads:
             raise ValueError(
                 f"{what} acts on {name!r} at ({at[0]:g}, {at[1]:g}), which lies {away:.3g} m outside of it: points are "
                 "given in the coordinates in which the blocks were drawn"
+            )
+
+    def _refuse_unshaken(self, base: BaseMotion) -> None:
+        """Ground shakes the fixed blocks: one that is not fixed would stay as it is without a word."""
+        if not self._blocks.fixed.any():
+            raise ValueError(
+                "the ground shakes, but no block is fixed that would go with it: fix what others stand on"
+            )
+        for block in base.blocks or ():
+            if not self._blocks.fixed[block]:
+                raise ValueError(
+                    f"the motion of the base names {self._name('it', block)!r}, which is not fixed: fix it, or give it "
+                    "a motion of its own"
+                )
+
+    def _refuse_idle(self, boundary: ViscousBoundary) -> None:
+        what = f"a viscous boundary is on edges named {boundary.edge_name!r}"
+        edges = self._blocks.edges_named(boundary.edge_name)
+        if not len(edges):
+            known = ", ".join(repr(n) for n in self._blocks.edge_names if n) or "none"
+            raise ValueError(f"{what}, but no edge has that name (names: {known})")
+        if self._blocks.fixed[self._blocks.vertex_block[edges]].all():
+            raise ValueError(
+                f"{what}, but the blocks that have them are fixed, where it brakes nothing"
             )

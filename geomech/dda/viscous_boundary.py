@@ -45,17 +45,10 @@ class QuietEdges:
         fixed: np.ndarray,
     ) -> QuietEdges:
         """Those that ``boundaries`` name, at ``time`` on the current ``vertices``; ``density`` (n_blocks,) kg/m³ and
-        ``stiffness`` (n_blocks, 3, 3) Pa; not those of ``fixed`` (n_blocks,) blocks. Raises ValueError for a name that
-        no edge has."""
+        ``stiffness`` (n_blocks, 3, 3) Pa; not those of ``fixed`` (n_blocks,) blocks."""
         edge, incoming = [], []
         for boundary in boundaries:
             named = blocks.edges_named(boundary.edge_name)
-            if len(named) == 0:
-                known = ", ".join(repr(n) for n in blocks.edge_names if n) or "none"
-                raise ValueError(
-                    f"a viscous boundary is on edges named {boundary.edge_name!r}, but no edge has that name (names: "
-                    f"{known})"
-                )
             named = named[~fixed[blocks.vertex_block[named]]]
             wave = np.zeros(2) if boundary.incoming is None else boundary.incoming.at(time)
             edge.append(named)

@@ -10,7 +10,7 @@ from ..shapes.gmsh_drawing import CRACK
 from ..shapes.parts import JOINT
 from .drawing import Drawing
 from .errors import Check
-from .held_blocks import holds
+from .held_blocks import fixed_blocks, holds
 from .locator import Path
 from .validation import nearest
 
@@ -29,7 +29,7 @@ def _edge_names(c: Check) -> list[str]:
 def _tractions(c: Check) -> None:
     if c.tables.loads is None:
         return
-    known = _edge_names(c)
+    known, blocks = _edge_names(c), c.drawing.blocks
     taken = {traction.edge for traction in c.tables.loads.tractions}
     for k, traction in enumerate(c.tables.loads.tractions):
         if traction.edge not in known:
@@ -44,6 +44,12 @@ def _tractions(c: Check) -> None:
                 ("loads", "viscous_boundaries", k, "edge"),
                 f"the geometry has no edge {boundary.edge!r}",
                 _edge_hint(c, boundary.edge, known, set()),
+            )
+        elif fixed_blocks(c.tables, c.drawing)[blocks.vertex_block[blocks.edges_named(boundary.edge)]].all():
+            c.refuse(
+                ("loads", "viscous_boundaries", k, "edge"),
+                f"the edges {boundary.edge!r} belong to fixed blocks: nothing there moves that could be braked",
+                "let the zone move: it stands on the boundary itself",
             )
     leading = c.tables.loads.leading_edge
     # Where a traction's own edge is wrong, it may be the one that leads.

@@ -211,6 +211,8 @@ def stepped(loads: Loads, *, rock: Material = ROCK, dt: float | None = None, **s
         (Loads(point_motions=(PointMotion(2, (0.5, 0.5), PUSH),)), "motion of point 1 names block 2"),
         (Loads(block_motions=(BlockMotion(7, PUSH, ("u0", "v0")),)), "motion of a block names block 7"),
         (Loads(base=BaseMotion(PUSH, blocks=(0, 3))), "motion of the base names block 3"),
+        (Loads(base=BaseMotion(PUSH, blocks=(0, 1))), "motion of the base names 'square', which is not fixed"),
+        (Loads(viscous_boundaries=(ViscousBoundary("toe"),)), r"edges named 'toe', but no edge has that name"),
         (Loads(bolts=(Bolt(**{**BOLT, "start": (99.0, 99.0)}),)), r"bolt 'anchor' acts on 'square' at \(99, 99\)"),
         (Loads(bolts=(Bolt(**{**BOLT, "end": (0.5, 0.2)}),)),
          r"bolt 'anchor' acts on 'base' at \(0.5, 0.2\), which lies 0.2 m outside"),
@@ -221,6 +223,17 @@ def stepped(loads: Loads, *, rock: Material = ROCK, dt: float | None = None, **s
 def test_a_load_that_its_block_does_not_hold_is_refused_by_name(loads, words):
     with pytest.raises(ValueError, match=words):
         stepped(loads)
+
+
+def test_loads_that_would_do_nothing_are_refused():
+    names = [[["foot"] * 4], [["side"] * 4]]
+    blocks = two_blocks(names=["base", "square"], edge_names=names)
+    quiet = Loads(viscous_boundaries=(ViscousBoundary("side"), ViscousBoundary("foot")))
+    with pytest.raises(ValueError, match="edges named 'foot', but the blocks that have them are fixed"):
+        dda.BlockSystem(blocks, [ROCK]).step(State.at_rest(blocks), quiet)
+    loose = Blocks.from_polygons([SQUARE])
+    with pytest.raises(ValueError, match="ground shakes, but no block is fixed"):
+        dda.BlockSystem(loose, [ROCK]).step(State.at_rest(loose), Loads(base=BaseMotion(PUSH)))
 
 
 def test_points_on_an_outline_and_in_the_ground_are_no_strays():

@@ -19,6 +19,16 @@ poissons_ratio = 0.2
 density_kg_m3 = 1800
 tensile_strength_pa = 1e6
 """
+QUIET_BASE = """\
+[[geometry.zones]]
+name = "base"
+rectangle = [-1.0, -1.0, 2.0, 0.0]
+[[geometry.edges]]
+name = "quiet"
+line = [[-1.0, -1.0], [2.0, -1.0]]
+[zones.base]
+fixed = true
+"""
 SPOILT = [
     # old, new, place, message, way out
     (
@@ -62,6 +72,13 @@ SPOILT = [
         "loads.viscous_boundaries[0].edge",
         "no edge 'load:tip'",
         "did you mean 'load:top'?",
+    ),
+    (
+        "[run]",
+        '[[loads.viscous_boundaries]]\nedge = "quiet"\n[dda]\ndynamic_factor = 1\n' + QUIET_BASE + "[run]",
+        "loads.viscous_boundaries[0].edge",
+        "the edges 'quiet' belong to fixed blocks",
+        "let the zone move",
     ),
     (
         "[run]",
