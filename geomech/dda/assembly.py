@@ -397,10 +397,11 @@ def assemble_contacts(
 
 
 def solve(
-    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, beside: bool = False
-) -> np.ndarray:
-    """Unknowns (6 n,) in the pattern's order; ``force`` as for `BlockSolver.solve`; ``beside``: see there. Overwrites
-    ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, beside: bool = False,
+    near: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Unknowns (6 n,) in the pattern's order; ``force`` and ``near`` as for `BlockSolver.solve`; ``beside``: see there.
+    Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
@@ -415,4 +416,4 @@ def solve(
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
     solver = pattern.solver.beside if beside else pattern.solver
-    return solver.solve(data, right, force=force)
+    return solver.solve(data, right, force=force, near=near)

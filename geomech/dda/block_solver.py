@@ -195,25 +195,26 @@ class BlockSolver:
         return np.searchsorted(self.keys, keys)
 
     def solve(
-        self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL, force: float = 0.0
-    ) -> np.ndarray:
+        self, data: np.ndarray, right: np.ndarray, within: float = RESIDUAL, force: float = 0.0,
+        near: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
         """x (6n,) for the blocks ``data`` (36 n_entries,), each row by row, with a residual ``within`` that part of
-        ``right``, or of a larger ``force`` that others balance in it, or of round-off. Raises
-        numpy.linalg.LinAlgError."""
+        ``right``, or of a larger ``force`` that others balance in it, or of round-off. ``near`` (6n,) may be known to
+        lie near x. Raises numpy.linalg.LinAlgError."""
         largest = float(np.abs(right).max(initial=0.0))
         target = within * max(force, largest)
         if largest > 0.0:
             within = target / largest
         if self._factors.single:
             try:
-                x = self._solved(data, right, within, target)
+                x = self._solved(data, right, within, target, near)
             except np.linalg.LinAlgError:
                 x = None
             if x is not None:
                 return x
             # Beyond single precision, as many sets of states are that are far from the right ones.
             self._go_on_in_double()
-        return self._solved(data, right, within, target)
+        return self._solved(data, right, within, target, near)
 
     def _go_on_in_double(self) -> None:
         """Raises numpy.linalg.LinAlgError if that is not wanted."""
@@ -281,19 +282,21 @@ class BlockSolver:
             self._rough = Factors(*self._pattern, np.float32, self._factors.tree, again=False)
         return self._rough
 
-    def _solved(self, data: np.ndarray, right: np.ndarray, within: float, target: float) -> np.ndarray | None:
+    def _solved(
+        self, data: np.ndarray, right: np.ndarray, within: float, target: float, near: np.ndarray | None
+    ) -> np.ndarray | None:
         """`solve` with the factors as they are, to residuals of ``target``; None where single precision does not
         do."""
         if self._has_factors:
             fresh = self._bring(data, 0 if self._factors.tree.kept else FEW)
             tries = TRIES if fresh or self.in_parts else TRIES_OF_FEW
-            found = self._iterate(data, right, within, target, self._factors, tries=tries)
+            found = self._iterate(data, right, within, target, self._factors, near, tries)
             # Single precision knows no more of this matrix than that, in full or in part.
             if found is not None or (fresh and self._factors.single):
                 return found
         self.factor(data)
         if self._factors.single:
-            return self._iterate(data, right, within, target, self._factors)
+            return self._iterate(data, right, within, target, self._factors, near)
         x, told = self.substitute(right), False
         for _ in range(REFINEMENTS):
             rest = right - self.multiply(data, x)
@@ -345,13 +348,14 @@ class BlockSolver:
         return multiply(data, self.pointer, self.columns, x)
 
     def _iterate(
-        self, data: np.ndarray, right: np.ndarray, within: float, target: float, factors: Factors, tries: int = TRIES
-    ) -> np.ndarray | None:
-        """x (6n,) with a residual of ``target``, from ``factors`` that are nearly those of the matrix; None when it
-        takes more than so many ``tries``, solutions with them."""
+        self, data: np.ndarray, right: np.ndarray, within: float, target: float, factors: Factors,
+        near: np.ndarray | None = None, tries: int = TRIES,
+    ) -> np.ndarray | None:  # fmt: skip
+        """x (6n,) with a residual of ``target``, from ``factors`` that are nearly those of the matrix, and from ``near``
+        on if that is known; None when it takes more than so many ``tries``, solutions with them."""
         known, told = self._directions, False
         known.forget()
-        x = self.substitute(right, factors)
+        x = self.substitute(right, factors) if near is None else near.copy()
         for cycle in range(3):
             rest = right - self.multiply(data, x)
             largest = float(np.abs(rest).max(initial=0.0))

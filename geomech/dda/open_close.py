@@ -198,6 +198,7 @@ class _Equations:
         self._data = np.empty(self.pattern.size)
         self._side = np.empty(6 * self.pattern.n)
         self._held: tuple[np.ndarray, ...] | None = None
+        self._near: np.ndarray | None = None
         self._force = float(np.abs(self.right).max(initial=0.0))
         self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
 
@@ -252,11 +253,12 @@ class _Equations:
         # Dense matrices are overwritten by their factors, links added to all.
         self._held = held if pattern.solver is not None and pattern.links is None else None
         try:
-            unknowns = assembly.solve(pattern, self._data, self._side, symmetric, self._force)
+            unknowns = assembly.solve(pattern, self._data, self._side, symmetric, self._force, near=self._near)
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         if not np.isfinite(unknowns).all():
             raise Unsettled("the step's matrix is singular")
+        self._near = unknowns
         forces = contact_forces(
             unknowns, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
             springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,

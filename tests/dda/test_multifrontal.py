@@ -321,6 +321,30 @@ def test_what_large_forces_leave_when_they_cancel_is_solved_to_their_round_off(m
     assert np.abs(x - exact).max() <= 1e-3 * np.abs(exact).max()
 
 
+@pytest.mark.parametrize("single", [False, True])
+def test_from_a_near_solution_on_it_takes_fewer_substitutions_to_the_same_residual(monkeypatch, single):
+    monkeypatch.setattr(block_solver, "SINGLE", 1 if single else 10**9)
+    points, rows, columns, data = springs_between(400, seed=8)
+    solver, rng = BlockSolver(points, rows, columns), np.random.default_rng(9)
+    right = rng.normal(size=2400)
+    before = solver.solve(data.ravel(), right)
+    # Factors of the first matrix serve the next one, which differs by less than is factored again.
+    data *= 1.0 + 1e-7 * rng.normal(size=len(data))[:, None, None]
+    other = right.copy()
+    other[:6] += 1e-3
+    took, answers = [], []
+    for near in (None, before):
+        told = solver.counts["substitutions"]
+        answers.append(solver.solve(data.ravel(), other, near=near))
+        took.append(solver.counts["substitutions"] - told)
+        rest = other - solver.multiply(data.ravel(), answers[-1])
+        assert np.abs(rest).max() <= max(1.01e-12 * np.abs(other).max(), solver._round_off(data.ravel(), answers[-1]))
+    print(f"substitutions {took}")
+    assert took[1] < took[0]
+    assert np.abs(answers[1] - answers[0]).max() <= 1e-8 * np.abs(answers[0]).max()
+    assert np.array_equal(before, BlockSolver(points, rows, columns).solve(springs_between(400, seed=8)[3].ravel(), right))
+
+
 def test_matrices_of_two_kinds_that_come_by_turns_are_each_factored_in_part(monkeypatch):
     points, rows, columns, data = springs_between(300, seed=3)
     right = np.random.default_rng(5).normal(size=1800)
