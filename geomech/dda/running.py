@@ -55,9 +55,9 @@ def run(
     ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
 
     ``settings.equilibrium`` "start" brings the blocks to rest before the first state, "loads" in statics at every load
-    too. Logs a warning when energy comes from nowhere, or a block is strained beyond the elastic range. Raises
-    `NotConverged` where no step or equilibrium is found, or a block is strained by more than a quarter, and ValueError
-    for what makes no sense, before the first step as far as it can be told then.
+    too. Logs a warning when energy comes from nowhere, a block is strained beyond the elastic range, or dashpots have
+    nothing to brake in statics. Raises `NotConverged` where no step or equilibrium is found, or a block is strained by
+    more than a quarter, and ValueError for what makes no sense, before the first step as far as it can be told then.
     """
     if not end_time >= 0:
         raise ValueError(f"end_time must not be negative, got {end_time!r} s")
@@ -65,6 +65,8 @@ def run(
     if state is None:
         state = State.at_rest(blocks)
     state.refuse_misfit(blocks)
+    if system.scheme.static and loads.viscous_boundaries:
+        log.warning("viscous boundaries do nothing in a static run")
     watched = _Watch(blocks)
     if settings.equilibrium:
         state = _at_rest(system, state, loads, state.time)

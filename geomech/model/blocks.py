@@ -324,6 +324,15 @@ def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
     crossing = crossing_loops(outline, hole)
     if crossing is not None:
         raise ValueError(f"{name}: a hole reaches out of the outline at ({crossing[0]:g}, {crossing[1]:g})")
+    # Between corners where it touches the outline an edge may lie along it: there is no rock beside it then.
+    along = np.roll(hole, -1, axis=0) - hole
+    outwards = np.stack([along[:, 1], -along[:, 0]], axis=1) * np.sign(signed_area(hole))
+    for point in hole + 0.5 * along + 1e-6 * outwards:
+        if abs(winding_number([outline], point)) < 0.5:
+            raise ValueError(
+                f"{name}: an edge of a hole lies along the outline at ({point[0]:.6g}, {point[1]:.6g}): draw the "
+                "outline round what is taken out"
+            )
 
 
 def _refuse_shared(holes: list[np.ndarray], name: str) -> None:

@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.model import Blocks, DdaSettings, EdgeTraction, Excavation, History, JointLaw, Loads, Material, State
+from geomech.model import (
+    Blocks,
+    DdaSettings,
+    EdgeTraction,
+    Excavation,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    State,
+    ViscousBoundary,
+)
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 BASE = np.array([[-5.0, -1.0], [5.0, -1.0], [5.0, 0.0], [-5.0, 0.0]])
@@ -65,6 +76,15 @@ def test_energy_from_nowhere_is_told_by_blocks_alone(caplog):
     for _ in dda.run(on_incline(0.0, 0.05), [ROCK], [JOINT], WEIGHT, MOVING, 0.3):
         pass
     assert not caplog.records
+
+
+@pytest.mark.parametrize(("settings", "told"), [(DdaSettings(time_step=1e-3), True), (MOVING, False)])
+def test_dashpots_that_statics_do_not_know_are_told(caplog, settings, told):
+    blocks = Blocks.from_polygons([BASE, SQUARE], fixed=[True, False], edge_names=[[[""] * 4], [["", "", "top", ""]]])
+    loads = replace(WEIGHT, viscous_boundaries=(ViscousBoundary("top"),))
+    for _ in dda.run(blocks, [ROCK], [JOINT], loads, settings, 2e-3):
+        pass
+    assert ("viscous boundaries do nothing in a static run" in caplog.text) is told
 
 
 def test_an_excavation_takes_its_energy_along(caplog):

@@ -83,8 +83,10 @@ WIDE, SMALL = np.array([[0, 0], [10, 0], [10, 10], [0, 10.0]]), np.array([[2, 2]
         ([WIDE, SMALL, SMALL[:3]], "slab: holes 1 and 2 overlap at"),
         ([WIDE, SMALL * [2, 0.5], SMALL * [1, 1.5] - [-2, 2.5]], "slab: holes 1 and 2 overlap at"),
         ([U, np.array([[0.5, 2], [2.5, 2], [2.5, 2.2], [0.5, 2.2]])], "slab: a hole reaches out of the outline at"),
+        ([WIDE, WIDE], "slab: an edge of a hole lies along the outline at"),
+        ([WIDE, WIDE[[1, 2, 0]]], "slab: an edge of a hole lies along the outline at"),
     ],
-    ids=["crossing", "inside", "twice", "half of it", "a cross", "over a notch"],
+    ids=["crossing", "inside", "twice", "half of it", "a cross", "over a notch", "all of it", "a half"],
 )
 def test_holes_that_share_rock_or_leave_it_are_refused(loops, message, far):
     with pytest.raises(ValueError, match=message):
@@ -94,6 +96,11 @@ def test_holes_that_share_rock_or_leave_it_are_refused(loops, message, far):
 @pytest.mark.parametrize("shift", [(2, 0), (2, 2), (2, 1), (4, 3)], ids=["a side", "a corner", "part of a side", "apart"])
 def test_holes_that_only_touch_are_two(shift):
     assert Blocks.from_polygons([[WIDE, SMALL, SMALL[::-1] + shift]]).areas() == pytest.approx(100 - 8)
+
+
+def test_a_hole_may_touch_the_corners_of_its_outline():
+    hole = np.array([[0, 0], [4, 1], [10, 10], [1, 4.0]])
+    assert Blocks.from_polygons([[WIDE, hole]]).areas() == pytest.approx(100 - 30)
 
 
 def test_motion_is_recovered_from_the_vertices():
