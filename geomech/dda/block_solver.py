@@ -19,7 +19,7 @@ import numpy as np
 
 from ..compiled import kept
 from .directions import Directions
-from .dissection import Tree
+from .dissection import KEPT, Tree
 from .multifrontal import Factors
 from .shared_tasks import add_at_once, await_value, crew
 from .work import Work
@@ -162,10 +162,7 @@ class BlockSolver:
         self._rough: Factors | None = None
         self._beside: BlockSolver | None = None
         self._rough_serves, self.single_only = True, False
-        self._directions = Directions(6 * self.n, max(TRIES, TRIES_OF_FEW))
-        # Those of rough solutions serve until the next matrix, whatever is solved between, but of so many blocks that
-        # this takes other factors, too: of 100 000 they would be 160 MB.
-        self._shown = Directions(6 * self.n, TRIES, self._directions if self.n >= SINGLE else None)
+        self._make_room_for_directions()
         #: ``shares``: factorisations, one that was done in part as that part.
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
@@ -178,13 +175,23 @@ class BlockSolver:
     @property
     def beside(self) -> BlockSolver:
         """A solver of the same pattern for matrices of another kind, that come by turns with this one's: the factors of
-        each are made anew in part. This one where that is not done."""
-        if not self.in_parts:
+        each are made anew in part. This one where that is not done, or is of too many blocks to be done twice: two of
+        50 000 would take 3 GB, and without a second one steps that stop blocks take 4 % longer."""
+        if not self.in_parts or 2 * self._factors.tree.own_room_size > KEPT:
             return self
         if self._beside is None:
             self._beside = BlockSolver(*self._pattern, self._factors.tree)
             self._beside.work, self._beside.counts = self.work, self.counts
         return self._beside
+
+    def _make_room_for_directions(self) -> None:
+        """Those of rough solutions serve until the next matrix, whatever is solved between, but of so many blocks that
+        this takes other factors, too. Then both share a room, that in which the factors are made where it is idle: of
+        100 000 blocks they would be 400 MB."""
+        size, most, many = 6 * self.n, max(TRIES, TRIES_OF_FEW), self.n >= SINGLE
+        idle = self._factors.idle_room
+        self._directions = Directions(size, most, room=idle if many and len(idle) >= 2 * most * size else None)
+        self._shown = Directions(size, TRIES, self._directions if many else None)
 
     def holds(self, keys: np.ndarray) -> bool:
         """Whether the pattern has the blocks ``keys`` = row · n + column."""
@@ -226,8 +233,9 @@ class BlockSolver:
         """Go on with factors of this precision; those at hand make room first: of 100 000 blocks both would take 4.4
         GB."""
         tree, self._has_factors = self._factors.tree, False
-        del self._factors
+        del self._factors, self._directions, self._shown
         self._factors = Factors(*self._pattern, dtype, tree)
+        self._make_room_for_directions()
 
     def rough_solution(self, data: np.ndarray) -> Callable[..., np.ndarray]:
         """What gives x (6n,) for one right side after the other, ``solution(right, within)``, with a residual ``within``
@@ -251,18 +259,18 @@ class BlockSolver:
             self._rough_serves = self.single_only
             return exactly
 
-        known = self._shown
-        known.forget()
+        self._shown.forget()
         # Those of `solve` are left to it: whoever kept them here would keep them beside double ones that follow.
         own = None if factors is self._factors else factors
 
         def solution(right: np.ndarray, within: float) -> np.ndarray:
             if self._rough_serves:
-                x, rest = np.zeros(len(right)), right.copy()
+                x, rest, known = np.zeros(len(right)), right.copy(), self._shown
                 target = within * float(np.abs(right).max(initial=0.0))
                 if self._follow(data, x, rest, known.project(x, rest), target, own or self._factors, known, TRIES):
                     return x
                 self._rough_serves = self.single_only
+                del known
             if self._factors.single:
                 self._go_on_in_double()
             return self.solve(data, right, within)
@@ -331,6 +339,10 @@ class BlockSolver:
         """Factor the matrix of ``data``, which may be known to have ``changed`` (n,) in these diagonal blocks only;
         ``again``: see `Factors.factor`. Raises numpy.linalg.LinAlgError when it is singular."""
         self._has_factors, began = False, time.perf_counter()
+        if self.n >= SINGLE:
+            # Where their room is that of the factorisation.
+            self._directions.forget()
+            self._shown.forget()
         share = self._factors.factor(data, changed, again)
         _take(data, self._diagonal, np.ones(self.n, np.bool_) if changed is None else changed, self._factored)
         self._has_factors = True

@@ -71,14 +71,18 @@ def _largest(values):
 
 
 class Directions:
-    """Room for ``most`` directions of ``size`` unknowns, of which ``number`` are known; or the first ``most`` of the
-    room of others, ``sharing``: what one of the two adds, the other has forgotten."""
+    """Room for ``most`` directions of ``size`` unknowns, of which ``number`` are known, in the first numbers of ``room``
+    if some is given; or the first ``most`` of the room of others, ``sharing``: what one of the two adds, the other has
+    forgotten."""
 
-    def __init__(self, size: int, most: int, sharing: Directions | None = None) -> None:
+    def __init__(
+        self, size: int, most: int, sharing: Directions | None = None, room: np.ndarray | None = None
+    ) -> None:
         self._sharing = sharing
         if sharing is None:
             # Memory is taken as directions come.
-            self._directions, self._products = np.empty((most, size)), np.empty((most, size))
+            room = np.empty(2 * most * size) if room is None else room
+            self._directions, self._products = room[: 2 * most * size].reshape(2, most, size)
         else:
             self._directions, self._products = sharing._directions[:most], sharing._products[:most]
             sharing._sharing = self

@@ -183,6 +183,11 @@ class Factors:
         """Whether the factors are in single precision."""
         return self._factors.dtype == np.float32
 
+    @property
+    def idle_room(self) -> np.ndarray:
+        """(…,) float64 that nothing is kept in from one factorisation to the next, for others to use in between."""
+        return self._room[: 0 if self._again else len(self._room) // 2 * 2].view(np.float64)
+
     def factor(self, data: np.ndarray, changed: np.ndarray | None = None, again: bool = True) -> float:
         """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row; the share of it that was done.
 

@@ -51,3 +51,18 @@ def test_the_oldest_make_room_and_what_leads_nowhere_is_told(matrices):
         assert known.number == (k + 1 if k < 4 else k - 3) and np.linalg.norm(rest) <= before
     assert known.add(np.ones(60), np.zeros(60), x, rest) == np.inf
     assert Directions(60, 4).project(np.zeros(60), np.full(60, np.nan)) == np.inf
+
+
+def test_of_two_that_share_a_room_one_forgets_what_the_other_overwrites(matrices):
+    matrix, nearly = matrices
+    rng = np.random.default_rng(6)
+    first = Directions(60, 40, room=np.empty(2 * 40 * 60 + 3))
+    second = Directions(60, 10, first)
+    assert np.shares_memory(first._directions, second._directions) and (len(first), len(second)) == (40, 10)
+    for _ in range(2):
+        for known, other in ((first, second), (second, first)):
+            right = rng.normal(size=60)
+            x, _ = solved(matrix, known, right, nearly)
+            expected = np.linalg.solve(matrix, right)
+            assert np.abs(x - expected).max() <= 1e-7 * np.abs(expected).max()
+            assert known.number > 0 and other.number == 0

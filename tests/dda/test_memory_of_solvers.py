@@ -123,3 +123,20 @@ def test_a_solver_is_gone_before_one_of_more_contacts_factors(alive):
     pairs = [set(zip(found.block.tolist(), found.other.tolist(), strict=True)) for found in made]
     assert len(pairs) > 1 and pairs[-1] > pairs[0]
     assert {number for number, _ in alive} == {1}
+
+
+def test_directions_lie_where_factors_are_made(alive, monkeypatch):
+    """… in between: what is solved is the same to the bit as with a room of their own."""
+    monkeypatch.setattr(block_solver, "TRIES", 8)
+    monkeypatch.setattr(block_solver, "TRIES_OF_FEW", 8)
+    blocks, told, kept = block_scenes.slope(300), [], Factors.idle_room
+    for room in (kept, property(lambda self: np.empty(0))):
+        monkeypatch.setattr(Factors, "idle_room", room)
+        settings, state = block_scenes.settings(0.01), State.at_rest(blocks)
+        system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
+        for _ in range(2):
+            state = system.step(state, block_scenes.WEIGHT).state
+        solver = system._sparse[1].solver
+        told.append((state.vertices, np.shares_memory(solver._directions._directions, solver._factors._room)))
+        assert np.shares_memory(solver._directions._directions, solver._shown._directions)
+    assert (told[0][1], told[1][1]) == (True, False) and np.array_equal(told[0][0], told[1][0])

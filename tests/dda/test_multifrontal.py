@@ -360,7 +360,12 @@ def test_matrices_of_two_kinds_that_come_by_turns_are_each_factored_in_part(monk
     assert solver.counts["factorisations"] == 6 and solver.counts["shares"] < 4.0
     expected = splu(full(rows, columns, other, 300).tocsc()).solve(right)
     assert np.abs(x - expected).max() <= 1e-8 * np.abs(expected).max()
-    # Where factors are made anew in full, one set has the memory.
+    # Where two would take more room than one may, one serves both, in part or …
+    with monkeypatch.context() as patched:
+        patched.setattr(block_solver, "KEPT", 2 * solver._factors.tree.own_room_size - 1)
+        assert solver.in_parts and solver.beside is solver
+    assert solver.beside is not solver
+    # … where factors are made anew, in full.
     monkeypatch.setattr(dissection, "KEPT", 0)
     large = BlockSolver(points, rows, columns)
     assert large.beside is large
