@@ -12,7 +12,7 @@ import numpy as np
 
 from ..compiled import kept, part
 from ..model import OPEN, SLIP, STICK
-from .block_solver import BlockSolver
+from .block_solver import RESIDUAL, BlockSolver
 from .lanes import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
 from .shared_tasks import add_at_once, await_value, crew
 
@@ -398,10 +398,10 @@ def assemble_contacts(
 
 def solve(
     pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, beside: bool = False,
-    near: np.ndarray | None = None,
+    near: np.ndarray | None = None, within: float = RESIDUAL,
 ) -> np.ndarray:  # fmt: skip
-    """Unknowns (6 n,) in the pattern's order; ``force`` and ``near`` as for `BlockSolver.solve`; ``beside``: see there.
-    Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` and ``within`` as for `BlockSolver.solve`;
+    ``beside``: see there. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
     pattern.add_links(data)
     if pattern.solver is None:
         from scipy.linalg.lapack import dgesv, dposv
@@ -416,4 +416,4 @@ def solve(
             raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
         return x
     solver = pattern.solver.beside if beside else pattern.solver
-    return solver.solve(data, right, force=force, near=near)
+    return solver.solve(data, right, within, force, near)

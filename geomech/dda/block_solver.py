@@ -163,6 +163,8 @@ class BlockSolver:
         self._beside: BlockSolver | None = None
         self._rough_serves, self.single_only = True, False
         self._make_room_for_directions()
+        #: The largest entry of the last solution's residual.
+        self.left = 0.0
         #: ``shares``: factorisations, one that was done in part as that part.
         self.work = Work()
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
@@ -308,7 +310,7 @@ class BlockSolver:
         x, told = self.substitute(right), False
         for _ in range(REFINEMENTS):
             rest = right - self.multiply(data, x)
-            largest = float(np.abs(rest).max())
+            self.left = largest = float(np.abs(rest).max())
             if largest > target and not told:
                 target, told = max(target, self._round_off(data, x)), True
             if not largest > target:
@@ -374,6 +376,7 @@ class BlockSolver:
             # Round-off is asked for only where it may decide, once: the first x of a coarse solution need not know it.
             if largest > target and not told and (cycle or within <= COARSE):
                 target, told = max(target, self._round_off(data, x)), True
+            self.left = largest
             if largest <= target:
                 return x
             if not self._follow(data, x, rest, largest, target, factors, known, tries):

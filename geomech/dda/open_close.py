@@ -23,6 +23,7 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
+from .block_solver import RESIDUAL
 from .bonded_faces import check_faces
 from .central_path import CentralPath
 from .contact_springs import Springs
@@ -83,6 +84,8 @@ MANY = 3_000
 #: nearly always wrong.
 _PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
 _CONVEX_CHANGE, _NEARER = 5e-3, 0.5
+#: What solutions with residuals below this part of the forces tell wrong states is not asked for more digits.
+_ROUGHLY = 1e-8
 #: Iterations to go from such states to the end.
 _FINISH = 8
 
@@ -252,8 +255,24 @@ class _Equations:
         )  # fmt: skip
         # Dense matrices are overwritten by their factors, links added to all.
         self._held = held if pattern.solver is not None and pattern.links is None else None
+        if self._held is not None:
+            answer = self._answered(states, springs, gap, slip, symmetric, _ROUGHLY)
+            forces = max(self._force, float(np.abs(self._side).max(initial=0.0)))
+            if (answer.violation > 0).any() or pattern.solver.left <= RESIDUAL * forces:
+                return answer
+        return self._answered(states, springs, gap, slip, symmetric, RESIDUAL)
+
+    def _answered(
+        self, states: _States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
+    ) -> _Answer:
+        """The answer of the system as it is assembled, of lines with these ``springs`` and ``gap``, solved to a residual
+        ``within`` that part of the forces."""
+        pattern, found = self.pattern, self.found
+        state, direction, bonded = states.state, states.direction, states.bonded
         try:
-            unknowns = assembly.solve(pattern, self._data, self._side, symmetric, self._force, near=self._near)
+            unknowns = assembly.solve(
+                pattern, self._data, self._side, symmetric, self._force, near=self._near, within=within
+            )
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         if not np.isfinite(unknowns).all():
