@@ -81,6 +81,21 @@ def test_a_solver_of_single_precision_only_gives_up_and_goes_on(alive, monkeypat
     assert np.array_equal(solver.solve(data, right), expected)
 
 
+@pytest.mark.parametrize(("spread", "single"), [(0.1, True), (0.9, False)])
+def test_single_factors_serve_on_while_residuals_fall(alive, monkeypatch, spread, single):
+    """Factors that are wrong by a little take more directions than one cycle has; those that lead nowhere are given
+    up after one."""
+    *pattern, data = column_on_springs(200)
+    right, substitute = np.random.default_rng(1).normal(size=1200), Factors.substitute
+    expected = BlockSolver(*pattern).solve(data, right)
+    wrong = 1.0 + spread * np.random.default_rng(2).uniform(-1.0, 1.0, 1200)
+    monkeypatch.setattr(block_solver, "TRIES", 5)
+    monkeypatch.setattr(Factors, "substitute", lambda self, b: substitute(self, b) * (wrong if self.single else 1.0))
+    solver = BlockSolver(*pattern)
+    assert np.abs(solver.solve(data, right) - expected).max() < 1e-10
+    assert solver._factors.single == single and solver.counts["substitutions"] > 6
+
+
 def test_of_many_blocks_in_motion_a_step_beyond_single_precision_is_cut(alive, monkeypatch):
     blocks = block_scenes.slope(80)
 
