@@ -77,22 +77,23 @@ def key_blocks(
         # Normals fill the arc from `start` to `end`; directions that leave all faces that from end − 90° to start +
         # 90°.
         low, high = end - 0.5 * np.pi, end - 0.5 * np.pi + max(spare, 0.0)
-        out["kind"][b] = SAFE
+        kind, way, factor = SAFE, np.nan, np.nan
         if np.isnan(pull):
-            out["direction"][b] = _principal(0.5 * (low + high))
-            continue
-        if 0.0 < (pull - low) % (2 * np.pi) < high - low:
-            out["kind"][b], out["direction"][b] = FALLS, pull
-            continue
-        way, face = max(((low, end), (high, start)), key=lambda pair: np.cos(pull - pair[0]))
-        along, press = np.cos(pull - way), -np.cos(pull - face)
-        if along <= 1e-9:
-            continue
-        mine = state.contacts[row[(owner == b) & (np.abs(_principal(angle - face)) <= _ONE_FACE)]]
-        weight = materials[blocks.material[b]].density * area[b] * np.hypot(*gravity)
-        out["direction"][b] = _principal(way)
-        out["factor"][b] = _strength(mine, joints, press * weight) / (along * weight) if weight > 0 else np.nan
-        out["kind"][b] = SLIDES if out["factor"][b] < 1.0 else FRICTION
+            way = 0.5 * (low + high)
+        elif 0.0 < (pull - low) % (2 * np.pi) < high - low:
+            kind, way = FALLS, pull
+        else:
+            # Along a face on which the pull presses: between parallel ones both ways are the same.
+            slides = [(np.cos(pull - w), f, w) for w, f in ((low, end), (high, start)) if np.cos(pull - f) <= 1e-9]
+            along, face, slide = max(slides, default=(0.0, 0.0, 0.0))
+            if along > 1e-9:
+                mine = state.contacts[row[(owner == b) & (np.abs(_principal(angle - face)) <= _ONE_FACE)]]
+                weight = materials[blocks.material[b]].density * area[b] * np.hypot(*gravity)
+                holding, way = _strength(mine, joints, max(0.0, -np.cos(pull - face)) * weight), slide
+                factor = holding / (along * weight) if weight > 0 else np.nan
+                kind = SLIDES if factor < 1.0 else FRICTION
+        if kind > out["kind"][b]:
+            out["kind"][b], out["direction"][b], out["factor"][b] = kind, _principal(way), factor
     return out
 
 
@@ -102,22 +103,20 @@ def _principal(angle):
 
 
 def _spares(owner: np.ndarray, angle: np.ndarray) -> Iterator[tuple[int, float, float, float]]:
-    """Of every block whose normals leave half a turn free: block, the arc of its normals from start to end (rad), what
-    is free beyond the half turn."""
+    """Wherever a block's normals leave half a turn free, between parallel faces twice: block, the arc of its normals
+    from start to end (rad), what is free beyond the half turn."""
     if len(owner) == 0:
         return
     order = np.lexsort((angle, owner))
     owner, angle = owner[order], angle[order]
     first = np.flatnonzero(np.diff(owner, prepend=-1))
     last = np.append(first[1:], len(owner)) - 1
-    wide = np.empty(len(owner))
-    wide[:-1] = np.diff(angle)
-    wide[last] = angle[first] + 2 * np.pi - angle[last]
-    free = np.maximum.reduceat(wide, first) - np.pi
+    after = np.arange(1, len(owner) + 1)
+    after[last] = first
+    free = np.mod(angle[after] - angle, 2 * np.pi) - np.pi
+    free[last] = angle[first] + np.pi - angle[last]
     for k in np.flatnonzero(free >= -_ONE_FACE):
-        at = first[k] + int(wide[first[k] : last[k] + 1].argmax())
-        start = angle[first[k]] if at == last[k] else angle[at + 1]
-        yield int(owner[at]), float(start), float(angle[at]), float(free[k])
+        yield int(owner[k]), float(angle[after[k]]), float(angle[k]), float(free[k])
 
 
 def _rank(out: np.ndarray, blocks: Blocks, state: State, fixed: np.ndarray) -> None:

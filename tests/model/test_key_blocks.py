@@ -44,6 +44,18 @@ def test_a_block_on_an_incline_slides_or_is_held(friction_deg, kind):
     assert rows["factor"][1] == pytest.approx(np.tan(np.radians(friction_deg)), rel=1e-4)
 
 
+@pytest.mark.parametrize(("friction_deg", "kind"), [(30, SLIDES), (50, FRICTION)])
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_a_block_between_parallel_faces_slides_on_the_lower_one(friction_deg, kind, mirrored):
+    law = JointLaw("joint", np.radians(friction_deg))
+    below, between = polygon([0, 0], [4, 0], [4, 4]), polygon([1, 1], [2, 2], [1.5, 2.5], [0.5, 1.5])
+    above = polygon([-0.5, 0.5], [3.5, 4.5], [-0.5, 4.5])
+    rows = found([p * [mirrored, 1.0] for p in (below, between, above)], law, fixed=[True, False, True])
+    assert rows["kind"].tolist() == [FIXED, kind, FIXED]
+    assert np.degrees(rows["direction"][1]) == pytest.approx(-90 - mirrored * 45, abs=0.01)
+    assert rows["factor"][1] == pytest.approx(np.tan(np.radians(friction_deg)), rel=1e-4)
+
+
 def test_cohesion_counts_while_it_holds():
     law = JointLaw("joint", np.radians(30), cohesion=10e3)
     rows = found([polygon([0, 0], [4, 0], [4, 4]), polygon([1, 1], [2, 2], [2, 3], [1, 2])], law)
