@@ -46,8 +46,8 @@ ITERATED = 100, 1000
 #: Blocks up to which other direct solutions of them are measured.
 DIRECTLY = 20_000
 #: CPU seconds from which on no further step is begun, in a quick run and else; blocks beyond which walls only are
-#: stepped, and only when asked for: the first step of 100 000 bricks takes 26 iterations, 112 s of CPU and 3.3 GiB,
-#: that of a slope of so many, halved twice, 350 s by the clock and 5.6 GiB.
+#: stepped, and only when asked for: the first step of 100 000 bricks takes 26 iterations, 110 s of CPU and 3.0 GiB,
+#: that of a slope of so many, halved twice, 580 s of CPU and 3.4 GiB.
 LONGEST, WALLS = (0.5, 6.0), 10_000
 #: Of so many settled steps the first, which factors, is not counted. Up to so many blocks in a quick run: the static
 #: steps that bring blocks to rest take as long as those from rest.
