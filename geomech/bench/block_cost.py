@@ -43,15 +43,18 @@ SIZES = (100, 1000, 10_000)
 #: Blocks up to which the last equations are solved iteratively too (block Jacobi takes minutes beyond), in a quick run
 #: and else.
 ITERATED = 100, 1000
-#: Blocks up to which other direct solutions of them are measured.
+#: Blocks up to which other direct solutions of them are measured, and domains; of more, domains behind the last scene
+#: alone, for they take a gigabyte.
 DIRECTLY = 20_000
-#: CPU seconds from which on no further step is begun, in a quick run and else; blocks beyond which walls only are
-#: stepped, and only when asked for: the first step of 100 000 bricks takes 26 iterations, 110 s of CPU and 3.0 GiB,
-#: that of a slope of so many, halved twice, 580 s of CPU and 3.4 GiB.
-LONGEST, WALLS = (0.5, 6.0), 10_000
+#: Residuals to which domains are then iterated: what the central path asks for, and what a step does.
+TO_PATH_AND_STEP = 1e-5, 1e-10
+#: CPU seconds from which on no further step is begun, in a quick run and else. (The first step of 100 000 bricks takes 26
+#: iterations, 110 s of CPU and 3.0 GiB, that of a slope of so many, halved twice, 580 s of CPU and 3.4 GiB.)
+LONGEST = 0.5, 6.0
 #: Of so many settled steps the first, which factors, is not counted. Up to so many blocks in a quick run: the static
-#: steps that bring blocks to rest take as long as those from rest.
-SETTLED, SETTLES = 6, 150
+#: steps that bring blocks to rest take as long as those from rest; of slopes in any other, walls of more are at rest
+#: sooner.
+SETTLED, SETTLES, SLOPES_SETTLE = 6, 150, 20_000
 SCENES = {"wall": block_scenes.wall, "jointed slope": block_scenes.slope}
 
 #: Shi's DDA in C (an optimised public build, measured on a machine of the same kind): blocks of a wall like ours →
@@ -148,16 +151,16 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
     costs: list[Cost] = []
     iterated: list[dict] = []
     sizes = SIZES[:2] if quick else SIZES
-    for n in (*sizes, blocks) if blocks else sizes:
-        for name, make in SCENES.items():
-            if n > WALLS and name != "wall":
-                continue
-            rests = not quick or n <= SETTLES
-            cost, others = _measured(name, make(n), LONGEST[not quick], n <= ITERATED[not quick], rests)
-            costs.append(cost)
-            for other in others:
-                told = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
-                iterated.append({"scene": name, "blocks": cost.blocks, **told})
+    scenes = [(n, name) for n in ((*sizes, blocks) if blocks else sizes) for name in SCENES]
+    for n, name in scenes:
+        rests = n <= SETTLES if quick else (name == "wall" or n <= SLOPES_SETTLE)
+        domains = not quick and (n <= DIRECTLY or (n, name) == scenes[-1])
+        jacobi = n <= ITERATED[not quick]
+        cost, others = _measured(name, SCENES[name](n), LONGEST[not quick], rests, jacobi, domains)
+        costs.append(cost)
+        for other in others:
+            told = {key: getattr(other, key) for key in ("method", "iterations", "seconds", "residual")}
+            iterated.append({"scene": name, "blocks": cost.blocks, **told})
     exponents = {
         f"{name}, {label}": _exponent([c for c in costs if c.scene == name], what)
         for name in SCENES
@@ -228,7 +231,7 @@ def settled(blocks: Blocks) -> tuple[float, float]:
 
 
 def _measured(
-    name: str, blocks: Blocks, longest: float, also_iterated: bool, rests: bool
+    name: str, blocks: Blocks, longest: float, rests: bool, jacobi: bool, domains: bool
 ) -> tuple[Cost, list[Iterated]]:
     rows, watch, result, system = run(blocks, longest)
     # What a scene pays once, patterns and orderings, is in the first step.
@@ -262,17 +265,15 @@ def _measured(
     centroid, area = result.forces.centroid[free], result.forces.area[free]
     x = solver.solve(data, right)
     residual = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
-    direct = [Iterated("direct", 1, cost.solution, residual, x)]
+    others = [Iterated("direct", 1, cost.solution, residual, x)]
     if n_free <= DIRECTLY:
-        direct.append(factored_anew(solver, centroid, data, right))
-        direct += [pardiso(solver, data, right)] if pardiso_available() else []
-    if not also_iterated:
-        return cost, direct
-    return cost, [
-        *direct,
-        *(block_jacobi(solver, data, right, tolerance) for tolerance in TOLERANCES),
-        *(two_levels(solver, centroid, np.sqrt(area), data, right, tolerance) for tolerance in TOLERANCES),
-    ]
+        others.append(factored_anew(solver, centroid, data, right))
+        others += [pardiso(solver, data, right)] if pardiso_available() else []
+    if jacobi:
+        others += [block_jacobi(solver, data, right, tolerance) for tolerance in TOLERANCES]
+    for tolerance in TOLERANCES if jacobi else (TO_PATH_AND_STEP if domains else ()):
+        others.append(two_levels(solver, centroid, np.sqrt(area), data, right, tolerance))
+    return cost, others
 
 
 def _imbalance(blocks: Blocks, system, result) -> float:
