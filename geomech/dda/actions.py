@@ -16,8 +16,8 @@ from .force_rows import POINT_FORCE
 from .imposed_motion import ImposedMotion, Pairs
 from .loads import LoadMap
 from .middle import Middle
-from .open_close import Settled
 from .step import contact_resultants
+from .step_equations import Settled
 
 #: (pattern, matrix, right side, contacts, gaps) → settled contacts.
 Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]

@@ -26,10 +26,11 @@ from .held import balanced, hold, with_rigid_motion
 from .imbalance import imbalance
 from .loads import AppliedForces, Inertia, generalised
 from .middle import Middle
-from .open_close import Settled, Unsettled, hurries, settle
+from .open_close import hurries, settle
 from .rigid import mean_stress
 from .rounding import tell_felt, undecided_gaps
 from .step import CrackResponse, StepResult
+from .step_equations import Settled, Unsettled
 from .stopping import Stopped, dissipating, stop
 from .stretched import stretched
 from .time_integration import advance, assemble_blocks, turned

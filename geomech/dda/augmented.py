@@ -20,7 +20,7 @@ import numpy as np
 from ..model import OPEN, STICK
 from .contact_set import ContactSet
 from .contact_springs import Springs
-from .open_close import Settled, Unsettled
+from .step_equations import Settled, Unsettled
 
 #: Former differences that Anderson's mixing combines.
 _DEPTH = 12

@@ -20,7 +20,7 @@ from ..model import BOLT, GROUND, Bolt
 from .force_rows import POINT_FORCE
 from .imposed_motion import Pairs
 from .middle import Middle
-from .open_close import Unsettled
+from .step_equations import Unsettled
 
 log = logging.getLogger(__name__)
 

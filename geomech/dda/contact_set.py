@@ -15,7 +15,7 @@ from .contact_springs import Springs
 from .face_points import FacePoints
 
 if TYPE_CHECKING:
-    from .open_close import Settled
+    from .step_equations import Settled
 
 
 #: Corners that come in by the very end of an edge may end the step so many radii of corners beyond it.

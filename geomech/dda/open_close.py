@@ -16,24 +16,20 @@ lines within an iteration, and the iteration goes on until lines and laws agree 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
-from .block_solver import RESIDUAL
-from .bonded_faces import check_faces
 from .central_path import CentralPath
 from .contact_springs import Springs
-from .contact_states import check_states, contact_forces
 from .contacts import ContactSet
 from .convex_rounds import ConvexRounds
 from .curved_joints import CurvedJoints
-from .joint_states import clusters, settled_together, with_neighbours
 from .lagged_friction import LaggedFriction
 from .rounded_laws import RoundedLaws
+from .step_equations import Answer, Equations, Settled, States, Unsettled
 
 #: Which of the contacts that are wrong are switched: all, those of each block that are half as wrong as its worst, its
 #: worst, the first.
@@ -50,8 +46,8 @@ _TRIES, _TRIES_OF_FEW, _FEW_OF_ALL, _FEW_OF_MANY = 1, 4, 0.02, 0.05
 #: iterations.
 _LITTLE, _MORE = 12, 5
 #: Before that, where no more than so many are wrong, the states of those that were in the last iterations (these and so
-#: many more) are sought together, so many times; no more than so many with each other.
-_SOUGHT, _LATELY, _TOGETHER, _JOINED = 40, 3, 12, 80
+#: many more) are sought together, so many times.
+_SOUGHT, _LATELY, _TOGETHER = 40, 3, 12
 #: It takes two solutions for each contact and one for each set of them: so many in all, as many as twenty iterations of
 #: the path. (A wall under sudden weight has a dozen of sets at once, and takes 27 iterations without.)
 _SOLUTIONS = 60
@@ -84,8 +80,6 @@ MANY = 3_000
 #: nearly always wrong.
 _PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
 _CONVEX_CHANGE, _NEARER = 5e-3, 0.5
-#: What solutions with residuals below this part of the forces tell wrong states is not asked for more digits.
-_ROUGHLY = 1e-8
 #: Iterations to go from such states to the end.
 _FINISH = 8
 
@@ -94,42 +88,6 @@ def hurries(patient: bool, statics: bool, n: int) -> bool:
     """Whether a step of ``n`` free blocks is cut at the first sign that it does not settle, see `MANY`; arguments as for
     `settle`."""
     return not (patient or statics) and n >= MANY
-
-
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`.
-
-    ``gap`` is counted from where the faces meet, ``slip`` is what the shear spring did not take up of the motion along
-    the edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration; ``stretch`` what
-    multipliers have left of the motion of sticking contacts.
-    """
-
-    unknowns: np.ndarray
-    state: np.ndarray
-    direction: np.ndarray
-    bonded: np.ndarray
-    normal_force: np.ndarray
-    shear_force: np.ndarray
-    gap: np.ndarray
-    slip: np.ndarray
-    lifted: np.ndarray
-    springs: Springs
-    iterations: int
-    stretch: np.ndarray | float = 0.0
-
-
-class Unsettled(Exception):
-    """The open–close iterations found no consistent states; ``contact`` is the row that still disagrees (or −1)."""
-
-    def __init__(self, reason: str, contact: int = -1) -> None:
-        super().__init__(reason)
-        self.contact = contact
-
-
-def _plastic(forces: np.ndarray, state: np.ndarray, shear_force: np.ndarray, springs: Springs) -> np.ndarray:
-    """(n,) m of slip in the step: the motion of sliding contacts without what their shear springs took up."""
-    return np.where(state == SLIP, forces[:, 3] - (shear_force - forces[:, 1]) / springs.shear, 0.0)
 
 
 def _worst_of_their_blocks(
@@ -144,189 +102,9 @@ def _worst_of_their_blocks(
     return violation >= share * np.maximum(worst[block], worst[other])
 
 
-@dataclass(frozen=True, eq=False)
-class _States:
-    """What each contact (n,) is tried as."""
-
-    state: np.ndarray
-    direction: np.ndarray
-    bonded: np.ndarray
-
-    @property
-    def key(self) -> bytes:
-        return self.state.tobytes() + self.direction.tobytes() + self.bonded.tobytes()
-
-    def switched(self, wrong: np.ndarray, to: _States) -> _States:
-        """These states, and where ``wrong`` those of ``to``."""
-        pairs = ((self.state, to.state), (self.direction, to.direction), (self.bonded, to.bonded))
-        return _States(*(np.where(wrong, theirs, mine) for mine, theirs in pairs))
-
-    def sliding(self, which: np.ndarray, shear: np.ndarray) -> _States:
-        """These states, with the contacts ``which`` that have no bond sliding under ``shear`` (n,) N."""
-        which = which & (self.bonded == 0) & (shear != 0)
-        return _States(np.where(which, SLIP, self.state), np.where(which, np.sign(shear), self.direction), self.bonded)
-
-
-@dataclass(frozen=True, eq=False)
-class _Answer:
-    """The motion (6 n,) and forces (n, 4) that states make, the states they call for, by how much each is wrong (N),
-    whether the lines agree with curved laws, and the lines."""
-
-    unknowns: np.ndarray
-    forces: np.ndarray
-    called: _States
-    violation: np.ndarray
-    missed: np.ndarray | None
-    slip: np.ndarray
-    springs: Springs
-    gap: np.ndarray
-
-
-@dataclass(eq=False)
-class _Equations:
-    """The step's equations but for the states; arguments as for `settle`."""
-
-    pattern: assembly.Pattern
-    matrix: np.ndarray
-    right: np.ndarray
-    found: ContactSet
-    vectors: np.ndarray
-    springs: Springs
-    gap: np.ndarray
-    slack: np.ndarray
-    curved: CurvedJoints | None
-    statics: bool
-
-    def __post_init__(self) -> None:
-        self._data = np.empty(self.pattern.size)
-        self._side = np.empty(6 * self.pattern.n)
-        self._held: tuple[np.ndarray, ...] | None = None
-        self._near: np.ndarray | None = None
-        self._force = float(np.abs(self.right).max(initial=0.0))
-        self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
-
-    def room(self) -> np.ndarray:
-        """The flat matrix, for others to fill until the next answer: one of 100 000 blocks takes 200 MB."""
-        self._held = None
-        return self._data
-
-    def together(self, which: np.ndarray, states: _States, answer: _Answer, budget: int) -> tuple[_States | None, int]:
-        """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in
-        common at a time; where none are found, as the ``answer`` calls for. And the solutions spent; None where they
-        would be more than the ``budget``."""
-        found, spent = self.found, 0
-        fixed = found, self.vectors, answer.springs, answer.gap
-        parts = clusters(which, found, self.pattern.order)
-        if 2 * which.sum() + len(parts) > budget:
-            return None, 0
-        for some in parts:
-            proposal = None
-            wider = with_neighbours(some, states.state, states.bonded, found, self.pattern.order)
-            for group in (some, wider):
-                cost = 2 * int(group.sum()) + 1
-                if proposal is None and group.sum() <= _JOINED and spent + cost <= budget:
-                    spent += cost
-                    try:
-                        proposal = settled_together(
-                            group, states.state, states.direction, self.pattern, self.matrix, self.right, *fixed,
-                            self.room,
-                        )
-                    except np.linalg.LinAlgError:
-                        # In statics nothing else may hold their blocks.
-                        break
-            called = some & (answer.violation > 0)
-            states = states.switched(called, answer.called) if proposal is None else _States(*proposal, states.bonded)
-        return states, spent
-
-    def answer(self, states: _States, normal_force: np.ndarray, slip: np.ndarray) -> _Answer:
-        """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises
-        `Unsettled`."""
-        pattern, found, springs, gap = self.pattern, self.found, self.springs, self.gap
-        state, direction, bonded = states.state, states.direction, states.bonded
-        if self.curved is not None:
-            plastic = np.where(state == SLIP, slip, 0.0)
-            springs, gap = self.curved.lines(
-                self.springs, self.gap, found, state, direction, bonded, normal_force, plastic
-            )
-        symmetric, held = assembly.assemble_contacts(
-            pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
-            found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
-            springs.friction, springs.sliding, springs.lift, found.shear, self._sides, self._held,
-        )  # fmt: skip
-        # Dense matrices are overwritten by their factors, links added to all.
-        self._held = held if pattern.solver is not None and pattern.links is None else None
-        if self._held is not None:
-            answer = self._answered(states, springs, gap, slip, symmetric, _ROUGHLY)
-            forces = max(self._force, float(np.abs(self._side).max(initial=0.0)))
-            if (answer.violation > 0).any() or pattern.solver.left <= RESIDUAL * forces:
-                return answer
-        return self._answered(states, springs, gap, slip, symmetric, RESIDUAL)
-
-    def _answered(
-        self, states: _States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
-    ) -> _Answer:
-        """The answer of the system as it is assembled, of lines with these ``springs`` and ``gap``, solved to a residual
-        ``within`` that part of the forces."""
-        pattern, found = self.pattern, self.found
-        state, direction, bonded = states.state, states.direction, states.bonded
-        try:
-            unknowns = assembly.solve(
-                pattern, self._data, self._side, symmetric, self._force, near=self._near, within=within
-            )
-        except np.linalg.LinAlgError as error:
-            raise Unsettled(str(error)) from error
-        if not np.isfinite(unknowns).all():
-            raise Unsettled("the step's matrix is singular")
-        self._near = unknowns
-        forces = contact_forces(
-            unknowns, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
-            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
-        )  # fmt: skip
-        known, missed = springs, None
-        if self.curved is not None:
-            slip = _plastic(forces, state, found.shear, springs)
-            known, known_gap = self.curved.lines(
-                self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
-            )
-            missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
-        *called, violation = check_states(
-            forces, found.partner, found.reach, found.behind, state, direction, bonded, known.normal, known.shear,
-            known.friction, known.sliding,
-            known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
-        )  # fmt: skip
-        if (faces := found.faces) is not None:
-            check_faces(
-                faces.start, faces.rows, faces.arm, faces.length, forces, state, bonded, known.normal, known.shear,
-                known.friction,
-                known.peak, known.hold, known.cohesion, known.tension, known.keeps, self.slack, *called, violation,
-            )  # fmt: skip
-        return _Answer(unknowns, forces, _States(*called), violation, missed, slip, springs, gap)
-
-
-def _settled(equations: _Equations, states: _States, answer: _Answer, iterations: int) -> Settled:
-    forces, springs = answer.forces, answer.springs
-    lifted = np.zeros(len(forces))
-    slip = _plastic(forces, states.state, equations.found.shear, springs)
-    if equations.curved is not None:
-        lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, forces[:, 3])
-    return Settled(
-        unknowns=answer.unknowns.reshape(-1, 6),
-        state=states.state,
-        direction=states.direction,
-        bonded=states.bonded,
-        normal_force=forces[:, 0],
-        shear_force=forces[:, 1],
-        gap=forces[:, 2] + springs.lift * forces[:, 3] - lifted - (answer.gap - equations.found.gap),
-        slip=slip,
-        lifted=lifted,
-        springs=springs,
-        iterations=iterations,
-    )
-
-
 def _proposed(
     path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int, patient: bool, hurried: bool = False
-) -> tuple[_States | None, int]:
+) -> tuple[States | None, int]:
     """States that the ``path`` proposes once nearly all contacts are decided, none of those ``offered`` already, or
     None if it ends or takes more than ``budget`` iterations; and the iterations spent. Unless ``patient`` a path that
     is blocked has ended, and one that gets ahead, or is near its end, may take more. If ``hurried``, one that has been
@@ -347,7 +125,7 @@ def _proposed(
             few = min(few, max(_LEFT, _LEFT_PART * len(bonded)))
         # Where no load comes to in so short a time, contacts neither bear nor part: round-off decides.
         if (undecided <= max(2, few) or (hurried and path.arrived)) and path.missed < _BALANCED:
-            states = _States(*path.states(), bonded)
+            states = States(*path.states(), bonded)
             if states.key not in offered:
                 offered.add(states.key)
                 return states, spent
@@ -359,7 +137,7 @@ def _proposed(
 def _by_rounds(
     rounds: LaggedFriction | ConvexRounds, least: float, closer: float, bonded: np.ndarray, offered: set[bytes],
     budget: int,
-) -> Iterator[tuple[_States | None, int]]:  # fmt: skip
+) -> Iterator[tuple[States | None, int]]:  # fmt: skip
     """States that ``rounds`` propose once their normal forces change by less than ``least``, then whenever they do
     ``closer`` times as little, and the solutions spent since the last; at most ``budget`` in all, None at the end.
     Raises `Unsettled`."""
@@ -367,7 +145,7 @@ def _by_rounds(
     try:
         for change in rounds.rounds():
             if change < bound:
-                states = _States(*rounds.decided(), bonded)
+                states = States(*rounds.decided(), bonded)
                 if states.key not in offered:
                     offered.add(states.key)
                     bound = closer * change
@@ -380,12 +158,12 @@ def _by_rounds(
     yield None, rounds.solutions - told
 
 
-def _by_stages(laws: RoundedLaws, bonded: np.ndarray, offered: set[bytes]) -> Iterator[tuple[_States | None, int]]:
+def _by_stages(laws: RoundedLaws, bonded: np.ndarray, offered: set[bytes]) -> Iterator[tuple[States | None, int]]:
     """As `_by_rounds`, by the stages of laws rounded off."""
     told = 0
     try:
         for state, direction in laws.stages():
-            states = _States(state, direction, bonded)
+            states = States(state, direction, bonded)
             if states.key not in offered:
                 offered.add(states.key)
                 yield states, laws.solutions - told
@@ -396,8 +174,8 @@ def _by_stages(laws: RoundedLaws, bonded: np.ndarray, offered: set[bytes]) -> It
 
 
 def _slower(
-    equations: _Equations, answer: _Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
-) -> Iterator[tuple[_States, int]]:
+    equations: Equations, answer: Answer, path: CentralPath, bonded: np.ndarray, offered: set[bytes], budget: int
+) -> Iterator[tuple[States, int]]:
     """States that laws rounded off propose, from where the ``path`` was blocked, then rounds of lagged friction, and
     the solutions spent since the last (in statics, where the first hardly ever do, those of convex problems before;
     rounds know nothing of lift). Where the matrix is dense a hundred solutions cost little, and blocks that topple one
@@ -450,13 +228,13 @@ def settle(
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
-    equations = _Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics)
-    states = _States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
+    equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics)
+    states = States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
     normal_force, slip = found.normal, np.zeros(len(found))
     seen: set[bytes] = set()
     offered: set[bytes] = set()
     path: CentralPath | None = None
-    slower: Iterator[tuple[_States, int]] | None = None
+    slower: Iterator[tuple[States, int]] | None = None
     caution, fewest, tries = _ALL, np.inf, 0
     few, small = len(found) <= _FEW, pattern.solver is None
     cheap = small or pattern.solver.in_parts
@@ -474,7 +252,7 @@ def settle(
         sheared = np.where(states.state == STICK, answer.forces[:, 1], sheared)
         wrong = answer.violation > 0
         if not wrong.any() and (answer.missed is None or not answer.missed.any()):
-            return _settled(equations, states, answer, iteration)
+            return equations.settled(states, answer, iteration)
         if iteration >= max_iterations:
             break
         if not wrong.any():
@@ -553,7 +331,7 @@ def settle(
             # A body held by sliding contacts alone has nothing but its inertia against the least imbalance: begin again
             # from sticking, and let only the contact that is worst off slide.
             rough = (springs.friction > 0) & (states.state == SLIP)
-            states = _States(np.where(rough, STICK, states.state), states.direction, states.bonded)
+            states = States(np.where(rough, STICK, states.state), states.direction, states.bonded)
             continue
         if caution == _FIRST and returned:
             break

@@ -19,7 +19,7 @@ import numpy as np
 from ..model import SLIP, STICK
 from . import assembly
 from .contact_set import ContactSet
-from .open_close import Settled
+from .step_equations import Settled
 
 #: Impulses found to be beyond what friction can have been are brought back to it so often.
 _ROUNDS = 4

@@ -15,7 +15,7 @@ from ..model import OPEN
 from .contact_set import ContactSet
 from .contact_springs import Springs
 from .curved_joints import CurvedJoints
-from .open_close import Settled, Unsettled
+from .step_equations import Settled, Unsettled
 
 #: Shear forces are found to this part of a contact's own force, as those of laws that bend are.
 _AGREED = 1e-8

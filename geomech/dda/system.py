@@ -16,11 +16,12 @@ from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
 from .moments import block_moments, fastest_vertex
-from .open_close import MANY, Unsettled
+from .open_close import MANY
 from .overlap import refuse_overlap
 from .rigid import with_rigid
 from .rounding import rounding_of
 from .step import CrackResponse, NotConverged, StepResult
+from .step_equations import Unsettled
 from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, at_their_springs, told_rows

@@ -10,7 +10,7 @@ import pytest
 
 from geomech import dda
 from geomech.bench import block_scenes
-from geomech.dda import block_solver, open_close
+from geomech.dda import block_solver, open_close, step_equations
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
@@ -52,7 +52,7 @@ def test_a_wall_under_sudden_weight_settles_at_the_step_asked_for(friction_deg):
 def test_the_central_path_ends_where_contacts_agree(monkeypatch):
     # What it proposes for the first step of a wall is right but for a few contacts in a thousand.
     wrong = []
-    proposed, answer = open_close._proposed, open_close._Equations.answer
+    proposed, answer = open_close._proposed, step_equations.Equations.answer
     state = {"follows": False}
 
     def watch(*arguments):
@@ -67,7 +67,7 @@ def test_the_central_path_ends_where_contacts_agree(monkeypatch):
         return found
 
     monkeypatch.setattr(open_close, "_proposed", watch)
-    monkeypatch.setattr(open_close._Equations, "answer", count)
+    monkeypatch.setattr(step_equations.Equations, "answer", count)
     system = brick_wall(20, 9, 35.0, 0.01)
     system.step(State.at_rest(system.blocks), WEIGHT)
     assert wrong and wrong[0] < 0.02
@@ -152,8 +152,8 @@ def test_states_that_are_wrong_ask_for_no_exact_solution(monkeypatch):
     velocity = start.velocity.copy()
     velocity[-1, 0] = 0.4
     told = []
-    for roughly in (open_close._ROUGHLY, block_solver.RESIDUAL):
-        monkeypatch.setattr(open_close, "_ROUGHLY", roughly)
+    for roughly in (step_equations._ROUGHLY, block_solver.RESIDUAL):
+        monkeypatch.setattr(step_equations, "_ROUGHLY", roughly)
         settings = block_scenes.settings(0.01)
         system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
         state, iterations = replace(start, velocity=velocity), []
