@@ -43,8 +43,8 @@ SIZES = (100, 1000, 10_000)
 #: Blocks up to which the last equations are solved iteratively too (block Jacobi takes minutes beyond), in a quick run
 #: and else.
 ITERATED = 100, 1000
-#: Blocks up to which other direct solutions of them are measured, and domains; of more, domains behind the last scene
-#: alone, for they take a gigabyte.
+#: Blocks up to which other direct solutions of them are measured, and domains; of more, behind the last scene alone, for
+#: each takes a gigabyte.
 DIRECTLY = 20_000
 #: Residuals to which domains are then iterated: what the central path asks for, and what a step does.
 TO_PATH_AND_STEP = 1e-5, 1e-10
@@ -197,7 +197,7 @@ def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, obje
     with _watched() as watch:
         began = time.process_time()
         while not rows or (time.process_time() - began < longest and len(rows) < 40):
-            before = watch.search, watch.solution
+            before, factored = (watch.search, watch.solution), system.work.factorisations
             spent_on, clock = stopwatch(), time.perf_counter()
             result = system.step(state, WEIGHT)
             seconds, passed = spent_on(), time.perf_counter() - clock
@@ -205,6 +205,9 @@ def run(blocks: Blocks, longest: float) -> tuple[list[dict], Watch, object, obje
             spent, solution = watch.search - before[0], watch.solution - before[1]
             # Correctors solve again with the same factors: iterations are fewer than solutions.
             iterations = result.statistics["open_close_iterations"]
+            if result.statistics["step_cuts"]:
+                # Attempts that were cut have taken theirs.
+                iterations = max(iterations, system.work.factorisations - factored)
             rows.append(
                 {
                     "seconds": seconds,
@@ -268,7 +271,7 @@ def _measured(name: str, blocks: Blocks, longest: float, jacobi: bool, domains: 
     x = solver.solve(data, right)
     residual = float(np.linalg.norm(right - solver.multiply(data, x)) / np.linalg.norm(right))
     others = [Iterated("direct", 1, cost.solution, residual, x)]
-    if n_free <= DIRECTLY:
+    if n_free <= DIRECTLY or domains:
         others.append(factored_anew(solver, centroid, data, right))
         others += [pardiso(solver, data, right)] if pardiso_available() else []
     if jacobi:

@@ -33,7 +33,7 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
 
     bench.add_argument(
-        "--blocks", type=int, metavar="N", help="of dda: a wall and a slope of so many too (100000: half an hour, 5 GB)"
+        "--blocks", type=int, metavar="N", help="of dda: a wall and a slope of so many too (100000: 12 minutes, 7 GB)"
     )
     bench.add_argument(
         "--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: an hour)"
