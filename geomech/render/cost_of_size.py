@@ -3,11 +3,14 @@ is left of the equations."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 _STYLES = (("#1f6f8b", "o"), ("#588157", "s"), ("#c8553d", "^"), ("#8e6c8a", "D"), ("#c9a227", "v"))
+#: Panels side by side at most.
+_ABREAST = 3
 
 
 class Measured(Protocol):
@@ -49,24 +52,34 @@ def draw_solvers(solutions: Sequence[Mapping[str, Any]], path: Path) -> Path:
     from matplotlib.figure import Figure
 
     scenes = list(dict.fromkeys((row["scene"], row["blocks"]) for row in solutions))
-    figure = Figure(figsize=(0.5 + 3.6 * len(scenes), 4.4), dpi=130, layout="constrained")
-    panels = figure.subplots(1, len(scenes), sharey=True, squeeze=False)[0]
+    styles = dict(zip(dict.fromkeys(row["method"] for row in solutions), itertools.cycle(_STYLES)))
+    rows = -(-len(scenes) // _ABREAST)
+    across = -(-len(scenes) // rows)
+    figure = Figure(figsize=(0.5 + 3.6 * across, 0.6 + 3.6 * rows), dpi=130, layout="constrained")
+    grid = figure.subplots(rows, across, sharex=True, sharey=True, squeeze=False)
+    panels = grid.ravel()
     for panel, (scene, blocks) in zip(panels, scenes):
         here = [row for row in solutions if (row["scene"], row["blocks"]) == (scene, blocks)]
-        for method, (colour, marker) in zip(dict.fromkeys(row["method"] for row in here), _STYLES):
-            mine = [row for row in here if row["method"] == method]
+        for method, (colour, marker) in styles.items():
+            mine = sorted((row for row in here if row["method"] == method), key=lambda row: -row["residual"])
             panel.loglog(
                 [row["residual"] for row in mine], [1e3 * row["seconds"] for row in mine], color=colour, marker=marker,
                 lw=1.5, label=method,
             )  # fmt: skip
         panel.set_title(f"{scene}, {blocks} blocks", fontsize=10, loc="left")
-        panel.invert_xaxis()
         panel.grid(which="major", color="#e4e4e4", lw=0.7)
         panel.set_axisbelow(True)
         for side in ("top", "right"):
             panel.spines[side].set_visible(False)
-    panels[0].set_ylabel("solution, set-up included, ms")
-    panels[-1].legend(frameon=False, fontsize=9)
+    # One axis for all.
+    panels[0].invert_xaxis()
+    for panel in panels[len(scenes) :]:
+        panel.set_axis_off()
+    for panel in grid[:, 0]:
+        panel.set_ylabel("solution, set-up included, ms")
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=9
+    )
     figure.supxlabel("residual over the right side, better to the right", fontsize=10)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
