@@ -38,6 +38,11 @@ class Iterated:
     solution: np.ndarray
 
 
+def _rows(solver: BlockSolver) -> np.ndarray:
+    """(n_entries,) the row of each of the matrix's blocks."""
+    return np.repeat(np.arange(solver.n), np.diff(solver.pointer))
+
+
 def pardiso_available() -> bool:
     """Whether pypardiso, and with it MKL, is installed: ``pip install 'geomech[pardiso]'``."""
     return importlib.util.find_spec("pypardiso") is not None
@@ -46,8 +51,7 @@ def pardiso_available() -> bool:
 def factored_anew(solver: BlockSolver, points: np.ndarray, data: np.ndarray, right: np.ndarray) -> Iterated:
     """As `geomech.dda` does where nothing is left of another set of contacts; ``points`` (n, 2) m are the blocks'
     centroids."""
-    rows = np.repeat(np.arange(solver.n), np.diff(solver.pointer))
-    another = BlockSolver(points, rows, solver.columns)
+    another = BlockSolver(points, _rows(solver), solver.columns)
     another.factor(data)  # finds its memory
     spent_on = stopwatch()
     another.factor(data)
@@ -82,8 +86,7 @@ def block_jacobi(
     from scipy.sparse.linalg import LinearOperator, bicgstab
 
     spent_on = stopwatch()
-    rows = np.repeat(np.arange(solver.n), np.diff(solver.pointer))
-    inverse = np.linalg.inv(data.reshape(-1, 6, 6)[rows == solver.columns])
+    inverse = np.linalg.inv(data.reshape(-1, 6, 6)[_rows(solver) == solver.columns])
     size = len(right)
     matrix = LinearOperator((size, size), matvec=lambda x: solver.multiply(data, x), dtype=float)
     behind = LinearOperator(
@@ -109,8 +112,7 @@ def two_levels(
     """GMRES behind domains and coarse fields; ``points`` (n, 2) and ``sizes`` (n,) m are the blocks' centroids and
     √area."""
     spent_on = stopwatch()
-    n, columns = solver.n, solver.columns
-    rows = np.repeat(np.arange(n), np.diff(solver.pointer))
+    n, rows, columns = solver.n, _rows(solver), solver.columns
     blocks = data.reshape(-1, 6, 6)
     domains = []
     for mine in _divided(points, DOMAIN):

@@ -100,10 +100,7 @@ class LoadMap:
         rows for them that know no more than block and edge. Raises ValueError when there are none."""
         name, key = load.edge_name, (load.edge_name, load.profile)
         if key not in self._edges:
-            edges = self.blocks.edges_named(name)
-            if len(edges) == 0:
-                known = ", ".join(repr(n) for n in self.blocks.edge_names if n) or "none"
-                raise ValueError(f"a traction acts on edges named {name!r}, but no edge has that name (names: {known})")
+            edges = self.blocks.edges_that_exist(name, f"a traction acts on edges named {name!r}")
             ends = np.stack([self.blocks.vertices[edges], self.blocks.vertices[self.blocks.next_vertex[edges]]], axis=1)
             along = ends[:, 1] - ends[:, 0]
             factor = np.ones((len(edges), 2)) if load.profile is None else load.profile.at(ends)

@@ -98,10 +98,7 @@ class StrayLoads:
 
     def _refuse_idle(self, boundary: ViscousBoundary) -> None:
         what = f"a viscous boundary is on edges named {boundary.edge_name!r}"
-        edges = self._blocks.edges_named(boundary.edge_name)
-        if not len(edges):
-            known = ", ".join(repr(n) for n in self._blocks.edge_names if n) or "none"
-            raise ValueError(f"{what}, but no edge has that name (names: {known})")
+        edges = self._blocks.edges_that_exist(boundary.edge_name, what)
         if self._blocks.fixed[self._blocks.vertex_block[edges]].all():
             raise ValueError(
                 f"{what}, but the blocks that have them are fixed, where it brakes nothing"

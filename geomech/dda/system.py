@@ -181,8 +181,8 @@ class BlockSystem:
 
         A step whose contact states do not settle, or that moves a vertex too far, is halved or shortened and begun
         again from ``state``, which is never changed; ``result.dt`` says what was done, and the log why contacts wanted a
-        shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap before they have moved, or when nothing
-        holds them up in statics.
+        shorter one. Raises `NotConverged` after ``settings.max_step_cuts`` cuts, and ValueError when blocks overlap
+        before they have moved, or when nothing holds them up in statics.
         """
         dt = self.settings.time_step if dt is None else float(dt)
         hasty |= not self.scheme.static and len(self.moving) >= MANY

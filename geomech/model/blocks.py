@@ -159,6 +159,14 @@ class Blocks:
         """Indices of the edges called ``name``; empty when there are none."""
         return self._edges_by_name.get(name, np.empty(0, int))
 
+    def edges_that_exist(self, name: str, what: str) -> np.ndarray:
+        """As `edges_named`; raises ValueError for ``what`` is said to be on them where there are none."""
+        edges = self.edges_named(name)
+        if len(edges) == 0:
+            known = ", ".join(repr(n) for n in self.edge_names if n) or "none"
+            raise ValueError(f"{what}, but no edge has that name (names: {known})")
+        return edges
+
     @cached_property
     def _edges_by_name(self) -> dict[str, np.ndarray]:
         return {name: np.flatnonzero(self.edge_name == k) for k, name in enumerate(self.edge_names)}
