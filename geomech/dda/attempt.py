@@ -44,9 +44,9 @@ if TYPE_CHECKING:
 _LABOUR, _EASED = 6, 3
 #: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
 _PLACED = 20
-#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the radius of
-#: corners; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
-#: (slabs that lean, of a tenth of the radius, as much in one step as all loads do).
+#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the contacts'
+#: ``precision``; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
+#: (slabs that lean, of a tenth of that, as much in one step as all loads do).
 _BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
 
 
@@ -221,7 +221,7 @@ class Attempt:
         system, found, settled = self.system, self.found, self.settled
         if not len(found) or not self.n_free:
             return False
-        known = (_KNOWN_IN_STATICS if system.scheme.static else _KNOWN) * found.rounding
+        known = (_KNOWN_IN_STATICS if system.scheme.static else _KNOWN) * found.precision
         # What turns by r while it moves by d leaves its chord by r d at most.
         increment = self._increment(self.unknowns)
         if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
@@ -230,7 +230,7 @@ class Attempt:
         straight = settled.gap + settled.lifted + found.lift - found.arc
         if found.points is not None:
             straight = found.points.gap_at_corners(straight)
-        gap = system.finder.gaps(vertices, found.vertex, found.edge)
+        gap = system.finder.gaps(vertices, self.vertices, found if found.lumped is None else found.lumped)
         arc, before = gap - straight, found.arc if found.lumped is None else found.lumped.arc
         some = (settled.state != OPEN) | (gap < 0.0)
         if not (np.abs(arc - before) > known)[some].any():
@@ -261,7 +261,7 @@ class Attempt:
         across, slid = (sliding(vectors, scaled, all_blocks, *blocks, way) for way in (0, 1))
         end = Middle.of(increment, 1.0, self.vertices, system.owner, self.moments)
         went = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]
-        arc = system.finder.gaps(vertices, found.vertex, found.edge) - found.geometry[:, 3] - across
+        arc = system.finder.gaps(vertices, self.vertices, found) - found.geometry[:, 3] - across
         self.found = self.found.along(arc, went * np.hypot(*along.T) - slid)
 
     def _along(self, found: ContactSet) -> np.ndarray:
@@ -528,8 +528,5 @@ class Attempt:
 
 
 def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
-    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them.
-
-    An open one whose vertex is behind its edge's line has a partner line that is not crossed: nothing penetrates there.
-    """
+    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them."""
     return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0

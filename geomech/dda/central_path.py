@@ -95,23 +95,12 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
     return lambda right, within=WITHIN: dgetrs(factors, pivots, right)[0]
 
 
-def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """(n,) True for contacts that alone stand for their pair of corners: the line that is crossed last."""
-    acting = np.ones(len(gap), bool)
-    index = np.arange(len(gap))
-    for column in partner.T:
-        theirs = gap[column]
-        acting &= (column < 0) | (theirs < gap) | ((theirs == gap) & (column > index))
-    return acting
-
-
 class CentralPath:
     """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which
     hold, ``forces`` (n,) N normal forces of the size to be expected, ``room`` gives each iteration the flat
     matrix to fill; without, it takes its own.
 
-    Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins. ``missed``:
-    what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
+    ``missed``: what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
     stiffness.
     """
 
@@ -130,9 +119,8 @@ class CentralPath:
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
-        act = acting(found.partner, gap)
         slipped = bonded == SLIPPED
-        some, held = (np.flatnonzero(act & which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
+        some, held = (np.flatnonzero(which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
         order = pattern.order
         if pattern.n >= THREADED:
             # Beyond what caches hold, in the order of their blocks: what contacts need of one another then lies near.

@@ -10,7 +10,7 @@ import numpy as np
 from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from . import contact_rows
 from .bonded_faces import BondedFaces
-from .contact_search import describe_contacts, find_contacts
+from .contact_search import Corners, convex_corners, describe_contacts, find_contacts
 from .contact_set import ContactSet
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
@@ -18,6 +18,7 @@ from .face_points import FacePoints, give_by_bending
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
+from .rounded_corners import LARGEST_SHARE
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -26,9 +27,8 @@ _TOUCH = 1e-7
 _ALIGNED = 0.99
 _UNKNOWN = -2
 _NEVER = -1
-#: Radius of corners, in sizes (√area) of the smaller block. Two corners that press on each other would slip off by less
-#: than they press each other in, and no state would fit; corners of rock are rounder than this.
-_ROUNDING = 1e-5
+#: The gaps of blocks that turn are followed to this part of the smaller block's size (√area).
+_PRECISION = 1e-5
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
 
@@ -71,6 +71,7 @@ class ContactFinder:
         self._rigid = rigid
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
+        self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.take_out(None)
         self._size = float(np.ptp(blocks.vertices, axis=0).max())
@@ -89,45 +90,53 @@ class ContactFinder:
         glue_holds: bool = True,
         lumped: bool = False,
         broken: np.ndarray | None = None,
+        motion: np.ndarray | None = None,
     ) -> ContactSet:
         """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it;
         without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
-        (vertex·n_vertices + edge), too."""
+        (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
+        it says on which sides corners meet."""
         old = np.ascontiguousarray(state.contacts)
         old_vertex, old_edge, keys, old_normal, lift, gap = contact_rows.names(old, len(vertices))
         # Faces that slid apart press at a distance, those that do not fit pass each other by as much; what soft springs
         # have let in deeper than that touches still.
         window = max(window + lift, -_DEEPER * gap)
         rank = np.argsort(keys, kind="stable")
-        table = find_contacts(
-            vertices, self._next, self._previous, self._start, self._near.of(vertices, window), window, keys[rank]
-        )
+        corners = Corners(
+            convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
+            np.zeros_like(vertices) if motion is None else motion,
+        )  # fmt: skip
+        table, met = find_contacts(
+            vertices, self._next, self._previous, self._start, self._near.of(vertices, window), window, keys[rank],
+            corners,
+        )  # fmt: skip
         geometry, mate, parent = describe_contacts(
-            table, vertices, self._next, self._previous, window, old_vertex, old_edge, old_normal, rank
+            table, met, vertices, self._next, self._previous, window, old_vertex, old_edge, old_normal, rank
         )
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
-        partner = table[:, 2:]
         if (law == _NEVER).any():
             keep = law != _NEVER
             table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
-            partner = _among(keep, partner)
         nodes, own = None, parent
         if self._by_length.any():
             nodes = nodes_in_faces(
-                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law], partner
+                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law]
             )
         if nodes is not None:
             geometry[:, 4] = nodes.left(geometry[:, 4])
             parent = nodes.heirs(own, np.ascontiguousarray(old["state"]))
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
-        remembered = self._remembered(old, parent, state.time, geometry, partner, springs, self._stiff[law])
+        remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
+        # A step that rounding smooths is none: what comes upon it begins there without force.
+        smoothed = (table[:, 3] == 1) & (remembered["state"] == OPEN) & (geometry[:, 3] < remembered["lift"])
+        remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
-        vertex, edge = table[:, 0].copy(), table[:, 1].copy()
+        vertex, edge, corner = (column.copy() for column in table[:, :3].T)
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
             for name in ("normal", "shear") if len(old) else ():
@@ -143,20 +152,21 @@ class ContactFinder:
                 keep &= ~glued
         if not keep.all():
             vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
-            partner, geometry = _among(keep, partner), geometry[keep]
+            corner, geometry = corner[keep], geometry[keep]
             springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
             remembered = {name: value[keep] for name, value in remembered.items()}
         bonded, faces = remembered["bonded"], None
         if bonded.any():
-            faces = BondedFaces.of(block, other, partner, geometry, bonded)
+            faces = BondedFaces.of(block, other, geometry, bonded)
         found = ContactSet(
             vertex=vertex,
             edge=edge,
             block=block,
             other=other,
             law=law,
-            partner=np.ascontiguousarray(partner),
-            rounding=_ROUNDING * np.sqrt(np.minimum(self._area[block], self._area[other])),
+            corner=corner,
+            tilt=self._tilt(vertices, edge, corner, geometry),
+            precision=_PRECISION * np.sqrt(np.minimum(self._area[block], self._area[other])),
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
             relies_on_glue=glued is not None,
@@ -189,7 +199,7 @@ class ContactFinder:
 
         def placed(inside):
             return FacePoints.of(
-                block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
+                block, other, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
                 (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), softened,
             )  # fmt: skip
 
@@ -217,7 +227,7 @@ class ContactFinder:
             normal if ks is None else np.full(len(block), float(ks)),
         )
 
-    def _remembered(self, old, parent, time, geometry, partner, springs, stiff):
+    def _remembered(self, old, parent, time, geometry, springs, stiff):
         """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
         known = parent >= 0
 
@@ -225,12 +235,11 @@ class ContactFinder:
             old, parent
         )
         if not known.all():
-            # New contacts that touch already are tried closed first; one with a partner must show which line it
-            # crosses.
+            # New contacts that touch already are tried closed first.
             fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
             if len(old) == 0 and time == 0.0:
                 bonded[fresh & (geometry[:, 4] > 0)] = 1
-            contact_state[fresh & (partner < 0).all(axis=1)] = STICK
+            contact_state[fresh] = STICK
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
         # Friction on a normal force that pulls by its round-off acts the other way: taken for the sense of the sliding
         # it would turn that about in every step, and with it the matrix of blocks at rest.
@@ -246,6 +255,24 @@ class ContactFinder:
             "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
             "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset, "bare": bare,
         }  # fmt: skip
+
+    def _pressed(self, old: np.ndarray) -> np.ndarray:
+        """(n_blocks,) m: how deep the faces of each block were last pressed in."""
+        deepest = np.zeros(len(self._area))
+        closed = old["state"] != OPEN
+        for blocks in (old["block"][closed], old["other"][closed]):
+            np.maximum.at(deepest, blocks, -old["gap"][closed])
+        return deepest
+
+    def _tilt(self, vertices, edge, corner, geometry) -> np.ndarray:
+        """(n,) rad, as in `ContactSet`."""
+        tilt, rounded = np.zeros(len(edge)), np.flatnonzero(corner >= 0)
+        along = vertices[self._next[edge[rounded]]] - vertices[edge[rounded]]
+        normal = geometry[rounded, 1:3]
+        tilt[rounded] = np.arctan2(
+            along[:, 1] * normal[:, 1] + along[:, 0] * normal[:, 0], along[:, 1] * normal[:, 0] - along[:, 0] * normal[:, 1]
+        )
+        return tilt
 
     def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:
         """Contacts that have not touched are as worn, and as far lifted, as the nearest that slides along their
@@ -307,11 +334,20 @@ class ContactFinder:
         """(k, 2) all blocks that may be nearer to each other than ``window`` m on ``vertices``, and some that are not."""
         return self._near.of(vertices, window)
 
-    def gaps(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
-        """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""
+    def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
+        """(n,) m of the contacts ``found`` on the geometry ``before``, at their corners, once the blocks are where
+        ``vertices`` are."""
+        vertex, edge = found.vertex, found.edge
         start = vertices[edge]
         along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
-        return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
+        gap = (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
+        rounded = np.flatnonzero(found.corner >= 0)
+        if len(rounded):
+            v, w = vertex[rounded], found.corner[rounded]
+            moved = vertices[v] - vertices[w] - (before[v] - before[w])
+            normal = found.geometry[rounded, 1:3]
+            gap[rounded] = found.geometry[rounded, 3] + np.einsum("na,na->n", moved, normal)
+        return gap
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""
@@ -326,11 +362,12 @@ class ContactFinder:
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
 
 
-def _among(keep: np.ndarray, partner: np.ndarray) -> np.ndarray:
-    """``partner`` (n, 2) of the rows ``keep`` (n,), counted among these; −1 for those that are left out, as for
-    none."""
-    number = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
-    return number[partner[keep]]
+def corner_lengths(blocks: Blocks, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n_vertices,) m twice: the rounding length of every corner of ``blocks``, ``share`` times the block's size
+    (√area), and the longest that fits beside its shorter edge."""
+    edges = np.hypot(*(blocks.vertices[blocks.next_vertex] - blocks.vertices).T)
+    longest = LARGEST_SHARE * np.minimum(edges, edges[blocks.previous_vertex])
+    return share * np.sqrt(blocks.areas())[blocks.vertex_block], longest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:

@@ -204,8 +204,7 @@ class Equations:
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
         *called, violation = check_states(
-            forces, found.partner, found.reach, found.behind, state, direction, bonded, known.normal, known.shear,
-            known.friction, known.sliding,
+            forces, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
             known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
         )  # fmt: skip
         if (faces := found.faces) is not None:

@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
 from .attempt import Attempt
 from .contact_set import ContactSet
 from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
+from .middle import Middle
 from .moments import block_moments, fastest_vertex
 from .open_close import MANY
 from .overlap import refuse_overlap
@@ -39,6 +40,10 @@ _BLOCK_SHARE = 0.1
 _AIM = 0.99
 #: A hasty step that has been cut so often takes its time.
 PATIENT_AFTER = 3
+#: A step is begun again so often where corners meet in another direction than was expected, …
+_REDIRECTED = 3
+#: … by more than this angle (cosine).
+_OTHER_WAY = 0.95
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
 
@@ -204,14 +209,15 @@ class BlockSystem:
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
         limit = self.step_limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
-        found = self.finder.find(state, vertices, _WINDOW * limit)
+        expected = self._expected_motion(vertices, carried, moments, dt)
+        found = self.finder.find(state, vertices, _WINDOW * limit, motion=expected)
         if like is not None:
             found = found.like(like.state.contacts)
             if self.scheme.static and found.tried is not None:
                 # (In motion the step's arcs are those that the velocity foresees.)
                 found = found.along(*like.arcs)
         reason, before, broken = "", np.inf, np.zeros(0, np.int64)
-        cuts, asked, failed = 0, dt, ""
+        cuts, asked, failed, redirected = 0, dt, "", 0
         while True:
             # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
             attempt = result = None
@@ -233,8 +239,18 @@ class BlockSystem:
                     # breaks.
                     broken = np.append(broken, found.vertex[lost] * len(vertices) + found.edge[lost])
                     holds = found.relies_on_glue and not unheld
-                    found = self.finder.find(state, vertices, _WINDOW * limit, holds, broken=broken)
+                    found = self.finder.find(state, vertices, _WINDOW * limit, holds, broken=broken, motion=expected)
                     continue
+                if redirected < _REDIRECTED and (result.contacts["state"] != OPEN)[found.corner >= 0].any():
+                    # Where corners meet is known once the step's motion is.
+                    expected = attempt.new_vertices - vertices
+                    again = self.finder.find(
+                        state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken, motion=expected
+                    )
+                    if self._redirected(found, again, result.contacts["state"]):
+                        redirected += 1
+                        found = again.trying(result.contacts)
+                        continue
                 if largest <= 1.0001 * limit:
                     unseen = self._turned_in(attempt, result, _WINDOW * limit)
                     if unseen and cuts < self.settings.max_step_cuts:
@@ -252,7 +268,9 @@ class BlockSystem:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     limit = 1.1 * largest
-                    found = self.finder.find(state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken)
+                    found = self.finder.find(
+                        state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken, motion=expected
+                    )
                     continue
                 before = largest
                 shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
@@ -263,6 +281,29 @@ class BlockSystem:
                 )
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
+
+    def _expected_motion(self, vertices, carried, moments, dt) -> np.ndarray | None:
+        """(n_vertices, 2) m: what the velocities ``carried`` make of a step of ``dt``; None where there are none."""
+        if not carried.any():
+            return None
+        return Middle.of(dt * carried, 1.0, vertices, self.owner, moments).vertices - vertices
+
+    def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
+        """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in
+        ``again``."""
+        known = {pair: c for c, pair in enumerate(zip(again.vertex.tolist(), again.edge.tolist(), strict=True))}
+        previous = self.blocks.previous_vertex
+        for c in np.flatnonzero((found.corner >= 0) & (state != OPEN)):
+            v, w = int(found.vertex[c]), int(found.corner[c])
+            names = ((v, w, 1), (v, int(previous[w]), 1), (w, v, -1), (w, int(previous[v]), -1))
+            ways = [
+                way * float(found.geometry[c, 1:3] @ again.geometry[known[v, e], 1:3])
+                for v, e, way in names
+                if (v, e) in known
+            ]
+            if max(ways, default=-1.0) < _OTHER_WAY:
+                return True
+        return False
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
