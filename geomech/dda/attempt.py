@@ -31,7 +31,7 @@ from .rigid import mean_stress
 from .rounding import tell_felt, undecided_gaps
 from .step import CrackResponse, StepResult
 from .step_equations import Settled, Unsettled
-from .stopping import Stopped, dissipating, stop
+from .stopping import Stopped, Unresolved, contact_speeds, dissipating, stop
 from .stretched import stretched
 from .time_integration import advance, assemble_blocks, turned
 from .viscous_boundary import QuietEdges
@@ -381,18 +381,22 @@ class Attempt:
         return before
 
     def _stop(self, imposed) -> None:
-        """Take the sliding that friction has stopped in the step off the velocity; the energy (J/m) that this takes."""
+        """Take off the velocity what the step cannot bring about (`stopping`); the energy (J/m) that this takes."""
         system, found, velocity = self.system, self.found, self.velocity
         mass = np.where(system.fixed, np.inf, system.mass)
+        if not len(found):
+            return
         end = Middle.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
         geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
-        stopped = Stopped.of(
-            found, geometry, self.settled, self.slid, velocity, end.centroid, mass, self.dt, system.rounding
-        )
-        if stopped is None:
+        speeds = contact_speeds(found, geometry, velocity, end.centroid)
+        stopped = Stopped.of(found, self.settled, self.slid, speeds[:, 1], mass, self.dt, system.rounding)
+        unresolved = Unresolved.of(found, self.settled, self.slid, speeds, mass, self.dt)
+        if stopped is None and unresolved is None:
             return
         try:
-            change = stop(stopped, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt)
+            change, rubbed = stop(
+                stopped, unresolved, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt
+            )  # fmt: skip
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         if imposed is not None:
@@ -400,10 +404,10 @@ class Attempt:
         rates = np.zeros_like(velocity)
         rates[system.moving] = change[self.order[system.moving]] * (2.0 / self.dt)
         rates[:, 2:] /= np.sqrt(self.moments[:, :1])
-        rates, self.rubbed = dissipating(
+        rates, taken = dissipating(
             turned(rates, self.increment[:, 2]), velocity, self.moments, self.density, system.fixed
         )
-        self.velocity = velocity + rates
+        self.velocity, self.rubbed = velocity + rates, min(max(rubbed, 0.0), taken)
 
     def result(self) -> StepResult:
         """The step as it is told of."""

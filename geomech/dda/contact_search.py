@@ -35,6 +35,8 @@ _LEAN = 0.01
 _ENDS = 1e-4
 # Corners are nearer to one than to another when their distances squared differ by more than this part.
 _NEARER = 1e-2
+# Corners may come nearer by so many times the motion that is expected of them.
+_HASTE = 2.0
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
 
@@ -135,6 +137,7 @@ class Corners(NamedTuple):
     longest   (n_vertices,)    m, the longest that these may be
     pressed   (n_blocks,)      m, how deep the faces of each block are pressed in
     motion    (n_vertices, 2)  m, how far each vertex is expected to move in the step
+    margin                     m, by which corners may come nearer besides: pairs that then stay apart are left out
     """
 
     convex: np.ndarray
@@ -142,6 +145,7 @@ class Corners(NamedTuple):
     longest: np.ndarray
     pressed: np.ndarray
     motion: np.ndarray
+    margin: float
 
 
 def find_contacts(
@@ -184,7 +188,7 @@ def convex_corners(vertices, next_vertex, previous_vertex):
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _look_at(
     table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, window, old_keys, convex, rounding,
-    longest, pressed, motion,
+    longest, pressed, motion, margin,
 ):  # fmt: skip
     """Fill ``table`` and ``met`` with the contacts of ``pairs`` and return their number, or −1 when they have no room
     for them.
@@ -274,17 +278,19 @@ def _look_at(
                     continue
                 if count + 4 > table.shape[0]:
                     return -1
-                line, length = 1, 0.0
+                line, length, reach = 1, 0.0, window
                 if two >= 0:
                     length = rounding_length(
                         min(rounding[v], rounding[w]), min(longest[v], longest[w]), max(pressed[a], pressed[b])
                     )
+                    ux, uy = motion[v, 0] - motion[w, 0], motion[v, 1] - motion[w, 1]
                     mx, my, gap, line = meeting(
-                        dx, dy, motion[v, 0] - motion[w, 0], motion[v, 1] - motion[w, 1], pick[one, 0], pick[one, 1],
-                        pick[one, 2], pick[two, 0], pick[two, 1], pick[two, 2], length,
+                        dx, dy, ux, uy, pick[one, 0], pick[one, 1], pick[one, 2], pick[two, 0], pick[two, 1],
+                        pick[two, 2], length,
                     )  # fmt: skip
+                    reach = min(window, _HASTE * np.sqrt(ux * ux + uy * uy) + margin)
                     if line == 0:
-                        if abs(gap) > window:
+                        if gap > reach or gap < -window:
                             continue
                         # It goes by the name of the line whose normal is nearer to its own.
                         k = one
@@ -301,7 +307,7 @@ def _look_at(
                 for k in range(n_lines):
                     if k != (one if line == 1 else two) and twin[k] != (one if line == 1 else two):
                         continue
-                    if abs(pick[k, 2]) > window:
+                    if pick[k, 2] > reach or pick[k, 2] < -window:
                         continue
                     row = _add(table, count, first, pick_vertex[k], pick_edge[k])
                     if row == count:

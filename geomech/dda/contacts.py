@@ -91,12 +91,13 @@ class ContactFinder:
         lumped: bool = False,
         broken: np.ndarray | None = None,
         motion: np.ndarray | None = None,
+        margin: float = np.inf,
     ) -> ContactSet:
         """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it;
         without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
         (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
-        it says on which sides corners meet."""
+        it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""
         old = np.ascontiguousarray(state.contacts)
         old_vertex, old_edge, keys, old_normal, lift, gap = contact_rows.names(old, len(vertices))
         # Faces that slid apart press at a distance, those that do not fit pass each other by as much; what soft springs
@@ -105,7 +106,7 @@ class ContactFinder:
         rank = np.argsort(keys, kind="stable")
         corners = Corners(
             convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
-            np.zeros_like(vertices) if motion is None else motion,
+            np.zeros_like(vertices) if motion is None else motion, float(margin) + lift,
         )  # fmt: skip
         table, met = find_contacts(
             vertices, self._next, self._previous, self._start, self._near.of(vertices, window), window, keys[rank],
@@ -131,11 +132,11 @@ class ContactFinder:
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
+        if self._table.curved.any():
+            self._pass_on_wear(old, block, other, geometry, remembered)
         # A step that rounding smooths is none: what comes upon it begins there without force.
         smoothed = (table[:, 3] == 1) & (remembered["state"] == OPEN) & (geometry[:, 3] < remembered["lift"])
         remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
-        if self._table.curved.any():
-            self._pass_on_wear(old, block, other, geometry, remembered)
         vertex, edge, corner = (column.copy() for column in table[:, :3].T)
         keep = np.ones(len(vertex), bool)
         if nodes is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,8 +44,30 @@ PATIENT_AFTER = 3
 _REDIRECTED = 3
 #: … by more than this angle (cosine).
 _OTHER_WAY = 0.95
+#: Corners are looked for that come nearer than expected by this part of the largest motion of a step.
+_SPARE = 0.01
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
+
+
+@dataclass(eq=False)
+class _Search:
+    """What the contacts of a step are sought by, see `ContactFinder.find`."""
+
+    finder: ContactFinder
+    state: State
+    vertices: np.ndarray
+    window: float
+    motion: np.ndarray | None
+    margin: float
+    glue_holds: bool = True
+    broken: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def find(self) -> ContactSet:
+        return self.finder.find(
+            self.state, self.vertices, self.window, self.glue_holds, broken=self.broken, motion=self.motion,
+            margin=self.margin,
+        )  # fmt: skip
 
 
 class BlockSystem:
@@ -209,14 +231,17 @@ class BlockSystem:
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
         limit = self.step_limit
         dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
-        expected = self._expected_motion(vertices, carried, moments, dt)
-        found = self.finder.find(state, vertices, _WINDOW * limit, motion=expected)
+        search = _Search(
+            self.finder, state, vertices, _WINDOW * limit, self._expected_motion(vertices, carried, moments, dt),
+            np.inf if self.scheme.static else self._margin(loads, state.time, dt),
+        )  # fmt: skip
+        found = search.find()
         if like is not None:
             found = found.like(like.state.contacts)
             if self.scheme.static and found.tried is not None:
                 # (In motion the step's arcs are those that the velocity foresees.)
                 found = found.along(*like.arcs)
-        reason, before, broken = "", np.inf, np.zeros(0, np.int64)
+        reason, before = "", np.inf
         cuts, asked, failed, redirected = 0, dt, "", 0
         while True:
             # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
@@ -237,19 +262,15 @@ class BlockSystem:
                 if unheld or lost.any():
                     # Corners that were left out, and springs that were moved, for the sake of a bond are back before it
                     # breaks.
-                    broken = np.append(broken, found.vertex[lost] * len(vertices) + found.edge[lost])
-                    holds = found.relies_on_glue and not unheld
-                    found = self.finder.find(state, vertices, _WINDOW * limit, holds, broken=broken, motion=expected)
+                    search.broken = np.append(search.broken, found.vertex[lost] * len(vertices) + found.edge[lost])
+                    search.glue_holds = found.relies_on_glue and not unheld
+                    found = search.find()
                     continue
-                if redirected < _REDIRECTED and (result.contacts["state"] != OPEN)[found.corner >= 0].any():
+                if redirected < _REDIRECTED:
                     # Where corners meet is known once the step's motion is.
-                    expected = attempt.new_vertices - vertices
-                    again = self.finder.find(
-                        state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken, motion=expected
-                    )
-                    if self._redirected(found, again, result.contacts["state"]):
-                        redirected += 1
-                        found = again.trying(result.contacts)
+                    again = self._with_corners_of(attempt, search, result.contacts["state"])
+                    if again is not None:
+                        redirected, found = redirected + 1, again
                         continue
                 if largest <= 1.0001 * limit:
                     unseen = self._turned_in(attempt, result, _WINDOW * limit)
@@ -268,9 +289,8 @@ class BlockSystem:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     limit = 1.1 * largest
-                    found = self.finder.find(
-                        state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken, motion=expected
-                    )
+                    search.window, search.glue_holds = _WINDOW * limit, found.relies_on_glue
+                    found = search.find()
                     continue
                 before = largest
                 shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
@@ -287,6 +307,27 @@ class BlockSystem:
         if not carried.any():
             return None
         return Middle.of(dt * carried, 1.0, vertices, self.owner, moments).vertices - vertices
+
+    def _margin(self, loads: Loads, time: float, dt: float) -> float:
+        """m: by which two corners may come nearer in a step of ``dt`` than their velocities say, by weight and a little
+        of the largest motion; what comes nearer still is looked for once the step is known."""
+        return dt * dt * float(np.hypot(*loads.gravity.at(time + dt))) + _SPARE * self.step_limit
+
+    def _with_corners_of(self, attempt: Attempt, search: _Search, state: np.ndarray) -> ContactSet | None:
+        """The contacts with which the step is to be begun again because corners have met on the way that the ``attempt``
+        went, with its contacts in ``state`` (n,), but not where they were expected to; None where all did."""
+        found, moved = attempt.found, attempt.new_vertices - attempt.vertices
+        pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
+        strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
+        if not pressed and not strayed > 0.5 * search.margin:
+            return None
+        search.motion, search.glue_holds = moved, found.relies_on_glue
+        again = search.find()
+        if pressed and self._redirected(found, again, state):
+            return again
+        known = np.isin(again.vertex * len(moved) + again.edge, found.vertex * len(moved) + found.edge)
+        missed = ~known & (self.finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision)
+        return again if missed.any() else None
 
     def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
         """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in

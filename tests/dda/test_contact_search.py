@@ -25,8 +25,9 @@ def search(polygons, window=0.05, turn=0.0, fixed=None, rounding=0.01):
     none = np.empty(0, np.int64)
     near = near_pairs(boxes(v, start[:-1]), fixed, window)
     corners = Corners(
-        convex_corners(v, next_, previous), *corner_lengths(blocks, rounding), np.zeros(len(polygons)), np.zeros_like(v)
-    )
+        convex_corners(v, next_, previous), *corner_lengths(blocks, rounding), np.zeros(len(polygons)), np.zeros_like(v),
+        np.inf,
+    )  # fmt: skip
     table, met = find_contacts(v, next_, previous, start, near, window, none, corners)
     geometry, mate, _ = describe_contacts(table, met, v, next_, previous, window, none, none, np.empty((0, 2)), none)
     return table, geometry, mate
