@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..conventions import rotate_stress
-from ..model import OPEN, STICK, Loads, State
+from ..model import OPEN, SLIP, STICK, Loads, State
 from . import assembly
 from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
@@ -85,6 +85,8 @@ class Attempt:
         self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
         self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
         self.iterations = 0
+        if not scheme.static and found.tried is None and len(found):
+            self.found = found.expecting(*self._expected_states())
         self._edges_along: tuple[np.ndarray | None, np.ndarray] = None, np.zeros((0, 2))
         foreseen = self._foreseen()
         self._place(foreseen)
@@ -99,6 +101,26 @@ class Attempt:
             if not bends or not self._bent():
                 break
         self._move()
+
+    def _expected_states(self) -> tuple[np.ndarray, np.ndarray]:
+        """States and senses of sliding (n,) that open-close iterations begin with: those carried over, but of contacts
+        whose blocks part, meet or slide so fast that it would take more than all that they bear to keep them from it in
+        a step."""
+        found, system = self.found, self.system
+        centroid = np.ascontiguousarray(self.moments[:, 1:3])
+        apart, along = contact_speeds(found, found.geometry, self.carried, centroid).T
+        mass = np.where(system.fixed, np.inf, system.mass)
+        largest = np.where(system.fixed, np.inf, 0.0)
+        for blocks in (found.block, found.other):
+            np.maximum.at(largest, blocks, found.normal)
+        least = np.minimum(mass[found.block], mass[found.other]), np.minimum(largest[found.block], largest[found.other])
+        fast, slides = (least[0] * np.abs(speed) / self.dt > least[1] for speed in (apart, along))
+        after, loose = found.gap_before + self.dt * apart, found.bonded == 0
+        parts = fast & (found.state != OPEN) & loose & (after > 0.0)
+        closed = np.where(found.state == OPEN, fast & (after < 0.0), ~parts)
+        slides &= closed & loose & ((found.springs.friction > 0.0) | (found.springs.sliding > 0.0))
+        state = np.where(slides, SLIP, np.where(closed, np.where(found.state == OPEN, STICK, found.state), OPEN))
+        return state, np.where(slides, -np.sign(along), np.where(parts, 0.0, found.direction))
 
     def _foreseen(self) -> np.ndarray | None:
         """(n_blocks, 6) what the velocity makes of this step; None in statics, which carry none."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -101,6 +101,25 @@ class ContactSet:
         return replace(
             self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction), bonded)
         )
+
+    def part(self, rows: np.ndarray) -> ContactSet:
+        """The contacts ``rows`` (k,) alone, without the faces that they are ends of."""
+        n = len(self)
+
+        def of(value):
+            if isinstance(value, np.ndarray) and len(value) == n:
+                return value[rows]
+            return Springs(**{name: each[rows] for name, each in vars(value).items()}) if value is self.springs else value
+
+        own = {field.name: of(getattr(self, field.name)) for field in fields(self)}
+        tried = None if self.tried is None else tuple(each[rows] for each in self.tried)
+        return ContactSet(**own | {"faces": None, "points": None, "lumped": None, "tried": tried})
+
+    def expecting(self, state: np.ndarray, direction: np.ndarray) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with these (n,)."""
+        if np.array_equal(state, self.state):
+            return self
+        return replace(self, tried=(state, direction, self.bonded))
 
     def trying_again(self, settled: Settled) -> ContactSet:
         """The same contacts, of which open–close iterations begin with the states so ``settled`` with springs that stood
