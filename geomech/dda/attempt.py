@@ -330,7 +330,7 @@ class Attempt:
                 most = system.settings.max_open_close_iterations
                 return settle(
                     pattern, matrix, right, contacts, vectors, stiff, start, slack, most, curved,
-                    system.scheme.static, self.patient,
+                    system.scheme.static, self.patient, expected=self._expected_unknowns(),
                 )  # fmt: skip
 
             return stretched(settled, contacts, stiff, start, stretch, curved) if stretch.any() else settled(contacts)
@@ -339,6 +339,17 @@ class Attempt:
         if not system.allowed_penetration or not len(found):
             return solve(found, springs, gap, found.stretch)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
+
+    def _expected_unknowns(self) -> np.ndarray | None:
+        """(6 n_free,) what the velocity makes of this step, in the unknowns of `assembly`; None in statics."""
+        if self.system.scheme.static:
+            return None
+        moving = self.system.moving
+        increment = self.dt * self.carried[moving]
+        increment[:, 2:] *= np.sqrt(self.moments[moving, :1])
+        out = np.empty_like(increment)
+        out[self.order[moving]] = increment
+        return out.ravel()
 
     def _increment(self, unknowns: np.ndarray) -> np.ndarray:
         """(n_blocks, 6) displacements of all blocks in the step."""

@@ -98,7 +98,8 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
 class CentralPath:
     """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which
     hold, ``forces`` (n,) N normal forces of the size to be expected, ``room`` gives each iteration the flat
-    matrix to fill; without, it takes its own.
+    matrix to fill; without, it takes its own. ``expected`` (6 n,) is the motion to begin with, that of the velocities,
+    None for none.
 
     ``missed``: what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
     stiffness.
@@ -116,6 +117,7 @@ class CentralPath:
         bonded: np.ndarray,
         forces: np.ndarray,
         room: Callable[[], np.ndarray] | None = None,
+        expected: np.ndarray | None = None,
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
@@ -149,7 +151,10 @@ class CentralPath:
         self._rough = (friction > 0.0) | (firm > 0.0)
         self._mu, self._base = np.where(self._rough, friction, 1.0), np.where(self._rough, firm, 0.0)
 
-        load = np.append(np.abs(right).max(axis=1, initial=0.0), 0.0)
+        start = np.zeros(right.size) if expected is None else expected
+        # What moves on by itself is no load.
+        left = right - pattern.without_contacts(matrix, start)
+        load = np.append(np.abs(left).max(axis=1, initial=0.0), 0.0)
         mine, others = order[self._at[0]], order[self._at[1]]
         # Small blocks pass on what large ones press them with: contacts in units of a small block's own load would have
         # forces that are nothing beside what they must balance, and no step of the path would get anywhere.
@@ -163,10 +168,12 @@ class CentralPath:
         load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
         self._unit = load * load / self._kn
         self._room = room
-        self._unknowns = np.zeros(right.size)
+        self._unknowns = start.copy()
         # Motions: what makes the gap and the motion along the edge 0 where no force acts.
-        self._g, self._s = gap[some], -found.shear[some] / self._ks
-        self._load = max(float(np.abs(right).max()), 1e-300)
+        apart, along = moved(start, *self._at).T
+        self._g = gap[some] + apart - springs.lift[some] * along
+        self._s = along - found.shear[some] / self._ks
+        self._load = max(float(np.abs(left).max()), 1e-300)
         mean = float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0
         self._begin(max(_START * mean, _LEAST_START))
 

@@ -225,16 +225,19 @@ def settle(
     statics: bool = False,
     patient: bool = True,
     patches: bool = True,
+    expected: np.ndarray | None = None,
 ) -> Settled:
     """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix``
     (n, 6, 6) and ``right`` (n, 6) are the blocks' own part, ``springs`` and ``gap`` those of this step (dashpots
     included), ``slack`` (n_contacts,) m the gaps that decide nothing. ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations,
-    those along the central path included. Unless ``patient``, systems too large for a dense matrix are not asked for
-    by laws and rounds that take hundreds: a shorter step takes less, of `MANY` in motion at the first sign.
+    those along the central path included. ``expected`` (6 n,) is the motion that velocities alone would make, None where
+    there are none. Unless ``patient``, systems too large for a dense matrix are not asked for by laws and rounds that
+    take hundreds: a shorter step takes less, of `MANY` in motion at the first sign. ``patches``: few contacts that stay
+    wrong are settled by themselves (`patches`).
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
-    equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics)
+    equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics, expected)
     states = States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
     normal_force, slip = found.normal, np.zeros(len(found))
     seen: set[bytes] = set()
@@ -322,7 +325,7 @@ def settle(
                 if path is None or not np.array_equal(path.bonded, states.bonded):
                     path = CentralPath(
                         pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded, normal_force,
-                        equations.room,
+                        equations.room, expected,
                     )
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration

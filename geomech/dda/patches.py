@@ -73,10 +73,15 @@ def settled_in_patch(
     try:
         settled = settle(
             own, equations.matrix[inside], equations.right[inside], part, vectors, springs, gap,
-            equations.slack[rows],
+            equations.slack[rows], expected=_of(equations.expected, inside),
         )  # fmt: skip
     except Unsettled:
         return None, 0.0
     state, direction = states.state.copy(), states.direction.copy()
     state[rows], direction[rows] = settled.state, settled.direction
     return States(state, direction, states.bonded), settled.iterations * float(inside.sum()) / n
+
+
+def _of(unknowns: np.ndarray | None, inside: np.ndarray) -> np.ndarray | None:
+    """(6 k,) of the ``unknowns`` (6 n,), those of the blocks ``inside`` (n,) bool."""
+    return None if unknowns is None else unknowns.reshape(-1, 6)[inside].ravel()

@@ -110,6 +110,7 @@ class Equations:
     slack: np.ndarray
     curved: CurvedJoints | None
     statics: bool
+    expected: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
