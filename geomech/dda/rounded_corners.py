@@ -68,7 +68,7 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
     cx, cy = -radius * (nx1 + nx2) / (1.0 + cosine), -radius * (ny1 + ny2) / (1.0 + cosine)
     mx, my, gap, line = _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way)
     if gap > 0.0:
-        zx, zy = x - cx, y - cy
+        here, zx, zy = (mx, my, gap, line), x - cx, y - cy
         # Where on the path x comes first to the wedge, or nearest to it: lines are met, or near, at an end of the path
         # or where it crosses them, the arc also where the path passes its centre.
         rate1, rate2, travel = dx * nx1 + dy * ny1, dx * nx2 + dy * ny2, dx * dx + dy * dy
@@ -107,8 +107,11 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
             if earlier:
                 least, first, mx, my, line = near, t, px, py, on
         gap = zx * mx + zy * my - radius
-    if mx * nx1 + my * ny1 > _ON_LINE:
+        # The line to come is none to stand on as long as the corner is behind it, beside the wedge.
+        if (line == 1 and gap1 < -EASED * length) or (line == 2 and gap2 < -EASED * length):
+            mx, my, gap, line = here
+    if line == 1 or (mx * nx1 + my * ny1 > _ON_LINE and gap1 > -EASED * length):
         return nx1, ny1, gap1, 1
-    if mx * nx2 + my * ny2 > _ON_LINE:
+    if line == 2 or (mx * nx2 + my * ny2 > _ON_LINE and gap2 > -EASED * length):
         return nx2, ny2, gap2, 2
-    return mx, my, gap, line
+    return mx, my, gap, 0
