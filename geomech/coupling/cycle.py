@@ -250,7 +250,7 @@ class Coupling:
                         growth_pass,
                     )
                 self.under_way = None
-                self.length.after(result, dt, now.system.allowed_ratio)
+                self.length.after(result, dt)
                 if self.tips is not None:
                     self.tips.end(tips, now.blocks, whole, now.loads)
                 now.take_step(result.state, budget)

@@ -193,4 +193,4 @@ class EventSteps:
         """The longest step, s, by how fast blocks have moved in the last one."""
         if not self._pace:
             return min(self._longest, math.inf if self._pace == 0 else self.time_step)
-        return min(self._longest, max(self.time_step, USE * now.system.allowed_ratio / self._pace))
+        return min(self._longest, max(self.time_step, USE / self._pace))

@@ -479,7 +479,7 @@ class Attempt:
             "elastic_energy": energy.elastic,
             "contact_energy": energy.contact,
             "worst_penetration": _deepest(settled.state != OPEN, found.gap_before, settled.gap),
-            "max_displacement_ratio": self.largest / system.half_height,
+            "max_displacement_ratio": self.largest / system.half_diagonal,
             "unbalanced": residual,
             "unbalanced_ratio": ratio,
             **acted,

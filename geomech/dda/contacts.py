@@ -9,12 +9,14 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from . import contact_rows
+from .approach import Approach, Windows
 from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
 from .contact_set import ContactSet
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
+from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
@@ -80,31 +82,32 @@ class ContactFinder:
         self._removed = removed
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
         self._near = NearPairs(self._start, self._fixed, self._work)
+        self.approach = Approach(self._next, self._start, np.sqrt(self._area), self._near)
 
     def find(
         self,
         state: State,
         vertices: np.ndarray,
-        window: float,
+        window: float | Windows,
         glue_holds: bool = True,
         lumped: bool = False,
         broken: np.ndarray | None = None,
     ) -> ContactSet:
-        """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it;
+        """Every vertex within ``window`` (m, of all pairs of blocks or of each) of an edge it may touch, with what ``state.contacts`` remembers of it;
         without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
         (vertex·n_vertices + edge), too."""
         old = np.ascontiguousarray(state.contacts)
         old_vertex, old_edge, keys, old_normal, lift, gap = contact_rows.names(old, len(vertices))
-        # Faces that slid apart press at a distance, those that do not fit pass each other by as much; what soft springs
-        # have let in deeper than that touches still.
-        window = max(window + lift, -_DEEPER * gap)
+        near = self._reaching(window, vertices, old, lift, gap)
         rank = np.argsort(keys, kind="stable")
         table = find_contacts(
-            vertices, self._next, self._previous, self._start, self._near.of(vertices, window), window, keys[rank]
+            vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank]
         )
+        table = self._from_outside(table, vertices, np.sort(keys[old["state"] != OPEN]))
+        at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
-            table, vertices, self._next, self._previous, window, old_vertex, old_edge, old_normal, rank
+            table, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
         )
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
@@ -201,6 +204,38 @@ class ContactFinder:
             out = found.inset & ~kept
             found = _at_their_corners(found, placed(found.inset) if out.any() else None, out, inside & kept)
         return replace(found, by_length=self._stiff_along[law]).placed(points)
+
+    def _reaching(
+        self, window: float | Windows, vertices: np.ndarray, old: np.ndarray, lift: float, gap: float
+    ) -> Windows:
+        """``window`` of each pair, wide enough for what the contacts ``old`` hold: faces that slid apart press at a
+        distance, those that do not fit pass each other by as much; what soft springs have let in deeper than that touches
+        still. ``lift`` is the largest, ``gap`` the lowest of them."""
+        if not isinstance(window, Windows):
+            pairs = self._near.of(vertices, max(window + lift, -_DEEPER * gap))
+            window = Windows(pairs, np.full(len(pairs), window))
+        if not len(window.pairs) or (lift == 0.0 and -_DEEPER * gap <= window.reach.min()):
+            return window
+        reach = window.reach.copy()
+        at = window.of_contacts(old["block"], old["other"], len(self._area))
+        known, wide = at >= 0, np.zeros(len(reach))
+        np.maximum.at(wide, at[known], np.abs(old["lift"][known]))
+        reach += wide
+        deep = known & (old["state"] != OPEN)
+        np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
+        return Windows(window.pairs, reach)
+
+    def _from_outside(self, table: np.ndarray, vertices: np.ndarray, closed: np.ndarray) -> np.ndarray:
+        """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
+        (sorted keys) have."""
+        vertex, edge = table[:, 0], table[:, 1]
+        keep = from_outside(
+            vertex, edge, self.gaps(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            self._owner, closed,
+        )  # fmt: skip
+        if keep.all():
+            return table
+        return np.concatenate([table[keep, :2], _among(keep, table[:, 2:])], axis=1)
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
@@ -303,9 +338,17 @@ class ContactFinder:
             law = self._law_of[a, b]
         return law
 
-    def pairs(self, vertices: np.ndarray, window: float) -> np.ndarray:
-        """(k, 2) all blocks that may be nearer to each other than ``window`` m on ``vertices``, and some that are not."""
-        return self._near.of(vertices, window)
+    def near_boxes(self, box: np.ndarray) -> np.ndarray:
+        """(k, 2) all pairs of blocks whose boxes ``box`` (n_blocks, 4) meet, and some whose do not."""
+        return self._near.of_boxes(box, 0.1 * np.sqrt(self._area))
+
+    def may_touch(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) False for a ``vertex`` of which neither edge may touch the ``edge``, and for blocks that are taken out."""
+        law = np.maximum(self._laws(edge, vertex), self._laws(edge, self._previous[vertex]))
+        out = law != _NEVER
+        if self._removed is not None:
+            out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
+        return out
 
     def gaps(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""

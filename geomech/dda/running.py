@@ -80,7 +80,7 @@ def run(
             state = _at_rest(system, state, loads, load_time)
             watched.set_down()
         result = system.step(state, loads, dt, load_time=load_time)
-        length.after(result, dt, system.allowed_ratio)
+        length.after(result, dt)
         watched.look(state, result)
         if watch is not None:
             watch(result)

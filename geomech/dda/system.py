@@ -10,35 +10,31 @@ import numpy as np
 
 from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
+from .approach import Windows
 from .attempt import Attempt
 from .contact_set import ContactSet
 from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
-from .moments import block_moments, fastest_vertex
+from .moments import block_moments
 from .open_close import MANY
 from .overlap import refuse_overlap
 from .rigid import with_rigid
 from .rounding import rounding_of
 from .step import CrackResponse, NotConverged, StepResult
 from .step_equations import Unsettled
+from .step_limits import StepLimits
 from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, at_their_springs, told_rows
-from .turned_in import turned_in
 from .work import Work
 
 log = logging.getLogger(__name__)
 
-#: Contacts are sought within this many times the largest displacement of a step: two blocks may approach each other.
-_WINDOW = 2.2
-#: No step moves a vertex by more than this part of the smallest block's size, √area, whatever the settings allow.
-_BLOCK_SHARE = 0.1
-#: A step that speed limits uses this part of what it may move: round-off, arcs and what blocks hit take the rest, so
-#: that it need not be cut.
-_AIM = 0.99
 #: A hasty step that has been cut so often takes its time.
 PATIENT_AFTER = 3
+#: Contacts of one step are sought anew, farther, so often at most; then it is cut.
+_FARTHER = 6
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
 
@@ -111,10 +107,10 @@ class BlockSystem:
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self._refuse_massless()
         self.mass = self.density * areas
-        self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
+        self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
         self.rounding, self.rounding_told = rounding_of(vertices), False
-        self.step_limit = min(
-            self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
+        self.limits = StepLimits(
+            self.finder, self.settings, self.half_diagonal, np.sqrt(areas), self.vertex_start, self.next, self.work
         )
         self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
 
@@ -137,9 +133,9 @@ class BlockSystem:
             )
 
     @property
-    def allowed_ratio(self) -> float:
-        """The largest displacement that a step may bring, in units of half the height."""
-        return self.step_limit / self.half_height
+    def step_limit(self) -> float:
+        """The largest displacement of a vertex that a step may bring, m."""
+        return self.limits.displacement
 
     def in_statics(self) -> BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
@@ -202,16 +198,17 @@ class BlockSystem:
             refuse_overlap(self.blocks, vertices, moments)
             self._excavations.refuse(loads)
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
-        limit = self.step_limit
-        dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
-        found = self.finder.find(state, vertices, _WINDOW * limit)
+        gravity = loads.gravity.at(state.time + dt)
+        dt = self.limits.foreseen(vertices, carried, moments, dt, gravity)
+        near = self._near(state, vertices, carried, moments, dt, gravity)
+        found = self.finder.find(state, vertices, near)
         if like is not None:
             found = found.like(like.state.contacts)
             if self.scheme.static and found.tried is not None:
                 # (In motion the step's arcs are those that the velocity foresees.)
                 found = found.along(*like.arcs)
         reason, before, broken = "", np.inf, np.zeros(0, np.int64)
-        cuts, asked, failed = 0, dt, ""
+        cuts, asked, failed, most, farther = 0, dt, "", 1.0, 0
         while True:
             # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
             attempt = result = None
@@ -220,7 +217,7 @@ class BlockSystem:
                     self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
                     patient=not hasty or cuts >= PATIENT_AFTER,
                 )  # fmt: skip
-                result, largest = attempt.result(), attempt.largest
+                result = attempt.result()
             except Unsettled as failure:
                 failed = reason = f"{failure}{self.finder.where(found, failure.contact)}"
                 shorter = 0.5 * dt
@@ -233,29 +230,40 @@ class BlockSystem:
                     # breaks.
                     broken = np.append(broken, found.vertex[lost] * len(vertices) + found.edge[lost])
                     holds = found.relies_on_glue and not unheld
-                    found = self.finder.find(state, vertices, _WINDOW * limit, holds, broken=broken)
+                    found = self.finder.find(state, vertices, near, holds, broken=broken)
                     continue
-                if largest <= 1.0001 * limit:
-                    unseen = self._turned_in(attempt, result, _WINDOW * limit)
-                    if unseen and cuts < self.settings.max_step_cuts:
-                        cuts, dt = cuts + 1, 0.5 * dt
-                        failed = unseen
+                used, reason, moved = self.limits.used(attempt, result)
+                if used <= 1.0001 * most:
+                    crossed = self.limits.crossed(attempt, result)
+                    if crossed is None:
+                        self._refuse_crushed(result.state)
+                        if failed:
+                            log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
+                        result.statistics["limit_share"] = used
+                        return result
+                    wider = near.widened(crossed.pairs, crossed.motion, self.blocks.n_blocks)
+                    if farther < _FARTHER and wider.reaches_beyond(near):
+                        # What went in met no contact: with it the step may be as long.
+                        near, farther = wider, farther + 1
+                        found = self.finder.find(state, vertices, near, found.relies_on_glue, broken=broken)
                         continue
-                    if unseen:
-                        log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, unseen)
-                    self._refuse_crushed(result.state)
-                    if failed:
-                        log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
-                    return result
-                reason = f"a vertex moves {largest:.3g} m, the limit is {limit:.3g} m"
-                if largest > 0.9 * before:
+                    if cuts >= self.settings.max_step_cuts and not crossed.through:
+                        log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
+                        result.statistics["limit_share"] = used
+                        return result
+                    self.limits.cut(crossed)
+                    failed = reason = crossed.reason
+                    shorter, farther = 0.5 * dt, 0
+                elif used > 0.9 * before:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
-                    limit = 1.1 * largest
-                    found = self.finder.find(state, vertices, _WINDOW * limit, found.relies_on_glue, broken=broken)
+                    most = 1.1 * used
+                    near = near.widened(moved.pairs, 1.1 * moved.reach, self.blocks.n_blocks)
+                    found = self.finder.find(state, vertices, near, found.relies_on_glue, broken=broken)
                     continue
-                before = largest
-                shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
+                else:
+                    before = used
+                    shorter = dt * float(min(0.8, max(0.05, 0.95 / used)))
             cuts += 1
             if cuts > self.settings.max_step_cuts:
                 raise NotConverged(
@@ -266,7 +274,18 @@ class BlockSystem:
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
-        return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit, lumped=True)
+        vertices = np.ascontiguousarray(state.vertices)
+        return self.finder.find(state, vertices, self._standing(state, vertices), lumped=True)
+
+    def _near(self, state, vertices, carried, moments, dt, gravity) -> Windows:
+        """Where a step of ``dt`` looks for contacts."""
+        lift = float(np.abs(state.contacts["lift"]).max(initial=0.0))
+        return self.limits.windows(vertices, carried, moments, dt, gravity, lift)
+
+    def _standing(self, state: State, vertices: np.ndarray) -> Windows:
+        """Where blocks that stand look for contacts."""
+        moments = block_moments(vertices, self.next, self.vertex_start)
+        return self._near(state, vertices, np.zeros_like(state.velocity), moments, 0.0, np.zeros(2))
 
     def told(self, state: State, found: ContactSet, forces: ToldContacts) -> np.ndarray:
         """CONTACT rows of ``found``, the contacts near ``state``, as ``forces`` say where they tell of one: for a
@@ -277,8 +296,8 @@ class BlockSystem:
             return self.finder.on_penalty(contacts)[0] if held else np.zeros(len(contacts), bool)
 
         rows = told_rows(found, forces, self.finder.closure, on_multiplier(found))
-        vertices, window = np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit
-        placed = self.finder.find(replace(state, contacts=rows), vertices, window)
+        vertices = np.ascontiguousarray(state.vertices)
+        placed = self.finder.find(replace(state, contacts=rows), vertices, self._standing(state, vertices))
         if placed.points is None:
             return rows
         return at_their_springs(rows, placed, forces.which, self.finder.closure, on_multiplier(placed))
@@ -295,17 +314,6 @@ class BlockSystem:
                 "block, or let velocity be carried (dynamic_factor = 1)"
             )
 
-    def _turned_in(self, attempt: Attempt, result: StepResult, window: float) -> str:
-        """What has gone in where the contacts sought within ``window`` (m) saw nothing come; empty for nothing."""
-        blocks = turned_in(
-            result.state.vertices, attempt.vertices, self.next, self.vertex_start, attempt.increment[:, 2],
-            self.finder.pairs(attempt.vertices, window), result.contacts, np.sqrt(attempt.moments[:, 0]),
-        )  # fmt: skip
-        if blocks is None:
-            return ""
-        a, b, depth = blocks
-        return f"{self.finder.names[a]!r} and {self.finder.names[b]!r} turn into each other by {depth:.3g} m"
-
     def _refuse_crushed(self, state: State) -> None:
         area = block_moments(state.vertices, self.next, self.vertex_start)[:, 0]
         if not (area > 0).all():
@@ -314,16 +322,6 @@ class BlockSystem:
             raise NotConverged(
                 f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness"
             )
-
-    def _foreseen(self, vertices, carried, moments, loads, time, dt, limit) -> float:
-        """``dt`` shortened where the velocity alone would carry a vertex beyond the limit."""
-        if not carried.any():
-            return dt
-        speed = float(fastest_vertex(carried, vertices, self.vertex_start, moments))
-        g = float(np.hypot(*loads.gravity.at(time + dt)))
-        # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
-        limit *= _AIM
-        return min(dt, float(2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit))))
 
     def pattern_of(
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None
