@@ -114,6 +114,7 @@ class NearPairs:
             return np.zeros((0, 2), np.int64)
         if self._kept is None or not _hold(self._kept, box):
             began = time.perf_counter()
+            more = (_REACH - 1.0) * more
             self._kept = box + np.stack([-more, -more, more, more], axis=1)
             self._in_boxes = near_pairs(self._kept, self._fixed, 0.0)
             self.work.pair_search_s += (time.perf_counter() - began) if self.work.pair_searches else 0.0
