@@ -198,6 +198,10 @@ class ContactSet:
             passes |= (column >= 0) & self.behind[column]
         return np.where(passes, _PASSING * self.rounding, self.rounding)
 
+    def blocks_of(self, contact: int) -> tuple[int, ...]:
+        """The two blocks of a ``contact``; none for −1."""
+        return () if contact < 0 else (int(self.block[contact]), int(self.other[contact]))
+
     def __len__(self) -> int:
         return len(self.vertex)
 

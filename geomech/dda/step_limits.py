@@ -9,6 +9,7 @@ more than the lines of their contacts are good for (`approach`); and nothing goe
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -39,15 +40,40 @@ _WIDER = 1.5
 _MISFIT = 1e-3
 
 
+#: Why steps are shortened, and what to do about it.
+DISPLACEMENT, APPROACH, CROSSING, UNSETTLED = "displacement", "relative motion", "crossing", "contact states"
+WAY_OUT = {
+    DISPLACEMENT: "raise dda.max_displacement_ratio if motion need not be followed so finely",
+    APPROACH: "small blocks that move fast beside others shorten steps: merge them (geometry.smallest_block_m2)",
+    CROSSING: "what is thinner than a step's motion takes shorter steps: merge slivers (geometry.smallest_block_m2), or "
+    "shorten dda.time_step_s",
+    UNSETTLED: "shorten dda.time_step_s, or merge small blocks (geometry.smallest_block_m2)",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Used:
+    """The ``share`` of what it may move that a step has used; what has used it in words (``reason``), by its kind
+    (``why``) and its ``blocks``; and how far the pairs that touch have ``moved`` against each other."""
+
+    share: float
+    reason: str
+    moved: Windows
+    why: str
+    blocks: tuple[int, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Crossed:
     """What went into or through a block in a step: ``reason`` in words, the ``pairs`` (k, 2) of blocks concerned with
-    how far they moved against each other, ``motion`` (k,) m; and whether anything went ``through``."""
+    how far they moved against each other, ``motion`` (k,) m; whether anything went ``through``, and the worst two
+    ``blocks``."""
 
     reason: str
     pairs: np.ndarray
     motion: np.ndarray
     through: bool
+    blocks: tuple[int, int]
 
 
 class StepLimits:
@@ -78,9 +104,9 @@ class StepLimits:
             turn, centroid = shorter * carried[:, 2], np.ascontiguousarray(moments[:, 1:3])
             shorter, pair = self._finder.approach.longest(vertices, affine, turn, centroid, shorter, g)
         if pair is not None:
-            self._work.shortens("speed of two near blocks", *pair)
+            self.shortens(APPROACH, *pair)
         elif shorter < dt:
-            self._work.shortens("displacement", int(np.argmax(np.abs(carried[:, :2]).max(axis=1))))
+            self.shortens(DISPLACEMENT, int(np.argmax(np.abs(carried[:, :2]).max(axis=1))))
         return shorter
 
     def windows(
@@ -94,9 +120,8 @@ class StepLimits:
             vertices, affine_motion(dt * carried), np.ascontiguousarray(moments[:, 1:3]), fall, lift
         )
 
-    def used(self, attempt: Attempt, result: StepResult) -> tuple[float, str, Windows]:
-        """The part of what it may move that a step has used, what has used it, and how far the pairs that touch have
-        moved."""
+    def used(self, attempt: Attempt, result: StepResult) -> Used:
+        """What a step has used of what it may move."""
         affine = affine_motion(attempt.increment)
         closed = result.contacts[result.contacts["state"] != OPEN]
         n = len(self._size)
@@ -117,9 +142,10 @@ class StepLimits:
                 f"{abs(attempt.increment[a, 2] - attempt.increment[b, 2]):.3g} rad against each other, "
                 f"{shares[worst, 1]:.3g} times what their contacts are good for"
             )
-            return float(shares[worst, 1]), reason, moved
-        reason = f"a vertex moves {attempt.largest:.3g} m, the limit is {self.displacement:.3g} m"
-        return float(of_all), reason, moved
+            return Used(float(shares[worst, 1]), reason, moved, APPROACH, (a, b))
+        block = int(np.argmax(np.abs(attempt.increment[:, :2]).max(axis=1)))
+        reason = f"a vertex of {self._named(block)} moves {attempt.largest:.3g} m, the limit is {self.displacement:.3g} m"
+        return Used(float(of_all), reason, moved, DISPLACEMENT, (block,))
 
     def crossed(self, attempt: Attempt, result: StepResult) -> Crossed | None:
         """What has gone where contacts saw nothing come; None for nothing."""
@@ -155,12 +181,17 @@ class StepLimits:
         x, y = after[vertex[worst]]
         how = "goes through" if kind[worst] == THROUGH else f"goes {depth[worst]:.3g} m into"
         reason = f"a corner of {self._named(a)} {how} {self._named(b)} near x = {x:.6g}, y = {y:.6g} m"
-        return Crossed(reason, concerned, _WIDER * motion, bool((kind == THROUGH).any()))
+        return Crossed(reason, concerned, _WIDER * motion, bool((kind == THROUGH).any()), (a, b))
 
-    def cut(self, crossed: Crossed) -> None:
-        """Count a step that is cut since something went in."""
-        for a, b in crossed.pairs.tolist():
-            self._work.shortens("what went into a block", a, b)
+    def shortens(self, why: str, *blocks: int) -> None:
+        """Count a step that one block has shortened, or two; the first, the tenth, the hundredth … is logged."""
+        names = tuple(self._finder.names[b] for b in blocks[:2])
+        key = (why, *names, "", "")[:3]
+        self._work.shortened[key] += 1
+        count = self._work.shortened[key]
+        if math.log10(count).is_integer():
+            told = " and ".join(map(repr, names)) or "no one block"
+            log.info("%s: %s shortened a step for the %s time; %s", why, told, _ordinal(count), WAY_OUT[why])
 
     def _named(self, block: int) -> str:
         return repr(self._finder.names[block])
@@ -175,3 +206,7 @@ def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
         held.setdefault(b, {b}).add(a)
     nothing: set[int] = set()
     return np.array([bool(held.get(a, nothing) & held.get(b, nothing)) for a, b in pairs.tolist()], bool)
+
+
+def _ordinal(count: int) -> str:
+    return {1: "first", 10: "tenth", 100: "hundredth", 1000: "thousandth"}.get(count, f"{count}th")

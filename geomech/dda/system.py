@@ -23,7 +23,7 @@ from .rigid import with_rigid
 from .rounding import rounding_of
 from .step import CrackResponse, NotConverged, StepResult
 from .step_equations import Unsettled
-from .step_limits import StepLimits
+from .step_limits import CROSSING, UNSETTLED, StepLimits
 from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, at_their_springs, told_rows
@@ -220,7 +220,7 @@ class BlockSystem:
                 result = attempt.result()
             except Unsettled as failure:
                 failed = reason = f"{failure}{self.finder.where(found, failure.contact)}"
-                shorter = 0.5 * dt
+                shorter, guilty = 0.5 * dt, (UNSETTLED, *found.blocks_of(failure.contact))
             else:
                 bonded = result.contacts["bonded"]
                 lost = (bonded != found.bonded) & found.inset
@@ -232,14 +232,15 @@ class BlockSystem:
                     holds = found.relies_on_glue and not unheld
                     found = self.finder.find(state, vertices, near, holds, broken=broken)
                     continue
-                used, reason, moved = self.limits.used(attempt, result)
-                if used <= 1.0001 * most:
+                used = self.limits.used(attempt, result)
+                reason, guilty = used.reason, (used.why, *used.blocks)
+                if used.share <= 1.0001 * most:
                     crossed = self.limits.crossed(attempt, result)
                     if crossed is None:
                         self._refuse_crushed(result.state)
                         if failed:
                             log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
-                        result.statistics["limit_share"] = used
+                        result.statistics["limit_share"] = used.share
                         return result
                     wider = near.widened(crossed.pairs, crossed.motion, self.blocks.n_blocks)
                     if farther < _FARTHER and wider.reaches_beyond(near):
@@ -249,26 +250,27 @@ class BlockSystem:
                         continue
                     if cuts >= self.settings.max_step_cuts and not crossed.through:
                         log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
-                        result.statistics["limit_share"] = used
+                        result.statistics["limit_share"] = used.share
                         return result
-                    self.limits.cut(crossed)
                     failed = reason = crossed.reason
+                    guilty = CROSSING, *crossed.blocks
                     shorter, farther = 0.5 * dt, 0
-                elif used > 0.9 * before:
+                elif used.share > 0.9 * before:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
-                    most = 1.1 * used
-                    near = near.widened(moved.pairs, 1.1 * moved.reach, self.blocks.n_blocks)
+                    most = 1.1 * used.share
+                    near = near.widened(used.moved.pairs, 1.1 * used.moved.reach, self.blocks.n_blocks)
                     found = self.finder.find(state, vertices, near, found.relies_on_glue, broken=broken)
                     continue
                 else:
-                    before = used
-                    shorter = dt * float(min(0.8, max(0.05, 0.95 / used)))
+                    before = used.share
+                    shorter = dt * min(0.8, max(0.05, 0.95 / used.share))
             cuts += 1
             if cuts > self.settings.max_step_cuts:
                 raise NotConverged(
                     f"the block step at t = {state.time:g} s failed after {cuts - 1} cuts (dt = {dt:.3g} s): {reason}"
                 )
+            self.limits.shortens(*guilty)
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
 

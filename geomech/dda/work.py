@@ -17,7 +17,7 @@ class Work:
                                           before, from which the present one hardly differs
     pair_search_s, factorisation_s        what those that were made took, s, but for the first, which may have loaded
                                           kernels
-    shortened                             how often each (reason, block, other block or −1) has shortened a step
+    shortened                             how often each (reason, block's name, the other's or "") has shortened a step
     """
 
     pair_searches: int = 0
@@ -27,8 +27,4 @@ class Work:
     factorisations_kept: int = 0
     pair_search_s: float = 0.0
     factorisation_s: float = 0.0
-    shortened: Counter[tuple[str, int, int]] = field(default_factory=Counter)
-
-    def shortens(self, reason: str, block: int, other: int = -1) -> None:
-        """Count a step that is shortened for a ``reason`` that lies in one block, or in two."""
-        self.shortened[reason, block, other] += 1
+    shortened: Counter[tuple[str, str, str]] = field(default_factory=Counter)
