@@ -7,7 +7,7 @@ moves along with both nor what lies elsewhere counts. From the velocity V with w
     motion ≤ V dt + g dt²,      window = 1.1 (V dt + g dt²) + margin,
 
 bounds what a contact may be sought for. Contacts keep the lines and the edges of the step's start. A pair may therefore
-move by `SHARE` of the mean √(√A_a √A_b) of its blocks' sizes, after it has gone the way that lies between the two, and
+move by `SHARE` of the geometric mean of its blocks' sizes (`widths`), after it has gone the way that lies between the two, and
 turn by `TURN` against each other: what a third block is like does not matter, nor how the model lies. What is not
 foreseen (impacts, loads that set in) is checked after the step (`crossings`).
 """
@@ -21,7 +21,7 @@ import numpy as np
 from ..compiled import kept, part
 from .near_pairs import NearPairs, boxes
 
-#: Two blocks move against each other by this part of the geometric mean of their sizes, √area, in a step …
+#: Two blocks move against each other by this part of the geometric mean of their sizes in a step …
 SHARE = 0.1
 #: … and turn by this, rad: what lines of contacts that stay on the axes of the start are good for.
 TURN = 0.15
@@ -161,9 +161,16 @@ class Windows:
         return np.where(keys[at] == key, at, -1)
 
 
+def widths(vertices: np.ndarray, next_vertex: np.ndarray, vertex_start: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """(n_blocks,) m: what a block's contacts see of its size, √area, or where it is thin or has teeth 4 area/perimeter:
+    the side of a square, about twice the thickness of a wall."""
+    edges = np.hypot(*(vertices[next_vertex] - vertices).T)
+    return np.minimum(np.sqrt(area), 4.0 * area / np.add.reduceat(edges, vertex_start[:-1]))
+
+
 class Approach:
     """Pairs of one system of blocks that come near each other in a step. ``next_vertex`` (n_vertices,),
-    ``vertex_start`` (n_blocks + 1,), ``size`` (n_blocks,) √area, m; ``near`` finds pairs."""
+    ``vertex_start`` (n_blocks + 1,), ``size`` (n_blocks,) m as of `widths`; ``near`` finds pairs."""
 
     def __init__(self, next_vertex: np.ndarray, vertex_start: np.ndarray, size: np.ndarray, near: NearPairs) -> None:
         self._next, self._start, self._size, self._near = next_vertex, vertex_start, size, near

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from . import contact_rows
-from .approach import Approach, Windows
+from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
 from .contact_search import describe_contacts, find_contacts
 from .contact_set import ContactSet
@@ -74,6 +74,7 @@ class ContactFinder:
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
+        self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
         self._size = float(np.ptp(blocks.vertices, axis=0).max())
 
@@ -82,7 +83,7 @@ class ContactFinder:
         self._removed = removed
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
         self._near = NearPairs(self._start, self._fixed, self._work)
-        self.approach = Approach(self._next, self._start, np.sqrt(self._area), self._near)
+        self.approach = Approach(self._next, self._start, self.widths, self._near)
 
     def find(
         self,
@@ -340,7 +341,7 @@ class ContactFinder:
 
     def near_boxes(self, box: np.ndarray) -> np.ndarray:
         """(k, 2) all pairs of blocks whose boxes ``box`` (n_blocks, 4) meet, and some whose do not."""
-        return self._near.of_boxes(box, 0.1 * np.sqrt(self._area))
+        return self._near.of_boxes(box, 0.1 * self.widths)
 
     def may_touch(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) False for a ``vertex`` of which neither edge may touch the ``edge``, and for blocks that are taken out."""

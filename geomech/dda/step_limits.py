@@ -40,6 +40,8 @@ _WIDER = 1.5
 _MISFIT = 1e-3
 
 
+#: Overlaps that bring more than this part of the energy of all blocks in a step are none that they had.
+_GIVEN = 1e-3
 #: Why steps are shortened, and what to do about it.
 DISPLACEMENT, APPROACH, CROSSING, UNSETTLED = "displacement", "relative motion", "crossing", "contact states"
 WAY_OUT = {
@@ -77,13 +79,13 @@ class Crossed:
 
 
 class StepLimits:
-    """The limits of one system's steps. ``half_diagonal`` (m) of the domain, ``size`` (n_blocks,) √area, m."""
+    """The limits of one system's steps; ``half_diagonal`` (m) is that of the domain."""
 
     def __init__(
-        self, finder: ContactFinder, settings: DdaSettings, half_diagonal: float, size: np.ndarray,
-        vertex_start: np.ndarray, next_vertex: np.ndarray, work: Work,
+        self, finder: ContactFinder, settings: DdaSettings, half_diagonal: float, vertex_start: np.ndarray,
+        next_vertex: np.ndarray, work: Work,
     ) -> None:  # fmt: skip
-        self._finder, self._size, self._start, self._next = finder, size, vertex_start, next_vertex
+        self._finder, self._size, self._start, self._next = finder, finder.widths, vertex_start, next_vertex
         self.displacement = settings.max_displacement_ratio * half_diagonal
         self._work = work
 
@@ -182,6 +184,25 @@ class StepLimits:
         how = "goes through" if kind[worst] == THROUGH else f"goes {depth[worst]:.3g} m into"
         reason = f"a corner of {self._named(a)} {how} {self._named(b)} near x = {x:.6g}, y = {y:.6g} m"
         return Crossed(reason, concerned, _WIDER * motion, bool((kind == THROUGH).any()), (a, b))
+
+    def pressed_apart(self, attempt: Attempt, result: StepResult) -> Crossed | None:
+        """What pushes blocks apart out of which they have not come in: contacts that close in a step with a vertex that
+        lay behind their edge as it began, if that brings more than `_GIVEN` of the energy there is; not what was drawn
+        so. A shorter step looks for contacts less far away, and meets them where they are met first."""
+        energy = result.energy
+        if energy.overlap <= _GIVEN * max(energy.stored, energy.before) or not len(attempt.state.contacts):
+            return None
+        found, settled = attempt.found, attempt.settled
+        fresh = (found.state == OPEN) & (settled.state != OPEN)
+        given = np.where(fresh, found.springs.normal * np.minimum(found.gap_before, 0.0) ** 2, 0.0)
+        worst = int(np.argmax(given))
+        a, b = found.blocks_of(worst)
+        x, y = found.geometry[worst, 5:7]
+        reason = (
+            f"{self._named(a)} and {self._named(b)} overlap by {-found.gap_before[worst]:.3g} m near x = {x:.6g}, "
+            f"y = {y:.6g} m where they first touch"
+        )
+        return Crossed(reason, np.zeros((0, 2), np.int64), np.zeros(0), False, (a, b))
 
     def shortens(self, why: str, *blocks: int) -> None:
         """Count a step that one block has shortened, or two; the first, the tenth, the hundredth … is logged."""

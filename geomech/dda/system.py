@@ -110,7 +110,7 @@ class BlockSystem:
         self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
         self.rounding, self.rounding_told = rounding_of(vertices), False
         self.limits = StepLimits(
-            self.finder, self.settings, self.half_diagonal, np.sqrt(areas), self.vertex_start, self.next, self.work
+            self.finder, self.settings, self.half_diagonal, self.vertex_start, self.next, self.work
         )
         self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
 
@@ -236,6 +236,8 @@ class BlockSystem:
                 reason, guilty = used.reason, (used.why, *used.blocks)
                 if used.share <= 1.0001 * most:
                     crossed = self.limits.crossed(attempt, result)
+                    if crossed is None and cuts < self.settings.max_step_cuts:
+                        crossed = self.limits.pressed_apart(attempt, result)
                     if crossed is None:
                         self._refuse_crushed(result.state)
                         if failed:
@@ -255,7 +257,7 @@ class BlockSystem:
                     failed = reason = crossed.reason
                     guilty = CROSSING, *crossed.blocks
                     shorter, farther = 0.5 * dt, 0
-                elif used.share > 0.9 * before:
+                elif self.scheme.static and used.share > 0.9 * before:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     most = 1.1 * used.share
@@ -273,6 +275,9 @@ class BlockSystem:
             self.limits.shortens(*guilty)
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
+            if not self.scheme.static:
+                near = self._near(state, vertices, carried, moments, dt, gravity)
+                found = self.finder.find(state, vertices, near, found.relies_on_glue or not len(broken), broken=broken)
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
