@@ -63,6 +63,7 @@ class ContactFinder:
         self._stiff = ~np.isnan(self._table.normal_stiffness)
         self._stiff_along = ~np.isnan(self._table.shear_stiffness)
         self._by_length = self._stiff & self._stiff_along
+        self.has_face_nodes = bool(self._by_length.any())
         self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
         self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)

@@ -20,7 +20,7 @@ from ..compiled import kept, part
 
 #: Vertices may lie in a block by this part of the smaller block's size, √area, the radius of corners, …
 _DEPTH = 1e-5
-#: … and by so many times what the contacts of both blocks are pressed in by.
+#: … and by so many times what contacts at that vertex are pressed in by.
 _PRESSED = 2.0
 #: What goes round a corner may cut it: by this part of the smaller block's size, along the outline.
 _CORNER = 1e-2
@@ -96,7 +96,6 @@ def _find(pairs, before, after, next_vertex, start, box, pressed, size, found):
             continue
         smaller = min(size[a], size[b])
         least = _DEPTH * smaller
-        allowed = _PRESSED * min(pressed[a], pressed[b]) + least
         for role in range(2):
             i, j = (a, b) if role == 0 else (b, a)
             first, last = start[j], start[j + 1]
@@ -106,6 +105,7 @@ def _find(pairs, before, after, next_vertex, start, box, pressed, size, found):
                     continue
                 if max(y0, y1) < box[j, 1] or min(y0, y1) > box[j, 3]:
                     continue
+                allowed = _PRESSED * pressed[v] + least
                 kind, edge, depth = -1, -1, 0.0
                 now, near = _depth(x1, y1, after, next_vertex, first, last)
                 was, beside = np.inf, -1
@@ -169,8 +169,8 @@ def crossings(
     """Crossings of the ``pairs`` (k, 2) of blocks in a step from ``before`` to ``after`` (both (n_vertices, 2) m): pair,
     vertex, the edge that it went in by, kind, and depth, m, (n,) each.
 
-    ``box`` (n_blocks, 4) holds each block before and after; ``pressed`` (n_blocks,) m is the deepest that contacts of a
-    block are pressed in by, ``size`` (n_blocks,) √area, m.
+    ``box`` (n_blocks, 4) holds each block before and after; ``pressed`` (n_vertices,) m is the deepest that contacts at
+    a vertex are pressed in by, ``size`` (n_blocks,) √area, m.
     """
     room = 64
     while True:

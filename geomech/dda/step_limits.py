@@ -158,10 +158,7 @@ class StepLimits:
         box = np.concatenate([np.minimum(one[:, :2], two[:, :2]), np.maximum(one[:, 2:], two[:, 2:])], axis=1)
         pairs = self._finder.near_boxes(box)
         rows = result.contacts
-        pressed = np.zeros(len(self._size))
-        deep = np.where(rows["state"] != OPEN, np.maximum(0.0, -(rows["gap"] + rows["lift"])), 0.0)
-        np.maximum.at(pressed, rows["block"], deep)
-        np.maximum.at(pressed, rows["other"], deep)
+        pressed = self._pressed(rows, len(before))
         pair, vertex, edge, kind, depth = crossings(
             before, after, self._next, self._start, pairs, box, pressed, self._size
         )
@@ -185,6 +182,20 @@ class StepLimits:
         reason = f"a corner of {self._named(a)} {how} {self._named(b)} near x = {x:.6g}, y = {y:.6g} m"
         return Crossed(reason, concerned, _WIDER * motion, bool((kind == THROUGH).any()), (a, b))
 
+    def _pressed(self, rows: np.ndarray, n_vertices: int) -> np.ndarray:
+        """(n_vertices,) m: how deep CONTACT ``rows`` at each vertex, or at an edge that it ends, are pressed in. Nodes
+        within the faces of joints that give have no contacts: there it is the deepest of their block."""
+        deep = np.where(rows["state"] != OPEN, np.maximum(0.0, -(rows["gap"] + rows["lift"])), 0.0)
+        out = np.zeros(n_vertices)
+        if self._finder.has_face_nodes:
+            of_block = np.zeros(len(self._size))
+            for name in ("block", "other"):
+                np.maximum.at(of_block, rows[name], deep)
+            return np.repeat(of_block, np.diff(self._start))
+        for vertices in (rows["vertex"], rows["edge"], self._next[rows["edge"]]):
+            np.maximum.at(out, vertices, deep)
+        return out
+
     def pressed_apart(self, attempt: Attempt, result: StepResult) -> Crossed | None:
         """What pushes blocks apart out of which they have not come in: contacts that close in a step with a vertex that
         lay behind their edge as it began, if that brings more than `_GIVEN` of the energy there is; not what was drawn
@@ -192,25 +203,20 @@ class StepLimits:
         energy = result.energy
         if energy.overlap <= _GIVEN * max(energy.stored, energy.before) or not len(attempt.state.contacts):
             return None
-        found, settled = attempt.found, attempt.settled
-        fresh = (found.state == OPEN) & (settled.state != OPEN)
-        given = np.where(fresh, found.springs.normal * np.minimum(found.gap_before, 0.0) ** 2, 0.0)
-        worst = int(np.argmax(given))
-        a, b = found.blocks_of(worst)
-        x, y = found.geometry[worst, 5:7]
+        _, a, b, deep, x, y = result.overlap
         reason = (
-            f"{self._named(a)} and {self._named(b)} overlap by {-found.gap_before[worst]:.3g} m near x = {x:.6g}, "
-            f"y = {y:.6g} m where they first touch"
+            f"{self._named(a)} and {self._named(b)} overlap by {deep:.3g} m near x = {x:.6g}, y = {y:.6g} m where they "
+            "first touch"
         )
         return Crossed(reason, np.zeros((0, 2), np.int64), np.zeros(0), False, (a, b))
 
     def shortens(self, why: str, *blocks: int) -> None:
-        """Count a step that one block has shortened, or two; the first, the tenth, the hundredth … is logged."""
+        """Count a step that one block has shortened, or two; the tenth, the hundredth … is logged."""
         names = tuple(self._finder.names[b] for b in blocks[:2])
         key = (why, *names, "", "")[:3]
         self._work.shortened[key] += 1
         count = self._work.shortened[key]
-        if math.log10(count).is_integer():
+        if count > 1 and math.log10(count).is_integer():
             told = " and ".join(map(repr, names)) or "no one block"
             log.info("%s: %s shortened a step for the %s time; %s", why, told, _ordinal(count), WAY_OUT[why])
 
@@ -230,4 +236,4 @@ def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
 
 
 def _ordinal(count: int) -> str:
-    return {1: "first", 10: "tenth", 100: "hundredth", 1000: "thousandth"}.get(count, f"{count}th")
+    return {10: "tenth", 100: "hundredth", 1000: "thousandth"}.get(count, f"{count}th")
