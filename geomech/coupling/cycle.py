@@ -19,6 +19,7 @@ import numpy as np
 from .. import dda
 from ..dda.blas_threads import alike, asked_for, blas_threads
 from ..dda.excavation import until_next_event
+from ..dda.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
 from .balance import Balance, balanced
 from .budget_watch import BudgetWatch
@@ -93,7 +94,7 @@ class Coupling:
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
-        self.energy = BudgetWatch()
+        self.energy, self.overlaps = BudgetWatch(), OverlapWatch()
         self.under_way: UnderWay | None = None
         #: s, when the present load step began.
         self.began = self.now.state.time
@@ -239,6 +240,8 @@ class Coupling:
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual, now.crack_energy.uneven)
             self.energy.check(statistics["budget_residual"], result.state.time)
+            overlap = None if result.overlap is None else Overlap(*result.overlap)
+            self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
             if self.tips is not None and (len(tips) or found.left_out):
                 statistics["fastest_tip"] = self.tips.speed.fastest(whole)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics, found.left_out)
@@ -250,7 +253,7 @@ class Coupling:
                         growth_pass,
                     )
                 self.under_way = None
-                self.length.after(result, dt, now.system.allowed_ratio)
+                self.length.after(result, dt)
                 if self.tips is not None:
                     self.tips.end(tips, now.blocks, whole, now.loads)
                 now.take_step(result.state, budget)

@@ -34,7 +34,7 @@ SETTLED = 1e-6
 #: symmetry differ by the rounding of their paths, which must not part them.
 TOGETHER = 1e-3
 #: Forces are in equilibrium on the geometry at the start of a step. A step to an event that would move blocks by more
-#: than the first (in units of half the height, as ``max_displacement_ratio``) goes the second part of the way, and the
+#: than the first (in units of half the diagonal, as ``max_displacement_ratio``) goes the second part of the way, and the
 #: next one the rest: K at the event is then off by no more than the former, times what K depends on the shape of the
 #: blocks.
 NEAR, APPROACH = 1e-5, 0.98
@@ -193,4 +193,4 @@ class EventSteps:
         """The longest step, s, by how fast blocks have moved in the last one."""
         if not self._pace:
             return min(self._longest, math.inf if self._pace == 0 else self.time_step)
-        return min(self._longest, max(self.time_step, USE * now.system.allowed_ratio / self._pace))
+        return min(self._longest, max(self.time_step, USE * now.system.settings.max_displacement_ratio / self._pace))

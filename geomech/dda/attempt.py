@@ -516,7 +516,7 @@ class Attempt:
             "elastic_energy": energy.elastic,
             "contact_energy": energy.contact,
             "worst_penetration": _deepest(settled.state != OPEN, found.gap_before, settled.gap),
-            "max_displacement_ratio": self.largest / system.half_height,
+            "max_displacement_ratio": self.largest / system.half_diagonal,
             "unbalanced": residual,
             "unbalanced_ratio": ratio,
             **acted,
@@ -527,8 +527,17 @@ class Attempt:
         )  # fmt: skip
         return StepResult(
             new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, found.arcs,
-            statistics,
+            statistics, self._worst_overlap() if energy.overlap > 0.0 else None,
         )  # fmt: skip
+
+    def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
+        """As `overlap_energy.Overlap`: of the contact that closed where its vertex lay deepest in the springs' terms."""
+        found = self.found
+        fresh = (found.state == OPEN) & (self.settled.state != OPEN)
+        given = np.where(fresh, 0.5 * found.springs.normal * np.minimum(found.gap_before, 0.0) ** 2, 0.0)
+        worst = int(np.argmax(given))
+        x, y = found.geometry[worst, 5:7].tolist()
+        return float(given[worst]), *found.blocks_of(worst), -float(found.gap_before[worst]), x, y
 
     def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
         """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""

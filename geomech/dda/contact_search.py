@@ -151,23 +151,24 @@ class Corners(NamedTuple):
 def find_contacts(
     vertices, next_vertex, previous_vertex, vertex_start, pairs, window, old_keys, corners
 ) -> tuple[np.ndarray, np.ndarray]:
-    """All contacts of the ``pairs`` (k, 2) of blocks, the lower number first, that are nearer than ``window`` (m), pair
-    by pair: a table (n, 4) of vertex, edge, the corner of the edge's block that the vertex meets where it is two rounded
-    corners that meet (−1: a vertex meets a line), and whether corners that meet on a line may overlap by a step that rounding smooths (1, else 0); and (n, 3) the
-    normal that pushes the vertex's block and the gap (m) of rounded corners.
+    """All contacts of the ``pairs`` (k, 2) of blocks, the lower number first, that are nearer than ``window`` (m, of all or
+    (k,) of each), pair by pair: a table (n, 4) of vertex, edge, the corner of the edge's block that the vertex meets where
+    it is two rounded corners that meet (−1: a vertex meets a line), and whether corners that meet on a line may overlap
+    by a step that rounding smooths (1, else 0); and (n, 3) the normal that pushes the vertex's block and the gap (m) of
+    rounded corners.
+
 
     ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
     representations of a corner on a corner is kept, so that contacts do not change names on round-off; ``corners`` is a
     `Corners`.
     """
     box = boxes(vertices, vertex_start[:-1])
-    room = 32 + 8 * len(box)
+    room, windows = 32 + 8 * len(box), _each(window, len(pairs))
     while True:
         table, met = np.empty((room, 4), np.int64), np.zeros((room, 3))
         count = _look_at(
-            table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, float(window), old_keys,
-            *corners,
-        )  # fmt: skip
+            table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys, *corners
+        )
         if count >= 0:
             return table[:count], met[:count]
         room *= 2
@@ -187,11 +188,11 @@ def convex_corners(vertices, next_vertex, previous_vertex):
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _look_at(
-    table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, window, old_keys, convex, rounding,
+    table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys, convex, rounding,
     longest, pressed, motion, margin,
 ):  # fmt: skip
-    """Fill ``table`` and ``met`` with the contacts of ``pairs`` and return their number, or −1 when they have no room
-    for them.
+    """Fill ``table`` and ``met`` with the contacts of ``pairs`` within ``windows`` (k,) and return their number, or −1
+    when they have no room for them.
 
     ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y.
     """
@@ -204,7 +205,7 @@ def _look_at(
     )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside, sine away from it
     twin = np.empty(4, np.int64)  # the other end of the same face
     for pair in range(pairs.shape[0]):
-        a, b = pairs[pair, 0], pairs[pair, 1]
+        a, b, window = pairs[pair, 0], pairs[pair, 1], windows[pair]
         if box[a, 0] > box[b, 2] + window or box[b, 0] > box[a, 2] + window:
             continue
         if box[a, 1] > box[b, 3] + window or box[b, 1] > box[a, 3] + window:
@@ -361,17 +362,33 @@ def _look_at(
     return count
 
 
-@kept(fastmath=False, error_model="numpy", nogil=True)
+def _each(window, n: int) -> np.ndarray:
+    """(n,) m: one ``window`` for all, or each its own."""
+    return np.ascontiguousarray(np.broadcast_to(np.asarray(window, float), n))
+
+
 def describe_contacts(
     table, met, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
-):
-    """Geometry of the rows of `find_contacts`, ``table`` and ``met``, and what they inherit.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Geometry of the rows of `find_contacts`, ``table`` and ``met``, and what they inherit; ``window`` m, of all or (n,)
+    of each.
 
     Returns (geometry, mate, parent): geometry (n, 7) = position, normal x, y, gap, tributary length, vertex x, y; mate
     (n,) the edge of the vertex's own block that faces the touched edge; parent (n,) the row of the last step's contacts
     whose force and slip it continues, −1 if new.
     The tributary length is half the overlap of the faces that meet there, 0 for a lone corner.
     """
+    return _describe(
+        table, met, vertices, next_vertex, previous_vertex, _each(window, len(table)), old_vertex, old_edge, old_normal,
+        old_order,
+    )  # fmt: skip
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _describe(
+    table, met, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
+):  # fmt: skip
+    """As `describe_contacts`, each row with its own ``window`` (n,)."""
     n, n_vertices = table.shape[0], vertices.shape[0]
     geometry = np.empty((n, 7))
     mate = np.empty(n, np.int64)
@@ -435,7 +452,7 @@ def describe_contacts(
         nx, ny = geometry[row, 1], geometry[row, 2]
         for corner in (edge, next_vertex[edge]):
             dx, dy = vertices[vertex, 0] - vertices[corner, 0], vertices[vertex, 1] - vertices[corner, 1]
-            if dx * dx + dy * dy > 2.25 * window * window:
+            if dx * dx + dy * dy > 2.25 * window[row] * window[row]:
                 continue
             for c in range(4):
                 # The same meeting under another name: the next edge round the corner, or the roles exchanged.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model import CONTACT, OPEN, SLIP
+from ..model import CONTACT, SLIP
 from .bonded_faces import BondedFaces
 from .contact_rows import fill
 from .contact_springs import Springs
@@ -196,6 +196,11 @@ class ContactSet:
     def gap(self) -> np.ndarray:
         """(n,) m: the gap from which the step's straight motion leads to the one at its end."""
         return self.gap_before + self.arc
+
+
+    def blocks_of(self, contact: int) -> tuple[int, ...]:
+        """The two blocks of a ``contact``; none for −1."""
+        return () if contact < 0 else (int(self.block[contact]), int(self.other[contact]))
 
     def __len__(self) -> int:
         return len(self.vertex)

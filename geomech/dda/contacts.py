@@ -9,12 +9,14 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from . import contact_rows
+from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
 from .contact_search import Corners, convex_corners, describe_contacts, find_contacts
 from .contact_set import ContactSet
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
+from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
@@ -61,6 +63,7 @@ class ContactFinder:
         self._stiff = ~np.isnan(self._table.normal_stiffness)
         self._stiff_along = ~np.isnan(self._table.shear_stiffness)
         self._by_length = self._stiff & self._stiff_along
+        self.has_face_nodes = bool(self._by_length.any())
         self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
         self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
         self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
@@ -72,7 +75,10 @@ class ContactFinder:
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
         self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
+        #: (n_vertices,) m: the lengths over which corners are rounded.
+        self.rounding = np.minimum(self._rounding, self._longest)
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
+        self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
         self._size = float(np.ptp(blocks.vertices, axis=0).max())
 
@@ -81,39 +87,39 @@ class ContactFinder:
         self._removed = removed
         self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
         self._near = NearPairs(self._start, self._fixed, self._work)
+        self.approach = Approach(self._next, self._start, self.widths, self._near)
 
     def find(
         self,
         state: State,
         vertices: np.ndarray,
-        window: float,
+        window: float | Windows,
         glue_holds: bool = True,
         lumped: bool = False,
         broken: np.ndarray | None = None,
         motion: np.ndarray | None = None,
         margin: float = np.inf,
     ) -> ContactSet:
-        """Every vertex within ``window`` (m) of an edge it may touch, with what ``state.contacts`` remembers of it;
+        """Every vertex within ``window`` (m, of all pairs of blocks or of each) of an edge it may touch, with what ``state.contacts`` remembers of it;
         without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
         (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
         it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""
         old = np.ascontiguousarray(state.contacts)
         old_vertex, old_edge, keys, old_normal, lift, gap = contact_rows.names(old, len(vertices))
-        # Faces that slid apart press at a distance, those that do not fit pass each other by as much; what soft springs
-        # have let in deeper than that touches still.
-        window = max(window + lift, -_DEEPER * gap)
+        near = self._reaching(window, vertices, old, lift, gap)
         rank = np.argsort(keys, kind="stable")
         corners = Corners(
             convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
             np.zeros_like(vertices) if motion is None else motion, float(margin) + lift,
         )  # fmt: skip
         table, met = find_contacts(
-            vertices, self._next, self._previous, self._start, self._near.of(vertices, window), window, keys[rank],
-            corners,
-        )  # fmt: skip
+            vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
+        )
+        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]))
+        at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
-            table, met, vertices, self._next, self._previous, window, old_vertex, old_edge, old_normal, rank
+            table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
         )
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
@@ -212,6 +218,37 @@ class ContactFinder:
             out = found.inset & ~kept
             found = _at_their_corners(found, placed(found.inset) if out.any() else None, out, inside & kept)
         return replace(found, by_length=self._stiff_along[law]).placed(points)
+
+    def _reaching(
+        self, window: float | Windows, vertices: np.ndarray, old: np.ndarray, lift: float, gap: float
+    ) -> Windows:
+        """``window`` of each pair, wide enough for what the contacts ``old`` hold: faces that slid apart press at a
+        distance, those that do not fit pass each other by as much; what soft springs have let in deeper than that touches
+        still. ``lift`` is the largest, ``gap`` the lowest of them."""
+        if not isinstance(window, Windows):
+            pairs = self._near.of(vertices, max(window + lift, -_DEEPER * gap))
+            window = Windows(pairs, np.full(len(pairs), window))
+        if not len(window.pairs) or (lift == 0.0 and -_DEEPER * gap <= window.reach.min()):
+            return window
+        reach = window.reach.copy()
+        at = window.of_contacts(old["block"], old["other"], len(self._area))
+        known, wide = at >= 0, np.zeros(len(reach))
+        np.maximum.at(wide, at[known], np.abs(old["lift"][known]))
+        reach += wide
+        deep = known & (old["state"] != OPEN)
+        np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
+        return Windows(window.pairs, reach)
+
+    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray):
+        """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
+        (sorted keys), and corners that meet corners, have."""
+        vertex, edge = table[:, 0], table[:, 1]
+        keep = from_outside(
+            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            self._owner, closed,
+        )  # fmt: skip
+        keep |= table[:, 2] >= 0
+        return (table, met) if keep.all() else (table[keep], met[keep])
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
@@ -331,24 +368,35 @@ class ContactFinder:
             law = self._law_of[a, b]
         return law
 
-    def pairs(self, vertices: np.ndarray, window: float) -> np.ndarray:
-        """(k, 2) all blocks that may be nearer to each other than ``window`` m on ``vertices``, and some that are not."""
-        return self._near.of(vertices, window)
+    def near_boxes(self, box: np.ndarray) -> np.ndarray:
+        """(k, 2) all pairs of blocks whose boxes ``box`` (n_blocks, 4) meet, and some whose do not."""
+        return self._near.of_boxes(box, 0.1 * self.widths)
+
+    def may_touch(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) False for a ``vertex`` of which neither edge may touch the ``edge``, and for blocks that are taken out."""
+        law = np.maximum(self._laws(edge, vertex), self._laws(edge, self._previous[vertex]))
+        out = law != _NEVER
+        if self._removed is not None:
+            out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
+        return out
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
         """(n,) m of the contacts ``found`` on the geometry ``before``, at their corners, once the blocks are where
         ``vertices`` are."""
-        vertex, edge = found.vertex, found.edge
-        start = vertices[edge]
-        along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
-        gap = (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
+        gap = self._off_lines(vertices, found.vertex, found.edge)
         rounded = np.flatnonzero(found.corner >= 0)
         if len(rounded):
-            v, w = vertex[rounded], found.corner[rounded]
+            v, w = found.vertex[rounded], found.corner[rounded]
             moved = vertices[v] - vertices[w] - (before[v] - before[w])
             normal = found.geometry[rounded, 1:3]
             gap[rounded] = found.geometry[rounded, 3] + np.einsum("na,na->n", moved, normal)
         return gap
+
+    def _off_lines(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""
+        start = vertices[edge]
+        along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
+        return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""

@@ -274,7 +274,7 @@ class EnergyBudget:
 
     work       weight and loads
     losses     friction, damping, bonds, time scheme, carried velocity, cracks
-    overlap    brought in by blocks that overlapped
+    overlap    brought in by blocks that overlapped, and of that ``drawn`` in the first step, as blocks were drawn
     start      stored as the first step began
     stored     stored now
     split      stored energy that has changed because blocks were cut or dug out (`cut`)
@@ -291,6 +291,7 @@ class EnergyBudget:
     turnover: float = 0.0
     is_cut: bool = False
     warned: float = GAIN
+    drawn: float = 0.0
 
     def after(self, step: StepEnergy, time: float = float("nan")) -> EnergyBudget:
         """The budget with one more step; logs a warning, naming ``time``, when energy has come from nowhere."""
@@ -312,13 +313,14 @@ class EnergyBudget:
                 time, gain, gain / turnover,
             )  # fmt: skip
             warned = 2.0 * gain / turnover
-        return EnergyBudget(self.steps + 1, step, start, totals, split, residual, turnover, False, warned)
+        drawn = step.overlap if first else self.drawn
+        return EnergyBudget(self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn)
 
     def cut(self) -> EnergyBudget:
         """The same as the next step finds blocks cut or dug out: what that changes is no residual."""
         return EnergyBudget(
             self.steps, self.last, self.start, self.totals, self.split, self.residual, self.turnover,
-            self.last is not None, self.warned,
+            self.last is not None, self.warned, self.drawn,
         )  # fmt: skip
 
     def __getattr__(self, name: str) -> float:
@@ -330,6 +332,12 @@ class EnergyBudget:
     @property
     def work(self) -> float:
         return self.gravity_work + self.load_work
+
+    @property
+    def by_overlap(self) -> float:
+        """What overlaps have brought in that were not drawn, as a part of all energy turned over."""
+        brought = self.overlap - self.drawn
+        return brought / self.turnover if brought > 0.0 else 0.0
 
     @property
     def losses(self) -> float:

@@ -161,7 +161,7 @@ def equilibrium(
                     f"no equilibrium: blocks have moved {travelled.max():.3g} m, and {_IN_VAIN} steps brought no more "
                     "balance",
                 )  # fmt: skip
-        moves_far = statistics["max_displacement_ratio"] > _NEARLY * static.allowed_ratio
+        moves_far = statistics["limit_share"] > _NEARLY
         dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
     return answer(False, False, f"unbalanced force {history[-1]['unbalanced']:.2g} after {max_steps} steps")
 

@@ -42,6 +42,11 @@ def _affine(increment, part):
     return out
 
 
+def affine_motion(increment: np.ndarray) -> np.ndarray:
+    """(n_blocks, 6) displacement of each centroid and its gradient, row by row, that `advance` makes of ``increment``."""
+    return _affine(increment, 1.0)
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _moved(points, owner, affine, centroid):
     out = np.empty_like(points)

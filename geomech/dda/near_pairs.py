@@ -84,7 +84,8 @@ class NearPairs:
     def __init__(self, vertex_start: np.ndarray, fixed: np.ndarray, work: Work | None = None) -> None:
         self._first, self._fixed = vertex_start[:-1], fixed
         self._vertices: np.ndarray | None = None
-        self._pairs = np.empty((0, 2), np.int64)
+        self._kept: np.ndarray | None = None
+        self._pairs = self._in_boxes = np.empty((0, 2), np.int64)
         self._reach = 0.0
         self.work = work or Work()
 
@@ -104,6 +105,23 @@ class NearPairs:
         else:
             self.work.pair_searches_kept += 1
         return self._pairs
+
+    def of_boxes(self, box: np.ndarray, more: np.ndarray) -> np.ndarray:
+        """All pairs whose boxes ``box`` (n_blocks, 4) meet, and some others: those that did when pairs were last sought,
+        with boxes wider by ``more`` (n_blocks,) m than they were then, as long as these hold the present ones."""
+        if len(self._first) < 2:
+            self.work.lone_searches += 1
+            return np.zeros((0, 2), np.int64)
+        if self._kept is None or not _hold(self._kept, box):
+            began = time.perf_counter()
+            more = (_REACH - 1.0) * more
+            self._kept = box + np.stack([-more, -more, more, more], axis=1)
+            self._in_boxes = near_pairs(self._kept, self._fixed, 0.0)
+            self.work.pair_search_s += (time.perf_counter() - began) if self.work.pair_searches else 0.0
+            self.work.pair_searches += 1
+        else:
+            self.work.pair_searches_kept += 1
+        return self._in_boxes
 
 
 def boxes(vertices: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -126,3 +144,12 @@ def _boxes(vertices, first):
             y0, y1 = min(y0, y), max(y1, y)
         out[b, 0], out[b, 1], out[b, 2], out[b, 3] = x0, y0, x1, y1
     return out
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _hold(wide, box):
+    """Whether each of the boxes ``wide`` (n, 4) holds the one of ``box``."""
+    for b in range(box.shape[0]):
+        if box[b, 0] < wide[b, 0] or box[b, 1] < wide[b, 1] or box[b, 2] > wide[b, 2] or box[b, 3] > wide[b, 3]:
+            return False
+    return True

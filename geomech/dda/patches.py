@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from . import assembly
-from .contact_set import ContactSet
 from .contact_springs import Springs
 from .contact_states import moved
 from .step_equations import Answer, Equations, Settled, States, Unsettled

@@ -11,6 +11,7 @@ from .elastic_range import ElasticRange
 from .energy import EnergyBudget
 from .equilibrium import equilibrium
 from .excavation import until_next_event
+from .overlap_energy import Overlap, OverlapWatch
 from .step import NotConverged, StepResult
 from .step_length import StepLength
 from .system import BlockSystem
@@ -20,16 +21,19 @@ log = logging.getLogger(__name__)
 
 @dataclass(eq=False)
 class _Watch:
-    """What is told of steps: energy that comes from nowhere, strains that are no longer elastic."""
+    """What is told of steps: energy that comes from nowhere or by overlaps, strains that are no longer elastic."""
 
     blocks: Blocks
     budget: EnergyBudget = field(default_factory=EnergyBudget)
     range: ElasticRange = field(default_factory=ElasticRange)
+    overlaps: OverlapWatch = field(default_factory=OverlapWatch)
 
     def look(self, before: State, result: StepResult) -> None:
         state = result.state
         budget = self.budget.cut() if state.removed is not before.removed else self.budget
         self.budget = budget.after(result.energy, state.time)
+        overlap = None if result.overlap is None else Overlap(*result.overlap)
+        self.overlaps.check(self.budget, overlap, self.blocks.names, state.time)
         self.range.check(Motion.of(self.blocks, state.vertices), self.blocks, state.time)
 
     def set_down(self) -> None:
@@ -80,7 +84,7 @@ def run(
             state = _at_rest(system, state, loads, load_time)
             watched.set_down()
         result = system.step(state, loads, dt, load_time=load_time)
-        length.after(result, dt, system.allowed_ratio)
+        length.after(result, dt)
         watched.look(state, result)
         if watch is not None:
             watch(result)

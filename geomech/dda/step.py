@@ -48,8 +48,10 @@ class StepResult:
     turn           (n_blocks,) rad, by which blocks have turned there since the step began
     arcs           (n_contacts,) m each, the arc and the swing that the contacts have followed (`contact_set`)
     reserve        (n_contacts,) N, how far each of ``contacts`` is from leaving its state (`contact_states.reserves`)
+    overlap        the overlap that brought most energy into the step; None where none did
     statistics     open_close_iterations, dt, step_cuts, kinetic_energy, elastic_energy, contact_energy (J/m),
-                   worst_penetration (m), max_displacement_ratio, unbalanced (largest residual of the equations of
+                   worst_penetration (m), max_displacement_ratio, limit_share (the part of what a step may
+                   move that it has used), unbalanced (largest residual of the equations of
                    motion over the largest force in them), unbalanced_ratio (0 at rest, 1 in free flight: see
                    `imbalance`)
     """
@@ -65,6 +67,7 @@ class StepResult:
     turn: np.ndarray
     arcs: tuple[np.ndarray, np.ndarray]
     statistics: dict[str, float] = field(default_factory=dict)
+    overlap: tuple[float, int, int, float, float, float] | None = None
 
 
 def contact_resultants(contacts: np.ndarray, n_blocks: int, about: np.ndarray) -> np.ndarray:

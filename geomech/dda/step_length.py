@@ -30,9 +30,8 @@ class StepLength:
         longest = self.settings.time_step
         self.dt = FIRST * longest if self.settings.automatic_time_step else longest
 
-    def after(self, result: StepResult, asked: float, allowed: float) -> None:
-        """Take account of a step that was to last ``asked`` s; ``allowed`` is the displacement ratio that none exceeds
-        (`BlockSystem.allowed_ratio`)."""
+    def after(self, result: StepResult, asked: float) -> None:
+        """Take account of a step that was to last ``asked`` s."""
         if not self.settings.automatic_time_step:
             return
         facts = result.statistics
@@ -40,7 +39,7 @@ class StepLength:
         if asked < self.dt or (result.dt < asked and not cut):
             # The run or a stage ended in it, or speed alone shortened it: no sign of how a whole step would have gone.
             return
-        share = facts["max_displacement_ratio"] / allowed
+        share = facts["limit_share"]
         factor = min(GROWTH, USE / share) if share > 0.0 else GROWTH
         if cut:
             factor = min(factor, 1.0)

@@ -139,7 +139,7 @@ def stop(
     """(n_free, 6) m: Δd by whose rate 2 Δd/dt the velocities change, in the unknowns of `assembly`; and the energy (J/m)
     that friction takes thereby. ``matrix`` (n, 6, 6) and ``vectors`` (n_contacts, 2, 12) as solved with. Raises
     numpy.linalg.LinAlgError."""
-    springs, n, nothing = settled.springs, len(found), np.zeros(len(found))
+    springs, nothing = settled.springs, np.zeros(len(found))
     apart, along = (nothing, nothing) if unresolved is None else (unresolved.apart, unresolved.along)
     data, side = np.empty(pattern.size), np.empty(6 * pattern.n)
 

@@ -10,42 +10,36 @@ import numpy as np
 
 from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
+from .approach import Windows
 from .attempt import Attempt
 from .contact_set import ContactSet
 from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
 from .middle import Middle
-from .moments import block_moments, fastest_vertex
+from .moments import block_moments
 from .open_close import MANY
 from .overlap import refuse_overlap
 from .rigid import with_rigid
 from .rounding import rounding_of
 from .step import CrackResponse, NotConverged, StepResult
 from .step_equations import Unsettled
+from .step_limits import CROSSING, UNSETTLED, StepLimits
 from .stray_loads import StrayLoads
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts, at_their_springs, told_rows
-from .turned_in import turned_in
 from .work import Work
 
 log = logging.getLogger(__name__)
 
-#: Contacts are sought within this many times the largest displacement of a step: two blocks may approach each other.
-_WINDOW = 2.2
-#: No step moves a vertex by more than this part of the smallest block's size, √area, whatever the settings allow.
-_BLOCK_SHARE = 0.1
-#: A step that speed limits uses this part of what it may move: round-off, arcs and what blocks hit take the rest, so
-#: that it need not be cut.
-_AIM = 0.99
 #: A hasty step that has been cut so often takes its time.
 PATIENT_AFTER = 3
+#: Contacts of one step are sought anew, farther, so often at most; then it is cut.
+_FARTHER = 6
 #: A step is begun again so often where corners meet in another direction than was expected, …
 _REDIRECTED = 3
 #: … by more than this angle (cosine).
 _OTHER_WAY = 0.95
-#: Corners are looked for that come nearer than expected by this part of the largest motion of a step.
-_SPARE = 0.01
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
 
@@ -57,7 +51,7 @@ class _Search:
     finder: ContactFinder
     state: State
     vertices: np.ndarray
-    window: float
+    near: Windows
     motion: np.ndarray | None
     margin: float
     glue_holds: bool = True
@@ -65,7 +59,7 @@ class _Search:
 
     def find(self) -> ContactSet:
         return self.finder.find(
-            self.state, self.vertices, self.window, self.glue_holds, broken=self.broken, motion=self.motion,
+            self.state, self.vertices, self.near, self.glue_holds, broken=self.broken, motion=self.motion,
             margin=self.margin,
         )  # fmt: skip
 
@@ -138,10 +132,10 @@ class BlockSystem:
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self._refuse_massless()
         self.mass = self.density * areas
-        self.half_height = 0.5 * float(np.ptp(vertices[:, 1]))
+        self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
         self.rounding, self.rounding_told = rounding_of(vertices), False
-        self.step_limit = min(
-            self.settings.max_displacement_ratio * self.half_height, _BLOCK_SHARE * float(np.sqrt(areas.min()))
+        self.limits = StepLimits(
+            self.finder, self.settings, self.half_diagonal, self.vertex_start, self.next, self.work
         )
         self.allowed_penetration = self._allowed_penetration(float(np.sqrt(areas.min())))
 
@@ -164,9 +158,9 @@ class BlockSystem:
             )
 
     @property
-    def allowed_ratio(self) -> float:
-        """The largest displacement that a step may bring, in units of half the height."""
-        return self.step_limit / self.half_height
+    def step_limit(self) -> float:
+        """The largest displacement of a vertex that a step may bring, m."""
+        return self.limits.displacement
 
     def in_statics(self) -> BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
@@ -229,12 +223,9 @@ class BlockSystem:
             refuse_overlap(self.blocks, vertices, moments)
             self._excavations.refuse(loads)
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
-        limit = self.step_limit
-        dt = self._foreseen(vertices, carried, moments, loads, state.time, dt, limit)
-        search = _Search(
-            self.finder, state, vertices, _WINDOW * limit, self._expected_motion(vertices, carried, moments, dt),
-            np.inf if self.scheme.static else self._margin(loads, state.time, dt),
-        )  # fmt: skip
+        gravity = loads.gravity.at(state.time + dt)
+        dt = self.limits.foreseen(vertices, carried, moments, dt, gravity)
+        search = self._search(state, vertices, carried, moments, dt, gravity)
         found = search.find()
         if like is not None:
             found = found.like(like.state.contacts)
@@ -242,7 +233,7 @@ class BlockSystem:
                 # (In motion the step's arcs are those that the velocity foresees.)
                 found = found.along(*like.arcs)
         reason, before = "", np.inf
-        cuts, asked, failed, redirected = 0, dt, "", 0
+        cuts, asked, failed, most, farther, redirected = 0, dt, "", 1.0, 0, 0
         while True:
             # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
             attempt = result = None
@@ -251,10 +242,10 @@ class BlockSystem:
                     self, state, vertices, carried, moments, loads, dt, crack, found, cuts, load_time,
                     patient=not hasty or cuts >= PATIENT_AFTER,
                 )  # fmt: skip
-                result, largest = attempt.result(), attempt.largest
+                result = attempt.result()
             except Unsettled as failure:
                 failed = reason = f"{failure}{self.finder.where(found, failure.contact)}"
-                shorter = 0.5 * dt
+                shorter, guilty = 0.5 * dt, (UNSETTLED, *found.blocks_of(failure.contact))
             else:
                 bonded = result.contacts["bonded"]
                 lost = (bonded != found.bonded) & found.inset
@@ -272,46 +263,71 @@ class BlockSystem:
                     if again is not None:
                         redirected, found = redirected + 1, again
                         continue
-                if largest <= 1.0001 * limit:
-                    unseen = self._turned_in(attempt, result, _WINDOW * limit)
-                    if unseen and cuts < self.settings.max_step_cuts:
-                        cuts, dt = cuts + 1, 0.5 * dt
-                        failed = unseen
+                used = self.limits.used(attempt, result)
+                reason, guilty = used.reason, (used.why, *used.blocks)
+                if used.share <= 1.0001 * most:
+                    crossed = self.limits.crossed(attempt, result)
+                    if crossed is None and cuts < self.settings.max_step_cuts:
+                        crossed = self.limits.pressed_apart(attempt, result)
+                    if crossed is None:
+                        self._refuse_crushed(result.state)
+                        if failed:
+                            log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
+                        result.statistics["limit_share"] = used.share
+                        return result
+                    wider = search.near.widened(crossed.pairs, crossed.motion, self.blocks.n_blocks)
+                    if farther < _FARTHER and wider.reaches_beyond(search.near):
+                        # What went in met no contact: with it the step may be as long.
+                        search.near, search.motion, farther = wider, attempt.new_vertices - vertices, farther + 1
+                        search.glue_holds = found.relies_on_glue
+                        found = search.find()
                         continue
-                    if unseen:
-                        log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, unseen)
-                    self._refuse_crushed(result.state)
-                    if failed:
-                        log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
-                    return result
-                reason = f"a vertex moves {largest:.3g} m, the limit is {limit:.3g} m"
-                if largest > 0.9 * before:
+                    if cuts >= self.settings.max_step_cuts and not crossed.through:
+                        log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
+                        result.statistics["limit_share"] = used.share
+                        return result
+                    failed = reason = crossed.reason
+                    guilty = CROSSING, *crossed.blocks
+                    shorter, farther = 0.5 * dt, 0
+                elif self.scheme.static and used.share > 0.9 * before:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
-                    limit = 1.1 * largest
-                    search.window, search.glue_holds = _WINDOW * limit, found.relies_on_glue
+                    most = 1.1 * used.share
+                    search.near = search.near.widened(used.moved.pairs, 1.1 * used.moved.reach, self.blocks.n_blocks)
+                    search.glue_holds = found.relies_on_glue
                     found = search.find()
                     continue
-                before = largest
-                shorter = dt * float(min(0.8, max(0.05, 0.95 * limit / largest)))
+                else:
+                    before = used.share
+                    shorter = dt * min(0.8, max(0.05, 0.95 / used.share))
             cuts += 1
             if cuts > self.settings.max_step_cuts:
                 raise NotConverged(
                     f"the block step at t = {state.time:g} s failed after {cuts - 1} cuts (dt = {dt:.3g} s): {reason}"
                 )
+            self.limits.shortens(*guilty)
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
+            if not self.scheme.static:
+                shorter = self._search(state, vertices, carried, moments, dt, gravity)
+                search.near, search.motion, search.margin = shorter.near, shorter.motion, shorter.margin
+                search.glue_holds = found.relies_on_glue or not len(search.broken)
+                found = search.find()
+
+    def _search(self, state, vertices, carried, moments, dt, gravity) -> _Search:
+        """How a step of ``dt`` looks for contacts. Two corners may come nearer by their weight than their velocities say;
+        what comes nearer still is looked for once the step is known."""
+        return _Search(
+            self.finder, state, vertices, self._near(state, vertices, carried, moments, dt, gravity),
+            self._expected_motion(vertices, carried, moments, dt),
+            np.inf if self.scheme.static else dt * dt * float(np.hypot(*gravity)),
+        )  # fmt: skip
 
     def _expected_motion(self, vertices, carried, moments, dt) -> np.ndarray | None:
         """(n_vertices, 2) m: what the velocities ``carried`` make of a step of ``dt``; None where there are none."""
         if not carried.any():
             return None
         return Middle.of(dt * carried, 1.0, vertices, self.owner, moments).vertices - vertices
-
-    def _margin(self, loads: Loads, time: float, dt: float) -> float:
-        """m: by which two corners may come nearer in a step of ``dt`` than their velocities say, by weight and a little
-        of the largest motion; what comes nearer still is looked for once the step is known."""
-        return dt * dt * float(np.hypot(*loads.gravity.at(time + dt))) + _SPARE * self.step_limit
 
     def _with_corners_of(self, attempt: Attempt, search: _Search, state: np.ndarray) -> ContactSet | None:
         """The contacts with which the step is to be begun again because corners have met on the way that the ``attempt``
@@ -348,7 +364,18 @@ class BlockSystem:
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
-        return self.finder.find(state, np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit, lumped=True)
+        vertices = np.ascontiguousarray(state.vertices)
+        return self.finder.find(state, vertices, self._standing(state, vertices), lumped=True)
+
+    def _near(self, state, vertices, carried, moments, dt, gravity) -> Windows:
+        """Where a step of ``dt`` looks for contacts."""
+        lift = float(np.abs(state.contacts["lift"]).max(initial=0.0))
+        return self.limits.windows(vertices, carried, moments, dt, gravity, lift)
+
+    def _standing(self, state: State, vertices: np.ndarray) -> Windows:
+        """Where blocks that stand look for contacts."""
+        moments = block_moments(vertices, self.next, self.vertex_start)
+        return self._near(state, vertices, np.zeros_like(state.velocity), moments, 0.0, np.zeros(2))
 
     def told(self, state: State, found: ContactSet, forces: ToldContacts) -> np.ndarray:
         """CONTACT rows of ``found``, the contacts near ``state``, as ``forces`` say where they tell of one: for a
@@ -359,8 +386,8 @@ class BlockSystem:
             return self.finder.on_penalty(contacts)[0] if held else np.zeros(len(contacts), bool)
 
         rows = told_rows(found, forces, self.finder.closure, on_multiplier(found))
-        vertices, window = np.ascontiguousarray(state.vertices), _WINDOW * self.step_limit
-        placed = self.finder.find(replace(state, contacts=rows), vertices, window)
+        vertices = np.ascontiguousarray(state.vertices)
+        placed = self.finder.find(replace(state, contacts=rows), vertices, self._standing(state, vertices))
         if placed.points is None:
             return rows
         return at_their_springs(rows, placed, forces.which, self.finder.closure, on_multiplier(placed))
@@ -377,17 +404,6 @@ class BlockSystem:
                 "block, or let velocity be carried (dynamic_factor = 1)"
             )
 
-    def _turned_in(self, attempt: Attempt, result: StepResult, window: float) -> str:
-        """What has gone in where the contacts sought within ``window`` (m) saw nothing come; empty for nothing."""
-        blocks = turned_in(
-            result.state.vertices, attempt.vertices, self.next, self.vertex_start, attempt.increment[:, 2],
-            self.finder.pairs(attempt.vertices, window), result.contacts, np.sqrt(attempt.moments[:, 0]),
-        )  # fmt: skip
-        if blocks is None:
-            return ""
-        a, b, depth = blocks
-        return f"{self.finder.names[a]!r} and {self.finder.names[b]!r} turn into each other by {depth:.3g} m"
-
     def _refuse_crushed(self, state: State) -> None:
         area = block_moments(state.vertices, self.next, self.vertex_start)[:, 0]
         if not (area > 0).all():
@@ -396,16 +412,6 @@ class BlockSystem:
             raise NotConverged(
                 f"{name!r} is crushed to nothing at t = {state.time:g} s: its loads are beyond its stiffness"
             )
-
-    def _foreseen(self, vertices, carried, moments, loads, time, dt, limit) -> float:
-        """``dt`` shortened where the velocity alone would carry a vertex beyond the limit."""
-        if not carried.any():
-            return dt
-        speed = float(fastest_vertex(carried, vertices, self.vertex_start, moments))
-        g = float(np.hypot(*loads.gravity.at(time + dt)))
-        # Root of speed dt + g dt²/2 = limit in the form that keeps its digits when g is small.
-        limit *= _AIM
-        return min(dt, float(2.0 * limit / (speed + np.sqrt(speed * speed + 2.0 * g * limit))))
 
     def pattern_of(
         self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: tuple[np.ndarray, np.ndarray] | None

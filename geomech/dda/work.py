@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field
 
 
 @dataclass(eq=False)
@@ -16,6 +17,7 @@ class Work:
                                           before, from which the present one hardly differs
     pair_search_s, factorisation_s        what those that were made took, s, but for the first, which may have loaded
                                           kernels
+    shortened                             how often each (reason, block's name, the other's or "") has shortened a step
     """
 
     pair_searches: int = 0
@@ -25,3 +27,4 @@ class Work:
     factorisations_kept: int = 0
     pair_search_s: float = 0.0
     factorisation_s: float = 0.0
+    shortened: Counter[tuple[str, str, str]] = field(default_factory=Counter)

@@ -13,7 +13,16 @@ from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, Vi
 from .material import Material
 from .motion import Motion
 from .problem import (
-    CHANGES, LARGEST_CORNER, STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted,
+    CHANGES,
+    LARGEST_CORNER,
+    STOPS,
+    WEIGHT,
+    DdaSettings,
+    DdmSettings,
+    GrowthSettings,
+    Problem,
+    RunSettings,
+    counted,
 )  # fmt: skip
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Skip, State
 from .whole_network import whole_network

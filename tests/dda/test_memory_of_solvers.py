@@ -125,11 +125,12 @@ def test_of_many_blocks_in_motion_a_step_beyond_single_precision_is_cut(alive, m
 
 
 def test_a_solver_is_gone_before_one_of_more_contacts_factors(alive):
-    """A static step that moves farther than was asked for is tried again with contacts from farther away: here with those
-    of bricks that stand 0.1 µm apart."""
+    """A static step in which bricks go through what lies below is tried again with contacts from farther away: here with
+    those of courses that are drawn 5 cm apart."""
     blocks, made = block_scenes.wall(80), []
-    corners = blocks.vertices.reshape(-1, 4, 2) - [5e-8, 0.0] * np.array([[-1], [1], [1], [-1]])
-    settings = replace(block_scenes.settings(1.0, dynamic=False), max_displacement_ratio=1e-9)
+    corners = blocks.vertices.reshape(-1, 4, 2)
+    corners = corners + [0.0, 0.05] * np.round(2 * corners.min(axis=1, keepdims=True) + 1)
+    settings = replace(block_scenes.settings(0.15, dynamic=False), max_displacement_ratio=1.0)
     blocks = Blocks.from_polygons(list(corners), fixed=blocks.fixed.tolist())
     system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=settings)
     find = system.finder.find

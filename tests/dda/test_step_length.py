@@ -21,8 +21,8 @@ def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
 
 
-def finished(dt, iterations=1, cuts=0, ratio=0.0):
-    facts = {"open_close_iterations": iterations, "step_cuts": cuts, "max_displacement_ratio": ratio}
+def finished(dt, iterations=1, cuts=0, share=0.0):
+    facts = {"open_close_iterations": iterations, "step_cuts": cuts, "limit_share": share}
     return SimpleNamespace(dt=dt, statistics=facts)
 
 
@@ -30,29 +30,29 @@ def test_steps_grow_and_shrink_by_what_is_stated_and_stay_bounded():
     length = dda.StepLength(DdaSettings(time_step=1.0, automatic_time_step=True))
     assert length.dt == step_length.FIRST
     for _ in range(100):
-        length.after(finished(length.dt), length.dt, 0.01)
+        length.after(finished(length.dt), length.dt)
     assert length.dt == 1.0
-    length.after(finished(1.0, iterations=step_length.EASY + 1), 1.0, 0.01)
+    length.after(finished(1.0, iterations=step_length.EASY + 1), 1.0)
     assert length.dt == 1.0
-    length.after(finished(1.0, iterations=step_length.HARD + 1), 1.0, 0.01)
+    length.after(finished(1.0, iterations=step_length.HARD + 1), 1.0)
     assert length.dt == 0.5
-    length.after(finished(0.125, cuts=2), 0.5, 0.01)
+    length.after(finished(0.125, cuts=2), 0.5)
     assert length.dt == 0.125
-    # The displacement that is allowed is approached from below.
-    length.after(finished(0.125, ratio=0.01), 0.125, 0.01)
+    # What a step may move is approached from below.
+    length.after(finished(0.125, share=1.0), 0.125)
     assert length.dt == pytest.approx(0.1)
     # A step that was short for other reasons says nothing.
-    length.after(finished(1e-3), 1e-3, 0.01)
-    length.after(finished(1e-3), length.dt, 0.01)
+    length.after(finished(1e-3), 1e-3)
+    length.after(finished(1e-3), length.dt)
     assert length.dt == pytest.approx(0.1)
     for _ in range(100):
-        length.after(finished(length.dt, iterations=99), length.dt, 0.01)
+        length.after(finished(length.dt, iterations=99), length.dt)
     assert length.dt == step_length.SHORTEST
 
 
 def test_without_it_every_step_is_the_one_asked_for():
     length = dda.StepLength(DdaSettings(time_step=0.5))
-    length.after(finished(0.1, iterations=99, cuts=3), 0.5, 0.01)
+    length.after(finished(0.1, iterations=99, cuts=3), 0.5)
     assert length.dt == 0.5
 
 

@@ -51,7 +51,9 @@ class DdaTable(Table):
         None, description="the two frequencies of `rayleigh_fractions`, Hz"
     )
     max_displacement_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
-        0.001, description="largest displacement in a step, in units of half the height of the domain"
+        0.01,
+        description="largest displacement in a step, in units of half the diagonal of the domain: how finely motion is "
+        "followed (blocks near each other move by no more than a tenth of their size against each other, whatever it is)",
     )
     normal_penalty_pa: Positive | None = Field(
         None,
