@@ -31,6 +31,9 @@ _UNKNOWN = -2
 _NEVER = -1
 #: The gaps of blocks that turn are followed to this part of the smaller block's size (√area).
 _PRECISION = 1e-5
+#: What lies behind a line by less than this part of the smaller block's size (√area) when they first touch was pushed
+#: there by others' give, or by the rounding of arcs.
+_HAIR = 1e-4
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
 
@@ -140,8 +143,11 @@ class ContactFinder:
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
-        # A step that rounding smooths is none: what comes upon it begins there without force.
-        smoothed = (table[:, 3] == 1) & (remembered["state"] == OPEN) & (geometry[:, 3] < remembered["lift"])
+        # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
+        # no energy: there contacts begin without force.
+        hair = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        smoothed = (table[:, 3] == 1) | ((geometry[:, 3] > -hair) & (len(old) > 0))
+        smoothed &= (remembered["state"] == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < remembered["lift"])
         remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
         vertex, edge, corner = (column.copy() for column in table[:, :3].T)
         keep = np.ones(len(vertex), bool)
