@@ -200,6 +200,7 @@ def test_solvers_stand_alone(module):
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.other_machines
 def test_top_level_is_as_agreed():
     if shutil.which("git") is None:
         pytest.skip("git, which knows what belongs to the project, is not installed")

@@ -438,6 +438,7 @@ class _At(Breaks):
             raise self.error
 
 
+@pytest.mark.other_machines
 def test_a_second_interrupt_stops_at_once(write, tmp_path):
     scene, out = load_scene(write(SLIDING), ["output.checkpoint_every=2"]), tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
@@ -552,6 +553,7 @@ def test_a_hundred_kills_lose_nothing(write, tmp_path):
     _killed_and_resumed(write(SPLIT + "checkpoint_every = 3\n"), tmp_path, 100, 2)
 
 
+@pytest.mark.other_machines
 def test_signals_are_left_alone_elsewhere(write, tmp_path):
     """A run in another thread than the main one changes no handler; a run without checkpoints neither."""
     scene = load_scene(write(SLIDING), ["run.end_time_s=0.02"])
@@ -568,6 +570,7 @@ def test_signals_are_left_alone_elsewhere(write, tmp_path):
     assert len(seen) == 6 and set(seen) == {signal.default_int_handler}
 
 
+@pytest.mark.other_machines
 def test_an_ignored_interrupt_stays_ignored(write, tmp_path, in_the_background):
     """A run that a script has put in the background is not broken off by the Ctrl-C meant for another program."""
     scene = load_scene(write(SLIDING), ["run.end_time_s=0.06"])

@@ -226,7 +226,9 @@ def _wait_for_cycles(process: subprocess.Popen, out: Path, count: int) -> None:
     assert process.poll() is None
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "how", [pytest.param(signal.SIGINT, marks=pytest.mark.other_machines), signal.SIGTERM, signal.SIGKILL]
+)
 def test_a_broken_off_run_can_be_read(tmp_path, how, interruptible):
     """Ctrl-C and SIGTERM end with exit code 3 and a summary; a kill leaves all but the last cycle's files in good
     order."""
@@ -241,6 +243,7 @@ def test_a_broken_off_run_can_be_read(tmp_path, how, interruptible):
     assert len(run.history["cycle"]) >= 9 and list(run.history["cycle"]) == list(range(len(run.history["cycle"])))
 
 
+@pytest.mark.other_machines
 def test_a_run_in_the_background_heeds_sigterm_alone(tmp_path, in_the_background):
     """What ignores SIGINT from its start, as a shell script's background jobs do, goes on after one; SIGTERM ends
     it."""
