@@ -105,7 +105,7 @@ def births(solution: Solution, material: Material, settings: GrowthSettings, blo
     for birth in _candidates(solution, material, settings):
         if birth.overstress <= 0 or (chosen and birth.overstress < (1 - TOGETHER) * chosen[0].overstress):
             break
-        apart = all(math.dist(birth.start, other.start) >= spacing for other in chosen)
+        apart = all(reached(math.dist(birth.start, other.start), spacing) for other in chosen)
         if apart and _has_room(network, birth, settings, block):
             chosen.append(birth)
     return chosen
@@ -217,7 +217,7 @@ def _on_free_surface(solution: Solution, settings: GrowthSettings):
     below = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
     along = rock.frame(below)[:, 0] if len(below) else np.zeros(1)
     low, high = along.min() - body._extent, along.max() + body._extent
-    n = min(GRID, math.ceil((high - low) / _spacing(settings)))
+    n = min(GRID, math.ceil((1 - TIED) * (high - low) / _spacing(settings)))
     # An odd number, so that symmetric bodies are looked at in the middle.
     x = low + (high - low) * (np.arange(2 * (n // 2) + 1) + 0.5) / (2 * (n // 2) + 1)
     points = np.asarray(rock.point) + x[:, None] * rock.turn[0]
@@ -268,13 +268,13 @@ def _away(cracks: Cracks, points: np.ndarray, own: np.ndarray, settings: GrowthS
     near = np.where(special, _spacing(settings), APART * settings.increment)
     marked = np.flatnonzero((special | _corners(cracks)) & (cracks.valence > 0))
     for node in marked:
-        free &= np.hypot(*(points - cracks.nodes[node]).T) >= near[node]
+        free &= reached(np.hypot(*(points - cracks.nodes[node]).T), near[node])
     start, along = cracks.nodes[cracks.segments[:, 0]], np.diff(cracks.nodes[cracks.segments], axis=1)[:, 0]
     for s in range(cracks.n_segments):
         rel = points - start[s]
         share = np.clip(rel @ along[s] / cracks.lengths[s] ** 2, 0, 1)
         distance = np.hypot(*(rel - share[:, None] * along[s]).T)
-        free &= (own >= 0) | (distance >= APART * settings.increment)
+        free &= (own >= 0) | reached(distance, APART * settings.increment)
     return free
 
 
@@ -362,7 +362,7 @@ def _in_rock(solution, material, settings) -> Iterator[Birth]:
     step = max(_spacing(settings), math.sqrt(float(np.prod(high - low)) / GRID))
     if not step < (high - low).max():
         return
-    axes = [np.linspace(a, b, max(2, math.ceil((b - a) / step)) + 1) for a, b in zip(low, high)]
+    axes = [np.linspace(a, b, max(2, math.ceil((1 - TIED) * (b - a) / step)) + 1) for a, b in zip(low, high)]
     points = np.stack(np.meshgrid(*[0.5 * (x[1:] + x[:-1]) for x in axes]), axis=-1).reshape(-1, 2)
     points = points[inside(body.limits, points)]
     points = points[_away(body.cracks, points, np.full(len(points), -1), settings)]

@@ -10,12 +10,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geomech.ddm import criteria, trial_kinks
+from geomech.ddm import Body, BodyLoad, criteria, initiation, trial_kinks
 from geomech.ddm.growth import advance
 from geomech.ddm.initiation import overstress
 from geomech.ddm.path import Chords, Memory
 from geomech.ddm.ties import best, in_order, reached
-from geomech.model import TIP, Cracks, GrowthSettings, Material
+from geomech.model import TIP, Cracks, DdmSettings, GrowthSettings, Material
 
 pytestmark = pytest.mark.other_machines
 
@@ -205,6 +205,32 @@ def test_trial_kinks_to_either_side_as_good():
 def test_stress_alike_in_all_directions_has_one_direction():
     stress = np.array([[-1e6 * (1 + off), -1e6, 1e6 * other] for off in OFF for other in OFF])
     assert not overstress(stress, replace(ROCK, tensile_strength=1e6, cohesion=1e6, friction_angle=0.5))[2].any()
+
+
+def test_halves_of_a_crack_have_as_many_elements():
+    """2½ of five each, by halves whose lengths are one but for rounding."""
+    settings = DdmSettings(elements_per_crack=5)
+    for off in OFF:
+        cracks = Cracks.from_polylines([np.array([[-1.0, 0.0], [off, 0.0], [1.0, 0.0]])])
+        middle = Body([], cracks, ROCK, settings).faces.nodes.mean(axis=1)[:, 0]
+        assert np.sort(middle) == pytest.approx(-np.sort(middle)[::-1], abs=1e-9)
+
+
+def test_births_as_far_apart_as_the_spacing():
+    """A square that is pulled evenly, 6 by 6 spacings: cracks are looked for in the middle of each."""
+    strong = replace(ROCK, tensile_strength=1e6)
+    settings = GrowthSettings(increment=0.01, initiation="everywhere", initiation_spacing=0.1)
+    found = []
+    for off in OFF:
+        side = 0.6 * (1 + off)
+        loop = np.array([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]])
+        ends = loop[[[1, 2], [3, 0]]]
+        load = BodyLoad(segments=ends, tractions=np.array([[[1e6, 0.0]] * 2, [[-1e6, 0.0]] * 2]))
+        solution = Body([loop], Cracks.from_polylines([]), strong).solve(load)
+        born = [birth for birth in initiation._candidates(solution, strong, settings) if birth.place == "rock"]
+        assert all(birth.end[1] > birth.start[1] for birth in born)
+        found.append(len(born))
+    assert the_one(found) == 36
 
 
 def test_a_path_that_goes_straight_on_tells_nothing_of_the_next():
