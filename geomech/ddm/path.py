@@ -145,7 +145,7 @@ class Chords:
         if first:
             # A first look that turns on a little, the way the trial did, needs no second one: the path is smooth.
             straight = np.abs(self.start) < ONE_WAY
-            self.onward = (straight | (rest * self.start >= 0)) & ~known
+            self.onward = (straight | (rest * self.start >= 0)) & seen & ~known
             self.whole = angle + self.share * turns
             smooth = self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF)
             unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)

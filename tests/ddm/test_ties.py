@@ -249,6 +249,22 @@ def test_a_path_that_goes_straight_on_tells_nothing_of_the_next():
             assert math.isnan(told.kappa) and abs(told.angle) < 1e-11
 
 
+def test_tips_that_stand_keep_their_direction_while_others_are_bent():
+    """Beside a tip whose path turns by so much that it is looked at twice, the other one stands, without a shear to
+    turn it."""
+    cracks = Cracks.from_polylines([np.array([[-1.0, 0.0], [0.0, 0.0]])])
+    for off in OFF:
+        tips = tips_of(cracks, angle=np.array([off, 0.1]), k_eq=np.array([0.0, 1.0]))
+        chords, turn, looks = Chords(tips), 0.5, 0
+        settled = False
+        while not settled:
+            growth = advance(cracks, lambda block: [], tips, SETTINGS, np.ones(2), 1)
+            ahead = tips_of(growth.cracks, np.array([off, turn - (tips["angle"][1] - 0.1)]))
+            settled = chords.bend(tips, growth.grown, ahead, growth.cracks, 1)
+            looks += 1
+        assert looks > 1 and tips["angle"][0] == off and tips["angle"][1] > 0.2
+
+
 # -- the rules themselves --------------------------------------------------------------------------------------------
 
 
