@@ -15,6 +15,7 @@ from geomech.model import (
     TIP,
     Blocks,
     Cracks,
+    DdaSettings,
     EdgeTraction,
     GrowthSettings,
     History,
@@ -31,11 +32,11 @@ OFF = (0.0, 1e-14, -1e-14)
 W, H = 0.03, 0.06
 
 
-def plate() -> Problem:
-    """A plate 2W wide under tension that rises by 0.2 MPa/s, with a crack across its middle, 9 mm from either edge when
+def plate(rate: float = 0.2e6) -> Problem:
+    """A plate 2W wide under tension that rises by ``rate`` Pa/s, with a crack across its middle, 9 mm from either edge when
     it has grown by 6 mm."""
     polygon = np.array([[-W, -H], [W, -H], [W, H], [-W, H]])
-    ends = (("load:top", 0.2e6), ("load:bottom", -0.2e6))
+    ends = (("load:top", rate), ("load:bottom", -rate))
     return Problem(
         title="plate",
         blocks=Blocks.from_polygons([polygon], edge_names=[[["load:bottom", "", "load:top", ""]]]),
@@ -62,6 +63,24 @@ def test_both_tips_of_a_plate_go_on_and_through_together():
                 if len(cycle.tips) and cycle.tips["grown"].any()
             ]
             np.testing.assert_allclose(grown, [[6e-3, 6e-3], [6e-3, 6e-3], [3e-3, 3e-3]], rtol=1e-9)
+
+
+def test_a_fixed_step_to_just_the_toughness_grows_both_tips():
+    """Steps of 1 s, the first to the load at which K_eq = K_Ic but for rounding: K is proportional to the load."""
+    fixed = RunSettings(end_time=1.0, stop_at=())
+
+    def first(rate: float) -> np.ndarray:
+        problem = replace(plate(rate), run=fixed, dda=DdaSettings(time_step=1.0))
+        return next(cycle.tips for cycle in cycles(problem) if len(cycle.tips))
+
+    rate = 0.2e6
+    for _ in range(3):
+        rate *= ROCK.k_ic / first(rate)["k_eq"].min()
+    for off in (*OFF, 1e-12, -1e-12):
+        tips = first(rate * (1 + off))
+        assert tips["k_eq"] == pytest.approx(ROCK.k_ic, rel=1e-11)
+        assert tips["grown"] == pytest.approx([6e-3, 6e-3], rel=1e-9)
+    assert not first(rate * (1 - 1e-6))["grown"].any()
 
 
 def test_of_blocks_that_are_alike_the_first_breaks(monkeypatch):
