@@ -27,6 +27,9 @@ TOE, CREST = (42.0, 20.0), (30.0, 40.0)
 #: Pa, Young's modulus: 40 m of such rock settle by 0.2 mm under their weight, ρgH²/(2E), which is 1 % of the slab's fall
 #: in 0.3 s at the least dip. (At 20 GPa it would be 5 %.)
 STIFF = 100e9
+#: Blocks smaller than this share of spacing × spacing join a neighbour: rarely, for it may be one across a bed, which is
+#: then no plane any more.
+SMALLEST = 2e-3
 _ROCK = "[[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]"
 _BASE = "[[-2, -2], [62, -2], [62, 20], [60, 20], [60, 0], [0, 0], [0, 40], [-2, 40]]"
 #: m: vertices nearer than this to a bed lie on it; blocks are cut on a grid of 1e-10 m.
@@ -63,7 +66,7 @@ class Slope:
         ]
         if self.length:
             cross.append(f"length_m = {self.length!r}\ngap_m = {self.gap!r}")
-        smallest = 0.02 * self.bed_spacing * self.cross_spacing
+        smallest = SMALLEST * self.bed_spacing * self.cross_spacing
         return "\n".join(
             [
                 f'title = "Sliding slope {self.seed}"',
