@@ -37,7 +37,8 @@ def declare(verbs: Verbs) -> None:
              "those in shorter steps, mirrored, rotated, shifted, with joints in another order and with noise",
     )  # fmt: skip
     bench.add_argument(
-        "--blocks", type=int, metavar="N", help="of dda: a wall and a slope of so many too (100000: 12 minutes, 7 GB)"
+        "--blocks", type=int, metavar="N",
+        help="of dda: a wall and a slope of so many too (100000: 12 minutes, 7 GB); of motion: a slope of so many too",
     )
     bench.add_argument(
         "--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: an hour)"
@@ -57,8 +58,12 @@ def _bench(options: argparse.Namespace) -> int:
     seeds = _seeds(options)
     out = options.out or Path("outputs/bench/figures.json")
     check_writable("--out", out)
-    if options.blocks is not None and ("dda" not in options.topics or options.blocks < 1):
-        raise BadInput("--blocks takes a number of blocks and belongs to dda: geomech bench dda --blocks 100000")
+    if options.blocks is not None and (
+        not {"dda", "motion"} & set(options.topics) or options.blocks < 1
+    ):
+        raise BadInput(
+            "--blocks takes a number of blocks and belongs to dda and motion: geomech bench dda --blocks 100000"
+        )
     if options.seconds is not None and ("debris" not in options.topics or not options.seconds > 0):
         raise BadInput("--seconds takes a time in s and belongs to debris: geomech bench debris --seconds 60")
     if options.invariance and ("slopes" not in options.topics or not seeds):
@@ -80,7 +85,7 @@ def _bench(options: argparse.Namespace) -> int:
             from ..bench.sliding_slopes import measure_many as measure_sliding
 
             found[name] = measure_sliding(seeds)
-        elif name == "dda":
+        elif name in ("dda", "motion"):
             found[name] = topic(name)(options.quick, options.blocks)
         elif name == "debris":
             found[name] = topic(name)(options.quick, options.seconds)

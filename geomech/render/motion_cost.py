@@ -1,0 +1,70 @@
+"""The picture of `geomech bench motion`: time of a simulated second against the error of what moves, a line a size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+_STYLES = (("#1f6f8b", "o"), ("#588157", "s"), ("#c8553d", "^"), ("#8e6c8a", "D"), ("#c9a227", "v"))
+#: Errors below this are drawn at it.
+LEAST = 1e-6
+
+
+class Cost(Protocol):
+    dt: float
+    second: float
+    iteration: float
+    iterations: float
+
+
+class Sized(Protocol):
+    blocks: int
+    costs: Sequence[Cost]
+    wall: float
+
+    def errors(self) -> list[float]: ...
+
+
+def draw(slopes: Sequence[Sized], path: Path) -> Path:
+    """Left: time against error; right: an iteration's time over that of a wall's of as many blocks, and iterations a
+    step, against the time step."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 4.6), dpi=120, layout="constrained")
+    of_error, of_step = figure.subplots(1, 2)
+    counts = of_step.twinx()
+    for sized, (colour, marker) in zip(slopes, _STYLES):
+        if not sized.costs:
+            continue
+        label = f"{sized.blocks} blocks"
+        known = [(c, max(error, LEAST)) for c, error in zip(sized.costs, sized.errors()) if math.isfinite(error)]
+        of_error.loglog(
+            [error for _, error in known], [c.second for c, _ in known], color=colour, marker=marker, lw=1.6, label=label
+        )
+        for cost, error in known:
+            of_error.annotate(
+                f"{1e3 * cost.dt:g} ms", (error, cost.second), xytext=(5, 3), textcoords="offset points", fontsize=7,
+                color=colour,
+            )  # fmt: skip
+        steps = [1e3 * cost.dt for cost in sized.costs]
+        of_step.plot(steps, [c.iteration / sized.wall for c in sized.costs], color=colour, marker=marker, lw=1.6)
+        counts.plot(steps, [c.iterations for c in sized.costs], color=colour, marker=marker, ms=3, lw=1.0, ls=":")
+    of_error.invert_xaxis()
+    of_error.set(xlabel="work of gravity on what moves, off that in the shortest steps", ylabel="s a simulated second")
+    of_error.set_title("better to the right and below", fontsize=10, loc="left")
+    if any(sized.costs for sized in slopes):
+        of_error.legend(frameon=False, fontsize=9)
+    of_step.set(xscale="log", xlabel="time step, ms", ylabel="an iteration's time over the wall's")
+    of_step.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    of_step.xaxis.set_minor_formatter(lambda value, _: "")
+    of_step.set_ylim(bottom=0)
+    counts.set_ylabel("open–close iterations a step (dotted)")
+    counts.set_ylim(bottom=0)
+    for axes in (of_error, of_step, counts):
+        axes.spines["top"].set_visible(False)
+    of_error.grid(which="major", color="#e4e4e4", lw=0.7)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+    return path
