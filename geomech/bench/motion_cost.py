@@ -41,9 +41,9 @@ LONGEST, WALL = (3.0, 30.0), (0.5, 3.0)
 @dataclass(frozen=True)
 class Cost:
     """Of a slope of so many ``blocks`` in steps of ``dt``, s: ``steps`` taken, mean open–close ``iterations`` a step;
-    seconds of an ``iteration`` (the step over its iterations) and of a simulated ``second``; ``moved`` share of the rock
-    and ``work`` of gravity on it, J/m, ``off_slab`` over that on the rigid slab, less 1 (nan where there is none). A run
-    that was not finished has no work (nan)."""
+    seconds of an ``iteration`` (the step over its iterations) and of a simulated ``second``; ``moved`` share of the
+    rock and ``work`` of gravity on it, J/m, ``off_slab`` over that on the rigid slab, less 1 (nan where there is none).
+    A run that was not finished has no work (nan)."""
 
     blocks: int
     dt: float
@@ -171,19 +171,20 @@ def measure(quick: bool = False, blocks: int | None = None) -> Measured:
 def table(every: Sequence[Sized]) -> Measured:
     """A line a size and time step, and figures of errors and times."""
     lines = [
-        f"slopes that slide from rest for {END:g} s; work of gravity on what moves, off that in the shortest steps and off "
-        "the rigid slab's;",
+        f"slopes that slide from rest for {END:g} s; work of gravity on what moves, off that in the shortest steps and "
+        "off the rigid slab's;",
         "an iteration is the step over its open–close iterations, beside that of a brick wall of as many blocks",
-        "  blocks   dt, ms   steps  iterations a step  ms/iteration  of the wall's  s/simulated s  moved  work off shortest"
-        "  off slab",
+        "  blocks   dt, ms   steps  iterations a step  ms/iteration  of the wall's  s/simulated s  moved"
+        "  work off shortest  off slab",
     ]
     errors: dict[str, float] = {}
     times: dict[str, float] = {}
     for sized in every:
         for cost, error in zip(sized.costs, sized.errors()):
             lines.append(
-                f"{sized.blocks:8d}{1e3 * cost.dt:9.3g}{cost.steps:8d}{cost.iterations:19.1f}{1e3 * cost.iteration:14.2f}"
-                f"{cost.iteration / sized.wall:15.2f}{cost.second:15.3g}{cost.moved:7.3f}{error:19.1e}{cost.off_slab:10.3f}"
+                f"{sized.blocks:8d}{1e3 * cost.dt:9.3g}{cost.steps:8d}{cost.iterations:19.1f}"
+                f"{1e3 * cost.iteration:14.2f}{cost.iteration / sized.wall:15.2f}{cost.second:15.3g}"
+                f"{cost.moved:7.3f}{error:19.1e}{cost.off_slab:10.3f}"
             )
             name = f"slope of {sized.size}, {1e3 * cost.dt:g} ms"
             times[f"{name}: an iteration"] = cost.iteration

@@ -24,11 +24,11 @@ GRAVITY = 9.81
 #: Friction angles, degrees, of beds and of cross joints.
 BEDS, CROSS = 20.0, 30.0
 TOE, CREST = (42.0, 20.0), (30.0, 40.0)
-#: Pa, Young's modulus: 40 m of such rock settle by 0.2 mm under their weight, ρgH²/(2E), which is 1 % of the slab's fall
-#: in 0.3 s at the least dip. (At 20 GPa it would be 5 %.)
+#: Pa, Young's modulus: 40 m of such rock settle by 0.2 mm under their weight, ρgH²/(2E), which is 1 % of the slab's
+#: fall in 0.3 s at the least dip. (At 20 GPa it would be 5 %.)
 STIFF = 100e9
-#: Blocks smaller than this share of spacing × spacing join a neighbour: rarely, for it may be one across a bed, which is
-#: then no plane any more.
+#: Blocks smaller than this share of spacing × spacing join a neighbour: rarely, for it may be one across a bed, which
+#: is then no plane any more.
 SMALLEST = 2e-3
 _ROCK = "[[0, 0], [60, 0], [60, 20], [42, 20], [30, 40], [0, 40]]"
 _BASE = "[[-2, -2], [62, -2], [62, 20], [60, 20], [60, 0], [0, 0], [0, 40], [-2, 40]]"
@@ -61,8 +61,8 @@ class Slope:
     def text(self, time_step: float, end: float) -> str:
         """The scene file: motion from rest until ``end``, s."""
         cross = [
-            f'[[geometry.joint_sets]]\nname = "cross"\nangle_deg = {self.cross!r}\nangle_deviation_deg = {self.deviation!r}',
-            f"spacing_m = {self.cross_spacing!r}\nregion = {_ROCK}",
+            f'[[geometry.joint_sets]]\nname = "cross"\nangle_deg = {self.cross!r}',
+            f"angle_deviation_deg = {self.deviation!r}\nspacing_m = {self.cross_spacing!r}\nregion = {_ROCK}",
         ]
         if self.length:
             cross.append(f"length_m = {self.length!r}\ngap_m = {self.gap!r}")
@@ -73,8 +73,8 @@ class Slope:
                 f'[geometry]\nsmallest_block_m2 = {smallest!r}\nseed = {self.seed}\ndead_ends = "trim"',
                 f'[[geometry.zones]]\nname = "rock"\npolygon = {_ROCK}',
                 f'[[geometry.zones]]\nname = "base"\npolygon = {_BASE}',
-                f'[[geometry.joint_sets]]\nname = "bedding"\nangle_deg = {-self.dip!r}\nspacing_m = {self.bed_spacing!r}',
-                f"region = {_ROCK}",
+                f'[[geometry.joint_sets]]\nname = "bedding"\nangle_deg = {-self.dip!r}',
+                f"spacing_m = {self.bed_spacing!r}\nregion = {_ROCK}",
                 *cross,
                 f"[materials.rock]\nyoungs_modulus_pa = {self.modulus!r}\npoissons_ratio = 0.25\ndensity_kg_m3 = 2600",
                 "[zones.base]\nfixed = true",
@@ -96,7 +96,8 @@ def random_slope(seed: int) -> Slope:
     if rng.random() < 0.5:
         length, gap = bed_spacing * rng.uniform(1.5, 4.0), bed_spacing * rng.uniform(0.3, 1.0)
     values = [
-        rng.uniform(25.0, 45.0), rng.uniform(50.0, 90.0), rng.uniform(0.0, 5.0), bed_spacing, cross_spacing, length, gap,
+        rng.uniform(25.0, 45.0), rng.uniform(50.0, 90.0), rng.uniform(0.0, 5.0), bed_spacing, cross_spacing, length,
+        gap,
     ]  # fmt: skip
     return Slope(*(round(float(value), 2) for value in values), seed=seed)
 

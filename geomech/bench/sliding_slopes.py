@@ -204,8 +204,8 @@ def table(every: Sequence[Slid]) -> Measured:
     """A line a slope: the works of gravity over that in the shortest steps, and off the rigid slab's."""
     steps = every[0].steps
     lines = [
-        f"work of gravity on what has moved by {every[0].end:g} s, at dt over that at {1e3 * steps[-1]:g} ms, less 1; share "
-        "of the rock that has moved;",
+        f"work of gravity on what has moved by {every[0].end:g} s, at dt over that at {1e3 * steps[-1]:g} ms, less 1; "
+        "share of the rock that has moved;",
         "and both against the rigid slab above the lowest bed that daylights (nan: a block reaches through it)",
         "seed  verdict   blocks   dip "
         + "".join(f"{f'{1e3 * dt:g} ms':>9}" for dt in steps[:-1])

@@ -345,11 +345,12 @@ def _row_of_run(seconds: float, seed: int) -> dict:
 def table(every: Sequence[Invariance]) -> Measured:
     """A line a seed, the worst of every quantity beside its bound, and the share of slopes that are wrong."""
     lines = [
-        "moved: share of the rock that goes farther than 1 mm (in short runs, a tenth of free fall), in steps of dt, dt/2, "
-        "dt/4;",
-        "scatter: share and gravity work off those of dt/4; the worst of mirror, rotation, shift, order and noise over the "
-        f"first {FIRST} steps",
-        "seed  verdict  blocks   moved, dt    dt/2    dt/4   work J/m  share,dt   work,dt  geometry    smooth  seconds  why",
+        "moved: share of the rock that goes farther than 1 mm (in short runs, a tenth of free fall), in steps of dt, "
+        "dt/2, dt/4;",
+        "scatter: share and gravity work off those of dt/4; the worst of mirror, rotation, shift, order and noise "
+        f"over the first {FIRST} steps",
+        "seed  verdict  blocks   moved, dt    dt/2    dt/4   work J/m  share,dt   work,dt  geometry    smooth  seconds"
+        "  why",
     ]
     for each in every:
         moved_shares = [*each.moved, math.nan, math.nan, math.nan][:3]

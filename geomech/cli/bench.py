@@ -33,8 +33,8 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
     bench.add_argument(
         "--invariance", action="store_true",
-        help="of slopes, with --seeds: hold the moved mass, its gravity work, displacements and energies of each against "
-             "those in shorter steps, mirrored, rotated, shifted, with joints in another order and with noise",
+        help="of slopes, with --seeds: hold the moved mass, its gravity work, displacements and energies of each "
+             "against those in shorter steps, mirrored, rotated, shifted, with joints in another order and with noise",
     )  # fmt: skip
     bench.add_argument(
         "--blocks", type=int, metavar="N",
@@ -58,9 +58,7 @@ def _bench(options: argparse.Namespace) -> int:
     seeds = _seeds(options)
     out = options.out or Path("outputs/bench/figures.json")
     check_writable("--out", out)
-    if options.blocks is not None and (
-        not {"dda", "motion"} & set(options.topics) or options.blocks < 1
-    ):
+    if options.blocks is not None and (not {"dda", "motion"} & set(options.topics) or options.blocks < 1):
         raise BadInput(
             "--blocks takes a number of blocks and belongs to dda and motion: geomech bench dda --blocks 100000"
         )

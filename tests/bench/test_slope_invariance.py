@@ -8,7 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geomech.bench.drawn_slopes import Isometry, can_be_moved, drawn, frictionless, moved, problem_of, reordered, with_noise
+from geomech.bench.drawn_slopes import (
+    Isometry,
+    can_be_moved,
+    drawn,
+    frictionless,
+    moved,
+    problem_of,
+    reordered,
+    with_noise,
+)
 from geomech.bench.limited_runs import REPORTED, RIGHT, VERDICTS, WRONG
 from geomech.bench.moved_mass import BlockDisplacements, moving_from
 from geomech.bench.random_slopes import scene_text
