@@ -40,6 +40,9 @@ _PASSED_ON = 20.0
 #: hundreds of contacts at their strength, by 1e-11 m each, of 1e-12 J in all, in every step, which all blocks' equations
 #: were solved for three times more.)
 _WORTH = 3e-5
+#: … and takes vibrations out that swing the forces of contacts by more than this part of the largest: less hardly brings
+#: one to its strength.
+_SWING = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,7 @@ class Unresolved:
         along = np.where(sticks, speeds[:, 1] - slid / dt, 0.0)
         rows = np.flatnonzero(holds)
         largest = np.maximum(np.abs(apart[rows]), np.abs(along[rows])) / dt
-        if not _worth_it(found, rows, largest, light, mass, settled.normal_force):
+        if not _worth_it(found, rows, largest, light, mass, settled.normal_force, _SWING):
             return None
         return cls(apart, along)
 
@@ -97,24 +100,24 @@ class Stopped:
         before = sense * (2.0 * slid[rows] / dt - after)
         keep = (np.abs(after) * dt > _PASSED_ON * slack) & (before > 0.0) & (sense * after < 0.0)
         light = np.where(mass[found.block] <= mass[found.other], found.block, found.other)
-        if not _worth_it(found, rows[keep], np.abs(after[keep]) / dt, light, mass, settled.normal_force):
+        if not _worth_it(found, rows[keep], np.abs(after[keep]) / dt, light, mass, settled.normal_force, _WORTH):
             return None
         return cls(rows[keep], sense[keep], before[keep], sense[keep] * after[keep])
 
 
 def _worth_it(
     found: ContactSet, rows: np.ndarray, deceleration: np.ndarray, light: np.ndarray, mass: np.ndarray,
-    force: np.ndarray,
+    force: np.ndarray, worth: float,
 ) -> bool:  # fmt: skip
-    """Whether any of the contacts ``rows`` that stop from a ``deceleration`` (m/s²) of their lighter blocks, of
-    ``light`` (n,) with their ``mass`` (n_blocks,), has more of it than ``_WORTH``; ``force`` (n,) N presses all
-    contacts."""
+    """Whether it takes more than the part ``worth`` of the largest force on its blocks to give any of the contacts
+    ``rows`` its ``deceleration`` (m/s²); ``light`` (n,) are the lighter blocks of all contacts, ``mass`` (n_blocks,) kg,
+    ``force`` (n,) N presses all contacts."""
     if not len(rows):
         return False
     largest = np.zeros(len(mass))
     for blocks in (found.block, found.other):
         np.maximum.at(largest, blocks, force)
-    return bool((deceleration * mass[light[rows]] > _WORTH * largest[light[rows]]).any())
+    return bool((deceleration * mass[light[rows]] > worth * largest[light[rows]]).any())
 
 
 def contact_speeds(
