@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model import OPEN, DdaSettings
+from ..model import OPEN, DdaSettings, Shortened
 from .approach import Windows
 from .contacts import ContactFinder
 from .crossings import INTO, THROUGH, crossings
@@ -185,7 +185,9 @@ class StepLimits:
     def _pressed(self, rows: np.ndarray, n_vertices: int) -> np.ndarray:
         """(n_vertices,) m: how deep CONTACT ``rows`` at each vertex, or at an edge that it ends, are pressed in. Nodes
         within the faces of joints that give have no contacts: there it is the deepest of their block."""
-        deep = np.where(rows["state"] != OPEN, np.maximum(0.0, -(rows["gap"] + rows["lift"])), 0.0)
+        # Faces that have to come nearer than the geometry says, to meet, lie in each other by that.
+        deep = np.maximum(0.0, -rows["lift"])
+        deep = np.where(rows["state"] != OPEN, np.maximum(deep, -(rows["gap"] + rows["lift"])), deep)
         out = np.zeros(n_vertices)
         if self._finder.has_face_nodes:
             of_block = np.zeros(len(self._size))
@@ -233,6 +235,14 @@ def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
         held.setdefault(b, {b}).add(a)
     nothing: set[int] = set()
     return np.array([bool(held.get(a, nothing) & held.get(b, nothing)) for a, b in pairs.tolist()], bool)
+
+
+def shortened(work: Work, most: int = 5) -> tuple[Shortened, ...]:
+    """The ``most`` frequent reasons for which steps were shortened, each with its blocks."""
+    return tuple(
+        Shortened(why, tuple(name for name in blocks if name), count, WAY_OUT[why])
+        for (why, *blocks), count in work.shortened.most_common(most)
+    )
 
 
 def _ordinal(count: int) -> str:

@@ -13,7 +13,7 @@ from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, Vi
 from .material import Material
 from .motion import Motion
 from .problem import CHANGES, STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
-from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Skip, State
+from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
 from .whole_network import whole_network
 
 __all__ = [
@@ -56,6 +56,7 @@ __all__ = [
     "Problem",
     "Roughness",
     "RunSettings",
+    "Shortened",
     "Skip",
     "State",
     "ViscousBoundary",
