@@ -103,9 +103,7 @@ class ContactFinder:
         old_vertex, old_edge, keys, old_normal, lift, gap = contact_rows.names(old, len(vertices))
         near = self._reaching(window, vertices, old, lift, gap)
         rank = np.argsort(keys, kind="stable")
-        table = find_contacts(
-            vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank]
-        )
+        table = find_contacts(vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank])
         table = self._from_outside(table, vertices, np.sort(keys[old["state"] != OPEN]))
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
@@ -233,7 +231,7 @@ class ContactFinder:
         vertex, edge = table[:, 0], table[:, 1]
         keep = from_outside(
             vertex, edge, self.gaps(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed,
+            self._owner, closed, True,
         )  # fmt: skip
         if keep.all():
             return table
@@ -351,6 +349,13 @@ class ContactFinder:
         if self._removed is not None:
             out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
         return out
+
+    def beyond_middle(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
+        return ~from_outside(
+            vertex, edge, self.gaps(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            self._owner, np.zeros(0, np.int64), False,
+        )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""

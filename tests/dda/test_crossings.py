@@ -59,9 +59,7 @@ def test_a_vertex_meets_no_face_from_behind_a_wall():
     and the far one where it has been pressed on before."""
     blocks = Blocks.from_polygons([WALL, SQUARE])
     start = np.ascontiguousarray(blocks.vertex_start, np.int64)
-    next_vertex, previous = (
-        np.ascontiguousarray(a, np.int64) for a in (blocks.next_vertex, blocks.previous_vertex)
-    )
+    next_vertex, previous = (np.ascontiguousarray(a, np.int64) for a in (blocks.next_vertex, blocks.previous_vertex))
     owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
 
     def kept(x, edge, closed=()):
@@ -88,9 +86,7 @@ def c_with_wall(wall, x, tilt, ratio):
     square = thin_scenes.turned(thin_scenes.rectangle(0, 0, 1, 1), tilt)
     square = square - square[square[:, 1].argmin()] + [x, 3.3]
     blocks = Blocks.from_polygons([c, square], fixed=[True, False])
-    settings = DdaSettings(
-        time_step=0.01, automatic_time_step=True, dynamic_factor=1.0, max_displacement_ratio=ratio
-    )
+    settings = DdaSettings(time_step=0.01, automatic_time_step=True, dynamic_factor=1.0, max_displacement_ratio=ratio)
     results = []
     rock = Material("rock", 10e9, 0.25, density=1000.0, rigid=True)
     weight = Loads(gravity=History.constant([0.0, -9.81]))
