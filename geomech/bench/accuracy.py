@@ -25,9 +25,7 @@ def measure(quick: bool = False) -> Measured:
     found = table()
     errors = {figure.name: figure.value for figure in found.figures}
     if not quick:
-        draw_bars(
-            {"error": errors}, FOLDER / "accuracy.png", "relative error", "Computed against published or closed form"
-        )
+        draw_bars({"error": errors}, FOLDER / "accuracy.png", "relative error", "Computed against published or closed form")
     return found
 
 

@@ -181,14 +181,7 @@ def _growth(quick: bool, own: bool = False) -> list[Point]:
     methods = {growth_paths.QUADRATIC: QUADRATIC, growth_paths.CONSTANT: CALIBRATED, growth_paths.FINITE: FEM}
     return [
         Point(
-            growth_paths.PROBLEM,
-            methods.get(kind, OURS),
-            increments,
-            run.unknowns,
-            max(parts),
-            run.seconds,
-            curve,
-            parts,
+            growth_paths.PROBLEM, methods.get(kind, OURS), increments, run.unknowns, max(parts), run.seconds, curve, parts
         )
         for kind, curve, increments, run, parts in growth_paths.rows(quick, own)
     ]
@@ -256,3 +249,5 @@ PROBLEMS = {
     "two-crack specimen": (crack_problems.specimen, 2.0, _body),
     MANY: (crack_problems.random_cracks, 0.0, _many),
 }
+
+

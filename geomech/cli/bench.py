@@ -35,7 +35,9 @@ def declare(verbs: Verbs) -> None:
     bench.add_argument(
         "--blocks", type=int, metavar="N", help="of dda: a wall and a slope of so many too (100000: 12 minutes, 7 GB)"
     )
-    bench.add_argument("--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: an hour)")
+    bench.add_argument(
+        "--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: an hour)"
+    )
 
 
 def _bench(options: argparse.Namespace) -> int:

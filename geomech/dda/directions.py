@@ -75,7 +75,9 @@ class Directions:
     if some is given; or the first ``most`` of the room of others, ``sharing``: what one of the two adds, the other has
     forgotten."""
 
-    def __init__(self, size: int, most: int, sharing: Directions | None = None, room: np.ndarray | None = None) -> None:
+    def __init__(
+        self, size: int, most: int, sharing: Directions | None = None, room: np.ndarray | None = None
+    ) -> None:
         self._sharing = sharing
         if sharing is None:
             # Memory is taken as directions come.

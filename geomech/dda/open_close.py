@@ -302,15 +302,7 @@ def settle(
             if slower is None:
                 if path is None or not np.array_equal(path.bonded, states.bonded):
                     path = CentralPath(
-                        pattern,
-                        matrix,
-                        right,
-                        found,
-                        vectors,
-                        answer.springs,
-                        answer.gap,
-                        states.bonded,
-                        normal_force,
+                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded, normal_force,
                         equations.room,
                     )
                 # The last sixth of the iterations is kept for the careful ways.

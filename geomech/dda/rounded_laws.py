@@ -116,7 +116,9 @@ class RoundedLaws:
             if float(np.abs(residual).max()) < _BALANCED * min(force, 1.0) * self._load:
                 return unknowns
             p = self._pattern
-            assembly.assemble(p, self._data, self._matrix, self._upper, self._lower, *self._at, *forces[2:], self._lift)
+            assembly.assemble(
+                p, self._data, self._matrix, self._upper, self._lower, *self._at, *forces[2:], self._lift
+            )
             solve = solution_of(p, self._data)
             self.solutions += 1
             step = solve(residual, WITHIN)

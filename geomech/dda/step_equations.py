@@ -142,13 +142,7 @@ class Equations:
                     spent += cost
                     try:
                         proposal = settled_together(
-                            group,
-                            states.state,
-                            states.direction,
-                            self.pattern,
-                            self.matrix,
-                            self.right,
-                            *fixed,
+                            group, states.state, states.direction, self.pattern, self.matrix, self.right, *fixed,
                             self.room,
                         )
                     except np.linalg.LinAlgError:

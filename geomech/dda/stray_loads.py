@@ -86,7 +86,9 @@ class StrayLoads:
     def _refuse_unshaken(self, base: BaseMotion) -> None:
         """Ground shakes the fixed blocks: one that is not fixed would stay as it is without a word."""
         if not self._blocks.fixed.any():
-            raise ValueError("the ground shakes, but no block is fixed that would go with it: fix what others stand on")
+            raise ValueError(
+                "the ground shakes, but no block is fixed that would go with it: fix what others stand on"
+            )
         for block in base.blocks or ():
             if not self._blocks.fixed[block]:
                 raise ValueError(
@@ -98,4 +100,6 @@ class StrayLoads:
         what = f"a viscous boundary is on edges named {boundary.edge_name!r}"
         edges = self._blocks.edges_that_exist(boundary.edge_name, what)
         if self._blocks.fixed[self._blocks.vertex_block[edges]].all():
-            raise ValueError(f"{what}, but the blocks that have them are fixed, where it brakes nothing")
+            raise ValueError(
+                f"{what}, but the blocks that have them are fixed, where it brakes nothing"
+            )

@@ -117,10 +117,7 @@ def _told(c: Check) -> None:
         return
     for kind in sorted(set(run.stop_at) & set(CHANGES)):
         if run.events is None:
-            what, way_out = (
-                "fixed steps tell of these where run.events names them",
-                'say run.events = ["contacts", "faces"]',
-            )
+            what, way_out = "fixed steps tell of these where run.events names them", 'say run.events = ["contacts", "faces"]'
         else:
             what, way_out = "run.events names neither", 'add "contacts" or "faces" to run.events'
         c.refuse(("run", "stop_at"), f'"{kind}" is of contacts and crack faces, and {what}', way_out)

@@ -342,9 +342,7 @@ def test_from_a_near_solution_on_it_takes_fewer_substitutions_to_the_same_residu
     print(f"substitutions {took}")
     assert took[1] < took[0]
     assert np.abs(answers[1] - answers[0]).max() <= 1e-8 * np.abs(answers[0]).max()
-    assert np.array_equal(
-        before, BlockSolver(points, rows, columns).solve(springs_between(400, seed=8)[3].ravel(), right)
-    )
+    assert np.array_equal(before, BlockSolver(points, rows, columns).solve(springs_between(400, seed=8)[3].ravel(), right))
 
 
 def test_matrices_of_two_kinds_that_come_by_turns_are_each_factored_in_part(monkeypatch):

@@ -17,9 +17,7 @@ def given():
     asked, blocks, patch = [], block_scenes.wall(100), pytest.MonkeyPatch()
     with patch.context() as patched:
         patched.setattr(attempt, "settle", lambda *given: asked.append(given) or settle(*given))
-        system = dda.BlockSystem(
-            blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01)
-        )
+        system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01))
         system.step(State.at_rest(blocks), block_scenes.WEIGHT)
     pattern, matrix, right, found, vectors, springs, gap, *_ = asked[0]
     return pattern, matrix, right, found, vectors, springs, gap, found.bonded, found.normal

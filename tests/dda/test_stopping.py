@@ -106,9 +106,7 @@ def test_what_a_sliding_brick_shakes_is_not_stopped_by_itself(monkeypatch):
     told = []
     for worth in (stopping._WORTH, 0.0):
         monkeypatch.setattr(stopping, "_WORTH", worth)
-        system = dda.BlockSystem(
-            blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01)
-        )
+        system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01))
         state, budget = replace(start, velocity=velocity), EnergyBudget()
         solved.clear()
         for _ in range(15):
