@@ -106,8 +106,7 @@ def test_a_kernel_calls_its_own_copies_only(tmp_path):
         "import numpy as np\nfrom geomech.compiled import kept, part\n"
         "@part(error_model='numpy')\ndef long(x):\n"
         "    for k in range(len(x)):\n"
-        + "        x[k] = np.sin(x[k]) * np.cos(x[k]) + np.exp(-x[k]) ** 1.5\n"
-        * 12  # too long to be inlined
+        + "        x[k] = np.sin(x[k]) * np.cos(x[k]) + np.exp(-x[k]) ** 1.5\n" * 12  # too long to be inlined
         + "    return x.sum()\n"
         "@kept(error_model='numpy')\ndef twice(x):\n    return long(x) + long(x)\n"
     )

@@ -36,7 +36,7 @@ def found(moved, pressed=0.0, corner=(-0.3, 0.4)):
 
 def test_what_ends_in_a_wall_or_beyond_it_is_found_by_the_face_it_came_in_by():
     assert not len(found((0.099, 0.0))[0])
-    pair, vertex, edge, kind, depth = found((0.104, 0.0))
+    _, vertex, edge, kind, depth = found((0.104, 0.0))
     assert vertex.tolist() == [5, 6] and edge.tolist() == [3, 3] and (kind == INTO).all()
     assert depth == pytest.approx(0.004, rel=1e-9)
     _, vertex, edge, kind, _ = found((0.5, 0.0))

@@ -93,9 +93,7 @@ def test_holes_that_share_rock_or_leave_it_are_refused(loops, message, far):
         Blocks.from_polygons([[loop + far for loop in loops]], names=["slab"])
 
 
-@pytest.mark.parametrize(
-    "shift", [(2, 0), (2, 2), (2, 1), (4, 3)], ids=["a side", "a corner", "part of a side", "apart"]
-)
+@pytest.mark.parametrize("shift", [(2, 0), (2, 2), (2, 1), (4, 3)], ids=["a side", "a corner", "part of a side", "apart"])
 def test_holes_that_only_touch_are_two(shift):
     assert Blocks.from_polygons([[WIDE, SMALL, SMALL[::-1] + shift]]).areas() == pytest.approx(100 - 8)
 

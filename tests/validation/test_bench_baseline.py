@@ -70,9 +70,7 @@ def test_any_stored_error_that_grows_threefold_is_a_failure():
         stored = before["topics"][topic][ERROR]
         assert any(value > FAR for value in stored.values()), topic
         for worse in (name for name, value in stored.items() if 3.0 * value > EXACT):
-            now = Measured.of(
-                "", errors={name: value * (3.0 if name == worse else 1.0) for name, value in stored.items()}
-            )
+            now = Measured.of("", errors={name: value * (3.0 if name == worse else 1.0) for name, value in stored.items()})
             found = less_accurate(changes(before, {topic: now}, before["yardstick_s"]))
             assert [row.name for row in found] == [worse]
 

@@ -160,9 +160,7 @@ def test_table_and_picture(tmp_path):
     for order in (2, 4):
         for n in (10, 40):
             told = {"curve": f"p = {order}", "parts": (0.01 / n, 0.02 / n)}
-            points.append(
-                Point(growth_paths.PROBLEM, precision_table.OURS, n, 90 * n, 0.02 / n, 1e-3 * n * order, **told)
-            )
+            points.append(Point(growth_paths.PROBLEM, precision_table.OURS, n, 90 * n, 0.02 / n, 1e-3 * n * order, **told))
     points += [Point(growth_paths.PROBLEM, precision_table.FEM, n, 900 * n, 0.06 / n, 1e-2 * n) for n in (10, 40)]
     goals = precision_table.goals_of(points)
     rows = {row["method"]: row for row in goals["time at one error over this solver's"]}

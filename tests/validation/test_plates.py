@@ -121,9 +121,7 @@ def test_brazilian_disc(ratio, degrees):
     errors = [np.abs(k - exact).max() / math.sqrt(ratio / math.pi) for k in (*found, limit)]
     order = np.log2(errors[0] / errors[1])
     listed = ", ".join(f"{e:.1e}" for e in errors)
-    print(
-        f"Brazilian disc a/R {ratio}, {degrees}°: with {sizes} facets and extrapolated {listed}, observed order {order:.2f}"
-    )
+    print(f"Brazilian disc a/R {ratio}, {degrees}°: with {sizes} facets and extrapolated {listed}, observed order {order:.2f}")
     assert 1.9 < order < 2.1 and errors[2] < 3e-4
 
 
