@@ -36,6 +36,8 @@ from geomech.scene import load_scene
 
 ROOT = Path(__file__).resolve().parent.parent
 
+pytestmark = pytest.mark.usefixtures("interruptible")
+
 ROCK = """
 [materials.rock]
 youngs_modulus_pa = 17e9
@@ -436,6 +438,7 @@ class _At(Breaks):
             raise self.error
 
 
+@pytest.mark.other_machines
 def test_a_second_interrupt_stops_at_once(write, tmp_path):
     scene, out = load_scene(write(SLIDING), ["output.checkpoint_every=2"]), tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
@@ -550,6 +553,7 @@ def test_a_hundred_kills_lose_nothing(write, tmp_path):
     _killed_and_resumed(write(SPLIT + "checkpoint_every = 3\n"), tmp_path, 100, 2)
 
 
+@pytest.mark.other_machines
 def test_signals_are_left_alone_elsewhere(write, tmp_path):
     """A run in another thread than the main one changes no handler; a run without checkpoints neither."""
     scene = load_scene(write(SLIDING), ["run.end_time_s=0.02"])
@@ -564,6 +568,15 @@ def test_signals_are_left_alone_elsewhere(write, tmp_path):
     thread.join()
     run(scene, tmp_path / "b", [Checkpoints(every=0), Sees(0)])
     assert len(seen) == 6 and set(seen) == {signal.default_int_handler}
+
+
+@pytest.mark.other_machines
+def test_an_ignored_interrupt_stays_ignored(write, tmp_path, in_the_background):
+    """A run that a script has put in the background is not broken off by the Ctrl-C meant for another program."""
+    scene = load_scene(write(SLIDING), ["run.end_time_s=0.06"])
+    ended = run(scene, tmp_path / "out", [*standard_observers(scene, quiet=True), Breaks(2)])
+    assert ended["end"] == "end of the scene"
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
 
 
 def test_time_spent_goes_on(write, tmp_path):

@@ -109,10 +109,10 @@ def _watched() -> Iterator[Watch]:
     solve, roughly = BlockSolver.solve, BlockSolver.rough_solution
     inside = False
 
-    def timed_find(self, *given):
+    def timed_find(self, *given, **named):
         spent_on = stopwatch()
         try:
-            return find(self, *given)
+            return find(self, *given, **named)
         finally:
             watch.search += spent_on()
 

@@ -8,31 +8,21 @@ error came. Seconds are those of the processor, so that the verdict does not dep
 
 from __future__ import annotations
 
-import hashlib
-import json
-import logging
-import multiprocessing
-import os
-import signal
 import statistics
 import tempfile
-import threading
-import time
-import traceback
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from functools import partial
 from pathlib import Path
 
 from ..output.summary import write_json
 from .figures import Measured
+from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Heard, limited
 from .random_slopes import scene_text
-from .refusals import REASONS, reason_of
+from .refusals import REASONS
+from .seed_rows import program, rows_of_seeds
 from .slope_invariants import INVARIANTS, Invariants
-
-RIGHT, REPORTED, REFUSED, LONG, WRONG = VERDICTS = ("right", "reported", "refused", "long", "wrong")
 
 #: Seeds of scenes that take a second or so, with cracks and without.
 LIGHT = (3, 5, 12, 16, 32, 34)
@@ -40,8 +30,8 @@ LIGHT = (3, 5, 12, 16, 32, 34)
 LIMIT = 30.0
 #: Where the rows, the table and the picture of many slopes go.
 FOLDER = Path("outputs/bench_slopes")
-#: Parts of the house that a slope's run depends on.
-PARTS = ("model", "shapes", "scene", "dda", "ddm", "coupling")
+#: Modules here that a slope's run depends on.
+_MODULES = ("fuzzed_slopes", "limited_runs", "random_slopes", "slope_invariants", "refusals")
 
 
 @dataclass(frozen=True)
@@ -76,47 +66,32 @@ class Watched:
         return ", ".join(f"{count} {kind}" for kind, count in sorted(self.events.items()))
 
 
-class _TimeUp(BaseException):
-    """No error of the run's own: nothing may catch it."""
-
-
 def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watched:
     """Load and run the scene of a ``seed`` (or ``text``) for at most so many processor ``seconds``, every cycle
     checked."""
     from ..coupling import cycles
     from ..scene import load_scene
 
-    heard, log, began = _Heard(), logging.getLogger("geomech"), time.process_time()
-    log.addHandler(heard)
     invariants = None
-    verdict, reason, message = RIGHT, "", ""
-    blocks = tips = number = 0
+    blocks = tips = 0
     events: Counter[str] = Counter()
-    try:
-        with _at_most(seconds), tempfile.TemporaryDirectory() as folder:
+
+    def run(heard: Heard) -> Iterator[None]:
+        nonlocal invariants, blocks, tips
+        with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"slope_{seed}.toml"
             path.write_text(scene_text(seed) if text is None else text, encoding="utf-8")
             problem = load_scene(path).problem()
-            invariants = Invariants(problem, lambda: heard.said)
-            for cycle in cycles(problem):
-                number += 1
-                blocks, tips = cycle.blocks.n_blocks, max(tips, len(cycle.tips))
-                events.update(event.kind for event in cycle.events)
-                invariants.check(cycle)
-            invariants.end()
-    except _TimeUp as up:
-        verdict, message = LONG, str(up)
-    except Exception as error:  # noqa: BLE001 (any but those known is what is looked for)
-        up = _time_up(error)
-        if up is not None:
-            # It came within a compiled function, which makes another error of it.
-            verdict, message = LONG, str(up)
-        else:
-            reason = reason_of(error, begun=number > 0) or ""
-            verdict = REFUSED if reason else WRONG
-            message = str(error) if reason else traceback.format_exc(limit=-3)
-    finally:
-        log.removeHandler(heard)
+        invariants = Invariants(problem, lambda: heard.said)
+        for cycle in cycles(problem):
+            blocks, tips = cycle.blocks.n_blocks, max(tips, len(cycle.tips))
+            events.update(event.kind for event in cycle.events)
+            invariants.check(cycle)
+            yield
+        invariants.end()
+
+    ended = limited(run, seconds)
+    verdict = ended.verdict
     faults, told, worst = (), (), {}
     if invariants is not None:
         faults, told, worst = tuple(invariants.faults), tuple(invariants.told), invariants.worst
@@ -125,46 +100,9 @@ def watched(seed: int, seconds: float = LIMIT, text: str | None = None) -> Watch
     elif told and verdict == RIGHT:
         verdict = REPORTED
     return Watched(
-        seed, verdict, reason, message, faults, told, tuple(heard.said), blocks, tips, number, dict(events), worst,
-        time.process_time() - began,
+        seed, verdict, ended.reason, ended.message, faults, told, ended.warnings, blocks, tips, ended.cycles,
+        dict(events), worst, ended.seconds,
     )  # fmt: skip
-
-
-class _Heard(logging.Handler):
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.said: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.said.append(record.getMessage())
-
-
-def _time_up(error: BaseException | None) -> _TimeUp | None:
-    """What ``error`` was made of or followed upon, if that is the end of the time."""
-    while error is not None and not isinstance(error, _TimeUp):
-        error = error.__cause__ or error.__context__
-    return error
-
-
-@contextmanager
-def _at_most(seconds: float) -> Iterator[None]:
-    """Raises `_TimeUp`, saying where it was, after so many ``seconds`` of the processor; where there are no timers,
-    never."""
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def up(_number, frame) -> None:
-        places = [f"{Path(at.filename).stem}.{at.name}" for at in traceback.extract_stack(frame)]
-        raise _TimeUp(" > ".join(name for name in places if not name.startswith("_"))[-300:])
-
-    before = signal.signal(signal.SIGPROF, up)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def measure(quick: bool = False) -> Measured:
@@ -180,27 +118,18 @@ def measure_many(
     Seeds that the same program has run before, as the rows there tell, are not run again."""
     from ..render.slope_outcomes import draw
 
-    program, rows = _program(), folder / "slopes.jsonl"
-    folder.mkdir(parents=True, exist_ok=True)
-    known = {w.seed: w for w in _read(rows) if w.program == program}
-    missing = [seed for seed in seeds if seed not in known]
-    if missing:
-        # A body a thread on every core would make the slopes wait for one another.
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        spawn = multiprocessing.get_context("spawn")
-        cores = workers or len(os.sched_getaffinity(0))
-        with ProcessPoolExecutor(cores, spawn, _compile) as pool, rows.open("a") as out:
-            for done in as_completed([pool.submit(watched, seed, seconds) for seed in missing]):
-                found = asdict(done.result()) | {"program": program}
-                known[found["seed"]] = Watched(**found)
-                out.write(json.dumps(found) + "\n")
-                out.flush()
-    every = [known[seed] for seed in seeds]
-    write_json(folder / "slopes.json", [_row(w) for w in every])
+    rows = folder / "slopes.jsonl"
+    names = {field.name for field in fields(Watched)}
+    found_rows = rows_of_seeds(seeds, rows, partial(_row_of_run, seconds), program(_MODULES), _compile, workers)
+    every = [Watched(**{name: value for name, value in row.items() if name in names}) for row in found_rows]
     found = _measured(every)
     picture = draw(every, VERDICTS, {name: each.bound for name, each in INVARIANTS.items()}, folder / "slopes.png")
     places = ", ".join(map(str, (folder / "slopes.json", rows.name, picture.name)))
     return Measured(f"{found.text}\n{places}", found.figures)
+
+
+def _row_of_run(seconds: float, seed: int) -> dict:
+    return asdict(watched(seed, seconds))
 
 
 def _compile() -> None:
@@ -254,25 +183,3 @@ def _row(w: Watched) -> dict:
         "seconds": round(w.seconds, 2), **{name: float(f"{value:.2g}") for name, value in w.worst.items()},
         "what": w.why,
     }  # fmt: skip
-
-
-def _program() -> str:
-    """A digest of the sources that a slope's run depends on."""
-    house, digest = Path(__file__).parent.parent, hashlib.sha256()
-    here = [
-        Path(__file__).with_name(f"{name}.py")
-        for name in ("fuzzed_slopes", "random_slopes", "slope_invariants", "refusals")
-    ]
-    for path in [*here, *sorted(path for part in PARTS for path in (house / part).rglob("*.py"))]:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def _read(rows: Path) -> Iterable[Watched]:
-    if not rows.exists():
-        return
-    for line in rows.read_text(encoding="utf-8").splitlines():
-        try:
-            yield Watched(**json.loads(line))
-        except (TypeError, json.JSONDecodeError):
-            continue  # of another version, or cut off as it was written

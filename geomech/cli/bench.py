@@ -28,12 +28,17 @@ def declare(verbs: Verbs) -> None:
     )
     bench.add_argument(
         "--seeds", metavar="FIRST-LAST",
-        help="of slopes: run these, one on each core, and leave rows and a picture in outputs/bench_slopes; seeds that "
-             "have been run before, by the same program, are not run again",
+        help="of slopes and sliding: run these, one on each core, and leave rows and a picture in outputs/bench_slopes "
+             "or outputs/bench_sliding; seeds that have been run before, by the same program, are not run again",
     )  # fmt: skip
-
     bench.add_argument(
-        "--blocks", type=int, metavar="N", help="of dda: a wall and a slope of so many too (100000: 12 minutes, 7 GB)"
+        "--invariance", action="store_true",
+        help="of slopes, with --seeds: hold the moved mass, its gravity work, displacements and energies of each "
+             "against those in shorter steps, mirrored, rotated, shifted, with joints in another order and with noise",
+    )  # fmt: skip
+    bench.add_argument(
+        "--blocks", type=int, metavar="N",
+        help="of dda: a wall and a slope of so many too (100000: 12 minutes, 7 GB); of motion: a slope of so many too",
     )
     bench.add_argument(
         "--seconds", type=float, metavar="S", help="of debris: follow it for so long (60: an hour)"
@@ -53,20 +58,32 @@ def _bench(options: argparse.Namespace) -> int:
     seeds = _seeds(options)
     out = options.out or Path("outputs/bench/figures.json")
     check_writable("--out", out)
-    if options.blocks is not None and ("dda" not in options.topics or options.blocks < 1):
-        raise BadInput("--blocks takes a number of blocks and belongs to dda: geomech bench dda --blocks 100000")
+    if options.blocks is not None and (not {"dda", "motion"} & set(options.topics) or options.blocks < 1):
+        raise BadInput(
+            "--blocks takes a number of blocks and belongs to dda and motion: geomech bench dda --blocks 100000"
+        )
     if options.seconds is not None and ("debris" not in options.topics or not options.seconds > 0):
         raise BadInput("--seconds takes a time in s and belongs to debris: geomech bench debris --seconds 60")
+    if options.invariance and ("slopes" not in options.topics or not seeds):
+        raise BadInput("--invariance belongs to slopes, with --seeds: geomech bench slopes --seeds 0-9 --invariance")
     unit, found = figures.yardstick(), {}
     spent: dict[str, dict[str, float]] = {}
     print(figures.said(figures.machine()), end="\n\n")
     for name in options.topics or TOPICS:
         began = time.perf_counter(), figures.processor_seconds()
-        if name == "slopes" and seeds:
+        if name == "slopes" and options.invariance:
+            from ..bench.slope_invariance import measure_invariance
+
+            found[name] = measure_invariance(seeds)
+        elif name == "slopes" and seeds:
             from ..bench.fuzzed_slopes import measure_many
 
             found[name] = measure_many(seeds)
-        elif name == "dda":
+        elif name == "sliding" and seeds:
+            from ..bench.sliding_slopes import measure_many as measure_sliding
+
+            found[name] = measure_sliding(seeds)
+        elif name in ("dda", "motion"):
             found[name] = topic(name)(options.quick, options.blocks)
         elif name == "debris":
             found[name] = topic(name)(options.quick, options.seconds)
@@ -87,11 +104,11 @@ def _bench(options: argparse.Namespace) -> int:
 
 
 def _seeds(options: argparse.Namespace) -> range:
-    """The seeds of slopes that are asked for; none: the benchmark's own."""
+    """The seeds that are asked for; none: the benchmark's own."""
     if options.seeds is None:
         return range(0)
-    if "slopes" not in options.topics:
-        raise BadInput("--seeds belongs to slopes: geomech bench slopes --seeds 0-299")
+    if not {"slopes", "sliding"} & set(options.topics):
+        raise BadInput("--seeds belongs to slopes and sliding: geomech bench slopes --seeds 0-299")
     first, _, last = options.seeds.partition("-")
     if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
         raise BadInput(f"--seeds takes two numbers that ascend, as 0-299, not {options.seeds!r}")

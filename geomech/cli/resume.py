@@ -18,7 +18,8 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
     resume.description += (
         " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores "
-        "itself on Ctrl-C or SIGTERM; a second one ends it at once."
+        "itself on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
+        "script has put in the background ignores Ctrl-C and ends on SIGTERM (`kill`)."
     )
     resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
     resume.add_argument(

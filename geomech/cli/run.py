@@ -83,7 +83,8 @@ def prepare_for_a_run() -> None:
     import signal
     import threading
 
-    if threading.current_thread() is threading.main_thread():
+    ignored = signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+    if threading.current_thread() is threading.main_thread() and not ignored:
         # A batch system's SIGTERM ends a run as Ctrl-C does, with its summary written.
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     # A cycle makes thousands of short-lived arrays and no reference loops worth speaking of: looking for loops every

@@ -16,13 +16,13 @@ def born_first(
     """The births (`ddm.initiation.Birth`) of the most overstressed block (keys of ``solutions``), whether or not it has
     reached its strength, and that block; ((), −1) when none has a strength to exceed."""
     from ..ddm.initiation import births
+    from ..ddm.ties import reached
 
-    best, where = (), -1
-    for b, solution in solutions.items():
-        found = births(solution, materials[blocks.material[b]], settings, b)
-        if found and (not best or found[0].overstress > best[0].overstress):
-            best, where = found, b
-    return best, where
+    found = {b: births(solution, materials[blocks.material[b]], settings, b) for b, solution in solutions.items()}
+    most = max((of[0].overstress for of in found.values() if of), default=0.0)
+    # Of blocks that are alike the first.
+    where = next((b for b, of in found.items() if of and reached(of[0].overstress, most)), -1)
+    return found.get(where, ()), where
 
 
 def bear_in_blocks(
@@ -40,9 +40,10 @@ def bear_in_blocks(
     time: the others then carry other loads."""
     from ..ddm.growth import Growth
     from ..ddm.initiation import bear
+    from ..ddm.ties import reached
 
     best, where = born_first(blocks, materials, solutions, settings)
-    if not best or best[0].overstress < enough:
+    if not best or not reached(best[0].overstress, enough):
         return None, ()
     # The body's segments are those of its block, in order.
     of_block = np.flatnonzero(cracks.block == where)

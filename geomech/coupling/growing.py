@@ -29,11 +29,13 @@ def growth_of_tips(
     None; those with ``together`` times theirs grow with it. No tip goes farther than ``longest`` (n_tips,) m, and none
     with 0. Sets the angles that were followed."""
     k_ic = toughness(now, tips)
-    if not np.any((tips["k_eq"] >= enough * k_ic) & (np.asarray(longest) > 0)):
-        return None
-    k_ic = together * k_ic
     from ..ddm.growth import advance
     from ..ddm.path import corrected
+    from ..ddm.ties import reached
+
+    if not np.any(reached(tips["k_eq"], enough * k_ic) & (np.asarray(longest) > 0)):
+        return None
+    k_ic = together * k_ic
 
     trial = now.bodies
 

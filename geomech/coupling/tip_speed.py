@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..ddm.ties import reached
 from ..model import Blocks, Problem
 
 
@@ -34,7 +35,7 @@ class TipSpeed:
         if not np.isfinite(way).any():
             return way
         way = way + self._of(self._kept, tips) - self._of(self._gone, tips)
-        return np.where(way < self._shortest, 0.0, way)
+        return np.where(reached(way, self._shortest), way, 0.0)
 
     def went(self, tips: np.ndarray) -> None:
         """``tips`` have ``grown`` in a pass of the present step."""

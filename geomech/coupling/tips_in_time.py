@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..ddm.ties import reached
 from ..model import Blocks, Problem
 from .tip_speed import TipSpeed
 from .tractions import BoundaryLoad
@@ -34,4 +35,4 @@ class TipsInTime:
         self.waves.end(tips, blocks, dt, loads)
 
     def _driven(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
-        return self.waves.drive(tips, blocks, dt, loads) >= self._k_ic[blocks.material[tips["block"]]]
+        return reached(self.waves.drive(tips, blocks, dt, loads), self._k_ic[blocks.material[tips["block"]]])

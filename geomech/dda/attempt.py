@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..conventions import rotate_stress
-from ..model import OPEN, STICK, Loads, State
+from ..model import OPEN, SLIP, STICK, Loads, State
 from . import assembly
 from .actions import StepActions, felt_gravity
 from .augmented import settle_augmented
@@ -31,7 +31,7 @@ from .rigid import mean_stress
 from .rounding import tell_felt, undecided_gaps
 from .step import CrackResponse, StepResult
 from .step_equations import Settled, Unsettled
-from .stopping import Stopped, dissipating, stop
+from .stopping import Stopped, Unresolved, contact_speeds, dissipating, stop
 from .stretched import stretched
 from .time_integration import advance, assemble_blocks, turned
 from .viscous_boundary import QuietEdges
@@ -44,9 +44,9 @@ if TYPE_CHECKING:
 _LABOUR, _EASED = 6, 3
 #: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
 _PLACED = 20
-#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the radius of
-#: corners; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
-#: (slabs that lean, of a tenth of the radius, as much in one step as all loads do).
+#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the contacts'
+#: ``precision``; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
+#: (slabs that lean, of a tenth of that, as much in one step as all loads do).
 _BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
 
 
@@ -85,6 +85,8 @@ class Attempt:
         self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
         self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
         self.iterations = 0
+        if not scheme.static and found.tried is None and len(found):
+            self.found = found.expecting(*self._expected_states())
         self._edges_along: tuple[np.ndarray | None, np.ndarray] = None, np.zeros((0, 2))
         foreseen = self._foreseen()
         self._place(foreseen)
@@ -99,6 +101,26 @@ class Attempt:
             if not bends or not self._bent():
                 break
         self._move()
+
+    def _expected_states(self) -> tuple[np.ndarray, np.ndarray]:
+        """States and senses of sliding (n,) that open-close iterations begin with: those carried over, but of contacts
+        whose blocks part, meet or slide so fast that it would take more than all that they bear to keep them from it in
+        a step."""
+        found, system = self.found, self.system
+        centroid = np.ascontiguousarray(self.moments[:, 1:3])
+        apart, along = contact_speeds(found, found.geometry, self.carried, centroid).T
+        mass = np.where(system.fixed, np.inf, system.mass)
+        largest = np.where(system.fixed, np.inf, 0.0)
+        for blocks in (found.block, found.other):
+            np.maximum.at(largest, blocks, found.normal)
+        least = np.minimum(mass[found.block], mass[found.other]), np.minimum(largest[found.block], largest[found.other])
+        fast, slides = (least[0] * np.abs(speed) / self.dt > least[1] for speed in (apart, along))
+        after, loose = found.gap_before + self.dt * apart, found.bonded == 0
+        parts = fast & (found.state != OPEN) & loose & (after > 0.0)
+        closed = np.where(found.state == OPEN, fast & (after < 0.0), ~parts)
+        slides &= closed & loose & ((found.springs.friction > 0.0) | (found.springs.sliding > 0.0))
+        state = np.where(slides, SLIP, np.where(closed, np.where(found.state == OPEN, STICK, found.state), OPEN))
+        return state, np.where(slides, -np.sign(along), np.where(parts, 0.0, found.direction))
 
     def _foreseen(self) -> np.ndarray | None:
         """(n_blocks, 6) what the velocity makes of this step; None in statics, which carry none."""
@@ -221,7 +243,7 @@ class Attempt:
         system, found, settled = self.system, self.found, self.settled
         if not len(found) or not self.n_free:
             return False
-        known = (_KNOWN_IN_STATICS if system.scheme.static else _KNOWN) * found.rounding
+        known = (_KNOWN_IN_STATICS if system.scheme.static else _KNOWN) * found.precision
         # What turns by r while it moves by d leaves its chord by r d at most.
         increment = self._increment(self.unknowns)
         if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
@@ -230,7 +252,7 @@ class Attempt:
         straight = settled.gap + settled.lifted + found.lift - found.arc
         if found.points is not None:
             straight = found.points.gap_at_corners(straight)
-        gap = system.finder.gaps(vertices, found.vertex, found.edge)
+        gap = system.finder.gaps(vertices, self.vertices, found if found.lumped is None else found.lumped)
         arc, before = gap - straight, found.arc if found.lumped is None else found.lumped.arc
         some = (settled.state != OPEN) | (gap < 0.0)
         if not (np.abs(arc - before) > known)[some].any():
@@ -261,7 +283,7 @@ class Attempt:
         across, slid = (sliding(vectors, scaled, all_blocks, *blocks, way) for way in (0, 1))
         end = Middle.of(increment, 1.0, self.vertices, system.owner, self.moments)
         went = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]
-        arc = system.finder.gaps(vertices, found.vertex, found.edge) - found.geometry[:, 3] - across
+        arc = system.finder.gaps(vertices, self.vertices, found) - found.geometry[:, 3] - across
         self.found = self.found.along(arc, went * np.hypot(*along.T) - slid)
 
     def _along(self, found: ContactSet) -> np.ndarray:
@@ -308,7 +330,7 @@ class Attempt:
                 most = system.settings.max_open_close_iterations
                 return settle(
                     pattern, matrix, right, contacts, vectors, stiff, start, slack, most, curved,
-                    system.scheme.static, self.patient,
+                    system.scheme.static, self.patient, expected=self._expected_unknowns(),
                 )  # fmt: skip
 
             return stretched(settled, contacts, stiff, start, stretch, curved) if stretch.any() else settled(contacts)
@@ -317,6 +339,17 @@ class Attempt:
         if not system.allowed_penetration or not len(found):
             return solve(found, springs, gap, found.stretch)
         return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
+
+    def _expected_unknowns(self) -> np.ndarray | None:
+        """(6 n_free,) what the velocity makes of this step, in the unknowns of `assembly`; None in statics."""
+        if self.system.scheme.static:
+            return None
+        moving = self.system.moving
+        increment = self.dt * self.carried[moving]
+        increment[:, 2:] *= np.sqrt(self.moments[moving, :1])
+        out = np.empty_like(increment)
+        out[self.order[moving]] = increment
+        return out.ravel()
 
     def _increment(self, unknowns: np.ndarray) -> np.ndarray:
         """(n_blocks, 6) displacements of all blocks in the step."""
@@ -381,18 +414,22 @@ class Attempt:
         return before
 
     def _stop(self, imposed) -> None:
-        """Take the sliding that friction has stopped in the step off the velocity; the energy (J/m) that this takes."""
+        """Take off the velocity what the step cannot bring about (`stopping`); the energy (J/m) that this takes."""
         system, found, velocity = self.system, self.found, self.velocity
         mass = np.where(system.fixed, np.inf, system.mass)
+        if not len(found):
+            return
         end = Middle.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
         geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
-        stopped = Stopped.of(
-            found, geometry, self.settled, self.slid, velocity, end.centroid, mass, self.dt, system.rounding
-        )
-        if stopped is None:
+        speeds = contact_speeds(found, geometry, velocity, end.centroid)
+        stopped = Stopped.of(found, self.settled, self.slid, speeds[:, 1], mass, self.dt, system.rounding)
+        unresolved = Unresolved.of(found, self.settled, self.slid, speeds, mass, self.dt)
+        if stopped is None and unresolved is None:
             return
         try:
-            change = stop(stopped, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt)
+            change, rubbed = stop(
+                stopped, unresolved, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt
+            )  # fmt: skip
         except np.linalg.LinAlgError as error:
             raise Unsettled(str(error)) from error
         if imposed is not None:
@@ -400,10 +437,10 @@ class Attempt:
         rates = np.zeros_like(velocity)
         rates[system.moving] = change[self.order[system.moving]] * (2.0 / self.dt)
         rates[:, 2:] /= np.sqrt(self.moments[:, :1])
-        rates, self.rubbed = dissipating(
+        rates, taken = dissipating(
             turned(rates, self.increment[:, 2]), velocity, self.moments, self.density, system.fixed
         )
-        self.velocity = velocity + rates
+        self.velocity, self.rubbed = velocity + rates, min(max(rubbed, 0.0), taken)
 
     def result(self) -> StepResult:
         """The step as it is told of."""
@@ -537,8 +574,5 @@ class Attempt:
 
 
 def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
-    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them.
-
-    An open one whose vertex is behind its edge's line has a partner line that is not crossed: nothing penetrates there.
-    """
+    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them."""
     return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0

@@ -173,6 +173,11 @@ class BlockSolver:
         self.counts = {"factorisations": 0, "shares": 0.0, "substitutions": 0}
 
     @property
+    def points(self) -> np.ndarray:
+        """(n, 2) m: where the blocks lie."""
+        return self._pattern[0]
+
+    @property
     def in_parts(self) -> bool:
         """Whether a matrix that differs in some blocks from the last is factored for a part of the price."""
         return self._factors.tree.kept

@@ -49,12 +49,10 @@ class BondedFaces:
 
     @classmethod
     def of(
-        cls, block: np.ndarray, other: np.ndarray, partner: np.ndarray, geometry: np.ndarray, bonded: np.ndarray
+        cls, block: np.ndarray, other: np.ndarray, geometry: np.ndarray, bonded: np.ndarray
     ) -> BondedFaces | None:
         """Faces among the contacts (n,) of a `ContactSet`; None without any."""
-        some = np.flatnonzero(
-            ((bonded == WHOLE) | (bonded == CRACKED)) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1)
-        )
+        some = np.flatnonzero(((bonded == WHOLE) | (bonded == CRACKED)) & (geometry[:, 4] > 0))
         if len(some) < 2:
             return None
         some, start, along = on_lines(block, other, geometry, some)

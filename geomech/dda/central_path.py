@@ -95,23 +95,13 @@ def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np
     return lambda right, within=WITHIN: dgetrs(factors, pivots, right)[0]
 
 
-def acting(partner: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """(n,) True for contacts that alone stand for their pair of corners: the line that is crossed last."""
-    acting = np.ones(len(gap), bool)
-    index = np.arange(len(gap))
-    for column in partner.T:
-        theirs = gap[column]
-        acting &= (column < 0) | (theirs < gap) | ((theirs == gap) & (column > index))
-    return acting
-
-
 class CentralPath:
     """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which
     hold, ``forces`` (n,) N normal forces of the size to be expected, ``room`` gives each iteration the flat
-    matrix to fill; without, it takes its own.
+    matrix to fill; without, it takes its own. ``expected`` (6 n,) is the motion to begin with, that of the velocities,
+    None for none.
 
-    Corners that meet are stood for by one of their lines, the one that is crossed last as the step begins. ``missed``:
-    what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
+    ``missed``: what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
     stiffness.
     """
 
@@ -127,12 +117,12 @@ class CentralPath:
         bonded: np.ndarray,
         forces: np.ndarray,
         room: Callable[[], np.ndarray] | None = None,
+        expected: np.ndarray | None = None,
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right
         self._n, self.bonded = len(found), bonded
-        act = acting(found.partner, gap)
         slipped = bonded == SLIPPED
-        some, held = (np.flatnonzero(act & which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
+        some, held = (np.flatnonzero(which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
         order = pattern.order
         if pattern.n >= THREADED:
             # Beyond what caches hold, in the order of their blocks: what contacts need of one another then lies near.
@@ -161,7 +151,10 @@ class CentralPath:
         self._rough = (friction > 0.0) | (firm > 0.0)
         self._mu, self._base = np.where(self._rough, friction, 1.0), np.where(self._rough, firm, 0.0)
 
-        load = np.append(np.abs(right).max(axis=1, initial=0.0), 0.0)
+        start = np.zeros(right.size) if expected is None else expected
+        # What moves on by itself is no load.
+        left = right - pattern.without_contacts(matrix, start)
+        load = np.append(np.abs(left).max(axis=1, initial=0.0), 0.0)
         mine, others = order[self._at[0]], order[self._at[1]]
         # Small blocks pass on what large ones press them with: contacts in units of a small block's own load would have
         # forces that are nothing beside what they must balance, and no step of the path would get anywhere.
@@ -175,10 +168,12 @@ class CentralPath:
         load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
         self._unit = load * load / self._kn
         self._room = room
-        self._unknowns = np.zeros(right.size)
+        self._unknowns = start.copy()
         # Motions: what makes the gap and the motion along the edge 0 where no force acts.
-        self._g, self._s = gap[some], -found.shear[some] / self._ks
-        self._load = max(float(np.abs(right).max()), 1e-300)
+        apart, along = moved(start, *self._at).T
+        self._g = gap[some] + apart - springs.lift[some] * along
+        self._s = along - found.shear[some] / self._ks
+        self._load = max(float(np.abs(left).max()), 1e-300)
         mean = float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0
         self._begin(max(_START * mean, _LEAST_START))
 

@@ -48,10 +48,11 @@ def inherited(rows, parent):
 @_jit
 def fill(
     rows, vertex, edge, block, other, law, inset, state, bonded, gap, normal_force, shear_force, slipped, worn, slip,
-    lift, lifted, acting, length,
+    lift, lifted, acting, length, tilt,
 ):  # fmt: skip
     """Fill CONTACT ``rows`` (n,): ``slipped``, ``worn`` and ``lift`` (n,) m as the step began, ``slip`` and ``lifted``
-    in it; where contacts are by ``acting`` (n, 7), as in `ContactSet.geometry`, and their ``length`` (n,)."""
+    in it; where contacts are by ``acting`` (n, 7), as in `ContactSet.geometry`, their ``length`` and
+    ``tilt`` (n,)."""
     for c in range(len(rows)):
         row = rows[c]
         row.vertex, row.edge, row.block, row.other, row.law = vertex[c], edge[c], block[c], other[c], law[c]
@@ -64,13 +65,14 @@ def fill(
         # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
         row.lift = max(lift[c] + lifted[c], min(lift[c], 0.0))
         row.bare = row.stretch = 0.0
+        row.tilt = tilt[c]
 
 
 @_jit
 def _carry(out, rows, vertices, next_vertex):
-    for c in range(len(rows)):
-        out[c] = rows[c]
-        row = out[c]
+    for k in range(len(rows)):
+        out[k] = rows[k]
+        row = out[k]
         vertex, start = row.vertex, row.edge
         end = next_vertex[start]
         along, up = vertices[end, 0] - vertices[start, 0], vertices[end, 1] - vertices[start, 1]
@@ -78,7 +80,8 @@ def _carry(out, rows, vertices, next_vertex):
         length = np.hypot(along, up)
         row.point[0], row.point[1] = vertices[vertex, 0], vertices[vertex, 1]
         row.position = (x * along + y * up) / (length * length)
-        row.normal[0], row.normal[1] = up / length, -along / length
+        c, s = np.cos(row.tilt), np.sin(row.tilt)
+        row.normal[0], row.normal[1] = (c * up + s * along) / length, (s * up - c * along) / length
 
 
 def carried(rows: np.ndarray, vertices: np.ndarray, next_vertex: np.ndarray) -> np.ndarray:

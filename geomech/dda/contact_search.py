@@ -5,17 +5,22 @@ through which one can enter the other are the edges that have the other corner w
 entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
 within the other's edge, or where they lean to each other by the one whose own face leans away; where each lies within
 the other's, the two corners are the ends of a short common face, and both stand for the line. Corners meet only if
-neither is nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all are in reach of all, and the lines of far ones are crossed by blocks
-that do not touch. When two lines remain, the corners overlap only if both gaps are negative, and the line of the
-smaller penetration carries the contact; each is stored as the other's *partner*.
+neither is nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all
+are in reach of all, and the lines of far ones are crossed by blocks that do not touch.
+
+Where two lines remain, the corners are rounded (`corner_rounding`), and one contact stands for both: where and in which
+direction the rounded corners first meet in the step.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..compiled import kept, part
 from .near_pairs import boxes
+from .rounded_corners import EASED, meeting, rounding_length
 
 # Corners and edges that interpenetrate by less than this angle (sine, about 3°) still count as touching face to face.
 _ANGLE = 0.05
@@ -30,6 +35,8 @@ _LEAN = 0.01
 _ENDS = 1e-4
 # Corners are nearer to one than to another when their distances squared differ by more than this part.
 _NEARER = 1e-2
+# Corners may come nearer by so many times the motion that is expected of them.
+_HASTE = 2.0
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
 
@@ -118,56 +125,81 @@ def _add(table, count, first, vertex, edge):
     table[count, 0] = vertex
     table[count, 1] = edge
     table[count, 2] = -1
-    table[count, 3] = -1
+    table[count, 3] = 0
     return count
 
 
-@part(fastmath=False, error_model="numpy", nogil=True)
-def _join_partners(table, row, other):
-    for column in (2, 3):
-        if table[row, column] == other:
-            return
-        if table[row, column] < 0:
-            table[row, column] = other
-            return
+class Corners(NamedTuple):
+    """What is known of corners before they are looked at.
+
+    convex    (n_vertices,)    bool
+    rounding  (n_vertices,)    m, their rounding lengths
+    longest   (n_vertices,)    m, the longest that these may be
+    pressed   (n_blocks,)      m, how deep the faces of each block are pressed in
+    motion    (n_vertices, 2)  m, how far each vertex is expected to move in the step
+    margin                     m, by which corners may come nearer besides: pairs that then stay apart are left out
+    """
+
+    convex: np.ndarray
+    rounding: np.ndarray
+    longest: np.ndarray
+    pressed: np.ndarray
+    motion: np.ndarray
+    margin: float
 
 
-def find_contacts(vertices, next_vertex, previous_vertex, vertex_start, pairs, window, old_keys) -> np.ndarray:
-    """(n_contacts, 4): vertex, edge, and up to two partner rows (−1: none), for all of the ``pairs`` (k, 2) of blocks,
-    the lower number first, that are nearer than ``window`` (m, of all or (k,) of each), pair by pair.
+def find_contacts(
+    vertices, next_vertex, previous_vertex, vertex_start, pairs, window, old_keys, corners
+) -> tuple[np.ndarray, np.ndarray]:
+    """All contacts of the ``pairs`` (k, 2) of blocks, the lower number first, that are nearer than ``window`` (m, of all or
+    (k,) of each), pair by pair: a table (n, 4) of vertex, edge, the corner of the edge's block that the vertex meets where
+    it is two rounded corners that meet (−1: a vertex meets a line), and whether corners that meet on a line may overlap
+    by a step that rounding smooths (1, else 0); and (n, 3) the normal that pushes the vertex's block and the gap (m) of
+    rounded corners.
+
 
     ``old_keys`` (sorted vertex·n_vertices + edge of the last step's contacts) settles which of two equivalent
-    representations of a corner on a corner is kept, so that contacts do not change names on round-off.
+    representations of a corner on a corner is kept, so that contacts do not change names on round-off; ``corners`` is a
+    `Corners`.
     """
     box = boxes(vertices, vertex_start[:-1])
     room, windows = 32 + 8 * len(box), _each(window, len(pairs))
     while True:
-        table = np.empty((room, 4), np.int64)
-        count = _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys)
+        table, met = np.empty((room, 4), np.int64), np.zeros((room, 3))
+        count = _look_at(
+            table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys, *corners
+        )
         if count >= 0:
-            return table[:count]
+            return table[:count], met[:count]
         room *= 2
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys):
-    """Fill ``table`` with the contacts of ``pairs`` within ``windows`` (k,) and return their number, or −1 when it has no
-    room for them.
+def convex_corners(vertices, next_vertex, previous_vertex):
+    """(n_vertices,) bool: a flat vertex counts as convex, for faces that were split at a node still touch there."""
+    convex = np.empty(vertices.shape[0], np.bool_)
+    for i in range(vertices.shape[0]):
+        k, j = previous_vertex[i], next_vertex[i]
+        ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
+        bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
+        convex[i] = ax * by - ay * bx >= -1e-9 * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
+    return convex
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _look_at(
+    table, met, box, pairs, vertices, next_vertex, previous_vertex, vertex_start, windows, old_keys, convex, rounding,
+    longest, pressed, motion, margin,
+):  # fmt: skip
+    """Fill ``table`` and ``met`` with the contacts of ``pairs`` within ``windows`` (k,) and return their number, or −1
+    when they have no room for them.
 
     ``box`` (n_blocks, 4) is the blocks' least x, y and greatest x, y.
     """
     n_vertices = vertices.shape[0]
-    convex = np.empty(n_vertices, np.bool_)
-    for i in range(n_vertices):
-        k, j = previous_vertex[i], next_vertex[i]
-        ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
-        bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
-        # A flat vertex counts as convex: faces that were split at a node still touch there.
-        convex[i] = ax * by - ay * bx >= -1e-9 * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
     count = 0
     pick_vertex = np.empty(4, np.int64)
     pick_edge = np.empty(4, np.int64)
-    rows = np.empty(4, np.int64)
     pick = np.empty(
         (4, 7)
     )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside, sine away from it
@@ -235,24 +267,53 @@ def _look_at(table, box, pairs, vertices, next_vertex, previous_vertex, vertex_s
                     pick_vertex[k], pick_edge[k] = vertex, edge
                     pick[k, 0], pick[k, 1], pick[k, 2], pick[k, 3], pick[k, 4] = nx, ny, gap, outside, length
                     pick[k, 5], pick[k, 6] = inside, away
-                widest = -np.inf
+                # The line that is least crossed, and of those in other directions the one that is.
+                one, two = -1, -1
                 for k in range(n_lines):
-                    widest = max(widest, pick[k, 2])
-                if widest > window:
+                    if one < 0 or pick[k, 2] > pick[one, 2]:
+                        one = k
+                for k in range(n_lines):
+                    if k != one and twin[k] != one and (two < 0 or pick[k, 2] > pick[two, 2]):
+                        two = k
+                if one < 0:
                     continue
                 if count + 4 > table.shape[0]:
                     return -1
+                line, length, reach = 1, 0.0, window
+                if two >= 0:
+                    length = rounding_length(
+                        min(rounding[v], rounding[w]), min(longest[v], longest[w]), max(pressed[a], pressed[b])
+                    )
+                    ux, uy = motion[v, 0] - motion[w, 0], motion[v, 1] - motion[w, 1]
+                    mx, my, gap, line = meeting(
+                        dx, dy, ux, uy, pick[one, 0], pick[one, 1], pick[one, 2], pick[two, 0], pick[two, 1],
+                        pick[two, 2], length,
+                    )  # fmt: skip
+                    reach = min(window, _HASTE * np.sqrt(ux * ux + uy * uy) + margin)
+                    if line == 0:
+                        if gap > reach or gap < -window:
+                            continue
+                        # It goes by the name of the line whose normal is nearer to its own.
+                        k = one
+                        if mx * pick[two, 0] + my * pick[two, 1] > mx * pick[one, 0] + my * pick[one, 1]:
+                            k = two
+                        row = _add(table, count, first, pick_vertex[k], pick_edge[k])
+                        if row < count:
+                            continue
+                        count += 1
+                        sign = 1.0 if pick_vertex[k] == v else -1.0
+                        table[row, 2] = w if pick_vertex[k] == v else v
+                        met[row, 0], met[row, 1], met[row, 2] = sign * mx, sign * my, gap
+                        continue
                 for k in range(n_lines):
-                    rows[k] = -1
-                    if pick[k, 2] < -window:
+                    if k != (one if line == 1 else two) and twin[k] != (one if line == 1 else two):
+                        continue
+                    if pick[k, 2] > reach or pick[k, 2] < -window:
                         continue
                     row = _add(table, count, first, pick_vertex[k], pick_edge[k])
-                    count = max(count, row + 1)
-                    for m in range(k):
-                        if rows[m] >= 0 and twin[k] != m:
-                            _join_partners(table, row, rows[m])
-                            _join_partners(table, rows[m], row)
-                    rows[k] = row
+                    if row == count:
+                        table[row, 3] = 1 if two >= 0 and pick[k, 2] > -EASED * length else 0
+                        count += 1
         # 2. Corner to edge, and corner into a re-entrant corner.
         for role in range(2):
             i, j = (a, b) if role == 0 else (b, a)
@@ -307,9 +368,10 @@ def _each(window, n: int) -> np.ndarray:
 
 
 def describe_contacts(
-    table, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
+    table, met, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Geometry of the rows of `find_contacts` and what they inherit; ``window`` m, of all or (n,) of each.
+    """Geometry of the rows of `find_contacts`, ``table`` and ``met``, and what they inherit; ``window`` m, of all or (n,)
+    of each.
 
     Returns (geometry, mate, parent): geometry (n, 7) = position, normal x, y, gap, tributary length, vertex x, y; mate
     (n,) the edge of the vertex's own block that faces the touched edge; parent (n,) the row of the last step's contacts
@@ -317,13 +379,15 @@ def describe_contacts(
     The tributary length is half the overlap of the faces that meet there, 0 for a lone corner.
     """
     return _describe(
-        table, vertices, next_vertex, previous_vertex, _each(window, len(table)), old_vertex, old_edge, old_normal,
+        table, met, vertices, next_vertex, previous_vertex, _each(window, len(table)), old_vertex, old_edge, old_normal,
         old_order,
     )  # fmt: skip
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _describe(table, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order):
+def _describe(
+    table, met, vertices, next_vertex, previous_vertex, window, old_vertex, old_edge, old_normal, old_order
+):  # fmt: skip
     """As `describe_contacts`, each row with its own ``window`` (n,)."""
     n, n_vertices = table.shape[0], vertices.shape[0]
     geometry = np.empty((n, 7))
@@ -372,6 +436,10 @@ def _describe(table, vertices, next_vertex, previous_vertex, window, old_vertex,
                 s1 = (vertices[head, 0] - vertices[face, 0]) * tx + (vertices[head, 1] - vertices[face, 1]) * ty
                 tributary += 0.5 * max(0.0, min(face_length, max(s0, s1)) - max(0.0, min(s0, s1)))
         geometry[row, 4] = tributary
+        if table[row, 2] >= 0:
+            # Rounded corners have no face in common.
+            geometry[row, 4] = 0.0
+            geometry[row, 1], geometry[row, 2], geometry[row, 3] = met[row, 0], met[row, 1], met[row, 2]
         key = vertex * n_vertices + edge
         at = _place(keys, key)
         if at >= 0:

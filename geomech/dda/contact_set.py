@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model import CONTACT, OPEN, SLIP
+from ..model import CONTACT, SLIP
 from .bonded_faces import BondedFaces
 from .contact_rows import fill
 from .contact_springs import Springs
@@ -17,18 +17,15 @@ from .face_points import FacePoints
 if TYPE_CHECKING:
     from .step_equations import Settled
 
-
-#: Corners that come in by the very end of an edge may end the step so many radii of corners beyond it.
-_PASSING = 100.0
-
-
 @dataclass(frozen=True, eq=False)
 class ContactSet:
     """Contacts (n,) as a step begins.
 
     vertex, edge, block, other, law   as in CONTACT rows
-    partner     (n, 2)   rows of the other lines of the same pair of corners, −1 where there are none
-    rounding    (n,)     m, radius of corners: lines that miss each other by less still hold
+    corner      (n,)     the corner of the edge's block that the vertex meets where both are rounded corners
+                         (`rounded_corners`), −1 where the vertex meets the edge's line
+    tilt        (n,)     rad, from the edge's normal to that along which rounded corners meet; 0 where a line is met
+    precision   (n,)     m, to which the gaps of blocks that turn are followed
     geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the
                 faces in ``points``, where their springs stand
     springs              stiffness and strengths
@@ -60,8 +57,9 @@ class ContactSet:
     block: np.ndarray
     other: np.ndarray
     law: np.ndarray
-    partner: np.ndarray
-    rounding: np.ndarray
+    corner: np.ndarray
+    tilt: np.ndarray
+    precision: np.ndarray
     geometry: np.ndarray
     springs: Springs
     state: np.ndarray
@@ -103,6 +101,25 @@ class ContactSet:
         return replace(
             self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction), bonded)
         )
+
+    def part(self, rows: np.ndarray) -> ContactSet:
+        """The contacts ``rows`` (k,) alone, without the faces that they are ends of."""
+        n = len(self)
+
+        def of(value):
+            if isinstance(value, np.ndarray) and len(value) == n:
+                return value[rows]
+            return Springs(**{name: each[rows] for name, each in vars(value).items()}) if value is self.springs else value
+
+        own = {field.name: of(getattr(self, field.name)) for field in fields(self)}
+        tried = None if self.tried is None else tuple(each[rows] for each in self.tried)
+        return ContactSet(**own | {"faces": None, "points": None, "lumped": None, "tried": tried})
+
+    def expecting(self, state: np.ndarray, direction: np.ndarray) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with these (n,)."""
+        if np.array_equal(state, self.state):
+            return self
+        return replace(self, tried=(state, direction, self.bonded))
 
     def trying_again(self, settled: Settled) -> ContactSet:
         """The same contacts, of which open–close iterations begin with the states so ``settled`` with springs that stood
@@ -180,23 +197,6 @@ class ContactSet:
         """(n,) m: the gap from which the step's straight motion leads to the one at its end."""
         return self.gap_before + self.arc
 
-    @cached_property
-    def behind(self) -> np.ndarray:
-        """(n,) True for lines of a pair of corners that the vertex has behind it while another keeps the corners apart:
-        by that one they come to overlap in this step, if they do."""
-        gap, out = self.gap_before, np.zeros(len(self), bool)
-        for column in self.partner.T:
-            out |= (column >= 0) & (gap[column] > gap)
-        return out & (gap < -self.rounding) & (self.state == OPEN)
-
-    @cached_property
-    def reach(self) -> np.ndarray:
-        """(n,) m by which a closed contact may have left its edge when the step ends: one that meets the very end of an
-        edge is not pushed clear of it by what it presses."""
-        passes = np.zeros(len(self), bool)
-        for column in self.partner.T:
-            passes |= (column >= 0) & self.behind[column]
-        return np.where(passes, _PASSING * self.rounding, self.rounding)
 
     def blocks_of(self, contact: int) -> tuple[int, ...]:
         """The two blocks of a ``contact``; none for −1."""
@@ -218,7 +218,7 @@ class ContactSet:
         fill(
             rows, self.vertex, self.edge, self.block, self.other, self.law, self.inset, settled.state, settled.bonded,
             gap, normal, shear, self.slip, self.wear, settled.slip, lift, settled.lifted,
-            geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]),
+            geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]), self.tilt,
         )  # fmt: skip
         if points is not None:
             rows["bare"][points.ends] = np.abs(points.part - [0.0, 1.0])

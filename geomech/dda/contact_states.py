@@ -73,9 +73,6 @@ def contact_forces(
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def check_states(
     forces,
-    partner,
-    reach,
-    behind,
     state,
     direction,
     bonded,
@@ -93,10 +90,8 @@ def check_states(
 ):
     """The states that the ``forces`` (n, 4) of `contact_forces` call for.
 
-    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). A corner that presses on
-    a corner holds until it has slid off by its ``reach`` (n,) m; lines that its vertex was ``behind`` (n,) as the step
-    began are not those by which it comes in. Gaps below the ``slack`` (n,) m, the round-off of coordinates, decide
-    nothing, nor does what they make of friction.
+    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). Gaps below the ``slack``
+    (n,) m, the round-off of coordinates, decide nothing, nor does what they make of friction.
     """
     n = state.shape[0]
     new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
@@ -104,34 +99,19 @@ def check_states(
     for c in range(n):
         gap, slide = forces[c, 2], forces[c, 3]
         if state[c] == OPEN:
-            if gap >= -slack[c] or behind[c]:
+            if gap >= -slack[c]:
                 continue
-            inside = True
-            for k in range(2):
-                p = partner[c, k]
-                # Corners overlap only where both lines are crossed; the lesser penetration, or the first of equals,
-                # acts.
-                if p < 0:
-                    continue
-                lesser = forces[p, 2] > gap or (forces[p, 2] == gap and p < c)
-                if forces[p, 2] >= -slack[p] or state[p] != OPEN or (lesser and not behind[p]):
-                    inside = False
-            if inside:
-                violation[c] = -normal[c] * gap
-                # The state to try is that of the springs under the motion at hand: sticking where it would have to
-                # slide, a contact may pull, open, close again and never come to sliding.
-                trial = shear0[c] - shear[c] * slide
-                if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
-                    new_state[c], new_direction[c] = SLIP, np.sign(trial)
-                else:
-                    new_state[c] = STICK
+            violation[c] = -normal[c] * gap
+            # The state to try is that of the springs under the motion at hand: sticking where it would have to slide, a
+            # contact may pull, open, close again and never come to sliding.
+            trial = shear0[c] - shear[c] * slide
+            if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
+                new_state[c], new_direction[c] = SLIP, np.sign(trial)
+            else:
+                new_state[c] = STICK
             continue
         pull = tension[c] if bonded[c] == 1 else 0.0
-        out = behind[c]
-        for k in range(2):
-            p = partner[c, k]
-            out = out or (p >= 0 and forces[p, 2] > reach[c] and gap < 0.0)
-        if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c] or out:
+        if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c]:
             new_state[c], new_bonded[c] = OPEN, 0
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:

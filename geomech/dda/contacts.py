@@ -11,7 +11,7 @@ from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from . import contact_rows
 from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
-from .contact_search import describe_contacts, find_contacts
+from .contact_search import Corners, convex_corners, describe_contacts, find_contacts
 from .contact_set import ContactSet
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
@@ -20,6 +20,7 @@ from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
+from .rounded_corners import LARGEST_SHARE
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -28,9 +29,11 @@ _TOUCH = 1e-7
 _ALIGNED = 0.99
 _UNKNOWN = -2
 _NEVER = -1
-#: Radius of corners, in sizes (√area) of the smaller block. Two corners that press on each other would slip off by less
-#: than they press each other in, and no state would fit; corners of rock are rounder than this.
-_ROUNDING = 1e-5
+#: The gaps of blocks that turn are followed to this part of the smaller block's size (√area).
+_PRECISION = 1e-5
+#: What lies behind a line by less than this part of the smaller block's size (√area) when they first touch was pushed
+#: there by others' give, or by the rounding of arcs.
+_HAIR = 1e-4
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
 
@@ -74,6 +77,9 @@ class ContactFinder:
         self._rigid = rigid
         # Triangles follow a rock that bends; multipliers hold what springs would give.
         self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
+        self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
+        #: (n_vertices,) m: the lengths over which corners are rounded.
+        self.rounding = np.minimum(self._rounding, self._longest)
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
@@ -94,43 +100,56 @@ class ContactFinder:
         glue_holds: bool = True,
         lumped: bool = False,
         broken: np.ndarray | None = None,
+        motion: np.ndarray | None = None,
+        margin: float = np.inf,
     ) -> ContactSet:
         """Every vertex within ``window`` (m, of all pairs of blocks or of each) of an edge it may touch, with what ``state.contacts`` remembers of it;
         without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
         faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
-        (vertex·n_vertices + edge), too."""
+        (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
+        it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""
         old = np.ascontiguousarray(state.contacts)
         old_vertex, old_edge, keys, old_normal, lift, gap = contact_rows.names(old, len(vertices))
         near = self._reaching(window, vertices, old, lift, gap)
         rank = np.argsort(keys, kind="stable")
-        table = find_contacts(vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank])
-        table = self._from_outside(table, vertices, np.sort(keys[old["state"] != OPEN]))
+        corners = Corners(
+            convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
+            np.zeros_like(vertices) if motion is None else motion, float(margin) + lift,
+        )  # fmt: skip
+        table, met = find_contacts(
+            vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
+        )
+        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]))
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
-            table, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
+            table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
         )
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
-        partner = table[:, 2:]
         if (law == _NEVER).any():
             keep = law != _NEVER
             table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
-            partner = _among(keep, partner)
         nodes, own = None, parent
         if self._by_length.any():
             nodes = nodes_in_faces(
-                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law], partner
+                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law]
             )
         if nodes is not None:
             geometry[:, 4] = nodes.left(geometry[:, 4])
             parent = nodes.heirs(own, np.ascontiguousarray(old["state"]))
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
         springs = self._springs(block, other, law, geometry[:, 4])
-        remembered = self._remembered(old, parent, state.time, geometry, partner, springs, self._stiff[law])
+        remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
-        vertex, edge = table[:, 0].copy(), table[:, 1].copy()
+        # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
+        # no energy: there contacts begin without force.
+        hair = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        smoothed = (table[:, 3] == 1) | ((geometry[:, 3] > -hair) & (len(old) > 0))
+        smoothed &= (remembered["state"] == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < remembered["lift"])
+        remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
+        vertex, edge, corner = (column.copy() for column in table[:, :3].T)
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
             for name in ("normal", "shear") if len(old) else ():
@@ -146,20 +165,21 @@ class ContactFinder:
                 keep &= ~glued
         if not keep.all():
             vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
-            partner, geometry = _among(keep, partner), geometry[keep]
+            corner, geometry = corner[keep], geometry[keep]
             springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
             remembered = {name: value[keep] for name, value in remembered.items()}
         bonded, faces = remembered["bonded"], None
         if bonded.any():
-            faces = BondedFaces.of(block, other, partner, geometry, bonded)
+            faces = BondedFaces.of(block, other, geometry, bonded)
         found = ContactSet(
             vertex=vertex,
             edge=edge,
             block=block,
             other=other,
             law=law,
-            partner=np.ascontiguousarray(partner),
-            rounding=_ROUNDING * np.sqrt(np.minimum(self._area[block], self._area[other])),
+            corner=corner,
+            tilt=self._tilt(vertices, edge, corner, geometry),
+            precision=_PRECISION * np.sqrt(np.minimum(self._area[block], self._area[other])),
             geometry=np.ascontiguousarray(geometry),
             springs=springs,
             relies_on_glue=glued is not None,
@@ -192,7 +212,7 @@ class ContactFinder:
 
         def placed(inside):
             return FacePoints.of(
-                block, other, partner, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
+                block, other, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
                 (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), softened,
             )  # fmt: skip
 
@@ -225,17 +245,16 @@ class ContactFinder:
         np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
         return Windows(window.pairs, reach)
 
-    def _from_outside(self, table: np.ndarray, vertices: np.ndarray, closed: np.ndarray) -> np.ndarray:
+    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray):
         """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
-        (sorted keys) have."""
+        (sorted keys), and corners that meet corners, have."""
         vertex, edge = table[:, 0], table[:, 1]
         keep = from_outside(
-            vertex, edge, self.gaps(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
             self._owner, closed, True,
         )  # fmt: skip
-        if keep.all():
-            return table
-        return np.concatenate([table[keep, :2], _among(keep, table[:, 2:])], axis=1)
+        keep |= table[:, 2] >= 0
+        return (table, met) if keep.all() else (table[keep], met[keep])
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
@@ -252,7 +271,7 @@ class ContactFinder:
             normal if ks is None else np.full(len(block), float(ks)),
         )
 
-    def _remembered(self, old, parent, time, geometry, partner, springs, stiff):
+    def _remembered(self, old, parent, time, geometry, springs, stiff):
         """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
         known = parent >= 0
 
@@ -260,12 +279,11 @@ class ContactFinder:
             old, parent
         )
         if not known.all():
-            # New contacts that touch already are tried closed first; one with a partner must show which line it
-            # crosses.
+            # New contacts that touch already are tried closed first.
             fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
             if len(old) == 0 and time == 0.0:
                 bonded[fresh & (geometry[:, 4] > 0)] = 1
-            contact_state[fresh & (partner < 0).all(axis=1)] = STICK
+            contact_state[fresh] = STICK
         bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
         # Friction on a normal force that pulls by its round-off acts the other way: taken for the sense of the sliding
         # it would turn that about in every step, and with it the matrix of blocks at rest.
@@ -281,6 +299,24 @@ class ContactFinder:
             "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
             "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset, "bare": bare,
         }  # fmt: skip
+
+    def _pressed(self, old: np.ndarray) -> np.ndarray:
+        """(n_blocks,) m: how deep the faces of each block were last pressed in."""
+        deepest = np.zeros(len(self._area))
+        closed = old["state"] != OPEN
+        for blocks in (old["block"][closed], old["other"][closed]):
+            np.maximum.at(deepest, blocks, -old["gap"][closed])
+        return deepest
+
+    def _tilt(self, vertices, edge, corner, geometry) -> np.ndarray:
+        """(n,) rad, as in `ContactSet`."""
+        tilt, rounded = np.zeros(len(edge)), np.flatnonzero(corner >= 0)
+        along = vertices[self._next[edge[rounded]]] - vertices[edge[rounded]]
+        normal = geometry[rounded, 1:3]
+        tilt[rounded] = np.arctan2(
+            along[:, 1] * normal[:, 1] + along[:, 0] * normal[:, 0], along[:, 1] * normal[:, 0] - along[:, 0] * normal[:, 1]
+        )
+        return tilt
 
     def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:
         """Contacts that have not touched are as worn, and as far lifted, as the nearest that slides along their
@@ -353,11 +389,23 @@ class ContactFinder:
     def beyond_middle(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
-            vertex, edge, self.gaps(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
             self._owner, np.zeros(0, np.int64), False,
         )  # fmt: skip
 
-    def gaps(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
+        """(n,) m of the contacts ``found`` on the geometry ``before``, at their corners, once the blocks are where
+        ``vertices`` are."""
+        gap = self._off_lines(vertices, found.vertex, found.edge)
+        rounded = np.flatnonzero(found.corner >= 0)
+        if len(rounded):
+            v, w = found.vertex[rounded], found.corner[rounded]
+            moved = vertices[v] - vertices[w] - (before[v] - before[w])
+            normal = found.geometry[rounded, 1:3]
+            gap[rounded] = found.geometry[rounded, 3] + np.einsum("na,na->n", moved, normal)
+        return gap
+
+    def _off_lines(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
         """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""
         start = vertices[edge]
         along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
@@ -376,11 +424,12 @@ class ContactFinder:
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
 
 
-def _among(keep: np.ndarray, partner: np.ndarray) -> np.ndarray:
-    """``partner`` (n, 2) of the rows ``keep`` (n,), counted among these; −1 for those that are left out, as for
-    none."""
-    number = np.append(np.where(keep, np.cumsum(keep) - 1, -1), -1)
-    return number[partner[keep]]
+def corner_lengths(blocks: Blocks, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """(n_vertices,) m twice: the rounding length of every corner of ``blocks``, ``share`` times the block's size
+    (√area), and the longest that fits beside its shorter edge."""
+    edges = np.hypot(*(blocks.vertices[blocks.next_vertex] - blocks.vertices).T)
+    longest = LARGEST_SHARE * np.minimum(edges, edges[blocks.previous_vertex])
+    return share * np.sqrt(blocks.areas())[blocks.vertex_block], longest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:

@@ -22,8 +22,12 @@ from ..compiled import kept, part
 _DEPTH = 1e-5
 #: … and by so many times what contacts at that vertex are pressed in by.
 _PRESSED = 2.0
-#: What goes round a corner may cut it: by this part of the smaller block's size, along the outline.
-_CORNER = 1e-2
+#: Where rounded corners pass each other, one may lie in the other by this part of their rounding length, so near to it
+#: in rounding lengths: an arc leaves 1 − cos 45° of the corner that it rounds.
+_ROUNDED, _NEAR = 0.3, 1.6
+#: What goes round a corner may cut it: by this part of the smaller block's size along the outline, or so many rounding
+#: lengths.
+_CORNER, _CUT = 1e-2, 2.5
 #: Kinds of crossings.
 INTO, THROUGH = 0, 1
 
@@ -86,8 +90,20 @@ def _way(vertices, next_vertex, e, at, f, to):
     return min(forth, whole - forth) if found else np.inf
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _rounded_off(v, vertices, rounding, first, last):
+    """The rounding length of corner ``v`` with the nearest of those from ``first`` to ``last``, m; 0 where none is near."""
+    longest = 0.0
+    for w in range(first, last):
+        length = min(rounding[v], rounding[w])
+        dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
+        if dx * dx + dy * dy < _NEAR * _NEAR * length * length:
+            longest = max(longest, length)
+    return longest
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _find(pairs, before, after, next_vertex, start, box, pressed, size, found):
+def _find(pairs, before, after, next_vertex, start, box, pressed, size, rounding, found):
     """Number of crossings of ``pairs``, the first of them in ``found`` (m, 6) as far as it has room."""
     count = 0
     for k in range(pairs.shape[0]):
@@ -109,6 +125,8 @@ def _find(pairs, before, after, next_vertex, start, box, pressed, size, found):
                 kind, edge, depth = -1, -1, 0.0
                 now, near = _depth(x1, y1, after, next_vertex, first, last)
                 was, beside = np.inf, -1
+                if now > allowed:
+                    allowed += _ROUNDED * _rounded_off(v, after, rounding, first, last)
                 if now > allowed:
                     was, beside = _depth(x0, y0, before, next_vertex, first, last)
                     if now > was + least:
@@ -145,7 +163,9 @@ def _find(pairs, before, after, next_vertex, start, box, pressed, size, found):
                             entry, at = beside, min(1.0, max(0.0, at))
                         if entry < 0:
                             continue
-                        if _way(before, next_vertex, entry, at, f, out) > _CORNER * smaller:
+                        if _way(before, next_vertex, entry, at, f, out) > max(
+                            _CORNER * smaller, _CUT * rounding[v]
+                        ):
                             kind, edge, depth = THROUGH, entry, min(-g0, g1)
                             break
                 if kind >= 0:
@@ -165,17 +185,19 @@ def crossings(
     box: np.ndarray,
     pressed: np.ndarray,
     size: np.ndarray,
+    rounding: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Crossings of the ``pairs`` (k, 2) of blocks in a step from ``before`` to ``after`` (both (n_vertices, 2) m): pair,
     vertex, the edge that it went in by, kind, and depth, m, (n,) each.
 
     ``box`` (n_blocks, 4) holds each block before and after; ``pressed`` (n_vertices,) m is the deepest that contacts at
-    a vertex are pressed in by, ``size`` (n_blocks,) √area, m.
+    a vertex are pressed in by, ``size`` (n_blocks,) √area and ``rounding`` (n_vertices,) the lengths over which corners are
+    rounded, m.
     """
     room = 64
     while True:
         found = np.empty((room, 6))
-        count = _find(pairs, before, after, next_vertex, vertex_start, box, pressed, size, found)
+        count = _find(pairs, before, after, next_vertex, vertex_start, box, pressed, size, rounding, found)
         if count <= room:
             break
         room = count

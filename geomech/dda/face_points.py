@@ -86,7 +86,6 @@ class FacePoints:
         cls,
         block: np.ndarray,
         other: np.ndarray,
-        partner: np.ndarray,
         geometry: np.ndarray,
         stiff: np.ndarray,
         normal: np.ndarray,
@@ -100,7 +99,7 @@ class FacePoints:
         from their corners on, ``holds`` a bond that may pull, ``least`` m of face
         that the stiffness is at least that of; ``softened(ends, length)`` the ``apart`` and
         ``share`` of bonds. None without any."""
-        some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0) & (partner < 0).all(axis=1))
+        some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0))
         if len(some) < 2:
             return None
         some, start, along = on_lines(block, other, geometry, some)

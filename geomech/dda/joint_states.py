@@ -22,7 +22,6 @@ import numpy as np
 from ..compiled import kept
 from ..model import OPEN, SLIP, STICK
 from . import assembly, contact_states
-from .central_path import acting
 from .contact_set import ContactSet
 from .contact_springs import Springs
 
@@ -54,13 +53,8 @@ def settled_together(
     """``state`` and ``direction`` (n,) with those of the contacts ``which`` (n,) bool, none of them bonded, that fit
     each other while all others stand; None where none are found. The rest as for `settle`, ``room`` as for
     `CentralPath`. Raises numpy.linalg.LinAlgError."""
-    stands = acting(found.partner, gap)
-    alone = which.copy()
-    for column in found.partner.T:
-        # Lines of the same corners: one acts.
-        alone[column[which & stands & (column >= 0)]] = True
-    state, direction = np.where(alone, OPEN, state), np.where(alone, 0.0, direction)
-    rows = np.flatnonzero(which & stands)
+    state, direction = np.where(which, OPEN, state), np.where(which, 0.0, direction)
+    rows = np.flatnonzero(which)
     if not len(rows):
         return None
     data, side = np.empty(pattern.size) if room is None else room(), np.empty(6 * pattern.n)

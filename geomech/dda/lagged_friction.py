@@ -31,51 +31,23 @@ _SOLUTIONS, _HALVINGS = 30, 14
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
-def _pushes(contact, gap, bonded, partner, rounding):
-    """Whether a contact pushes (or, bonded, pulls) at the gaps of all, ``gap`` (n,): of two corners' lines the one less
-    deep in, where both are crossed. ``partner`` (n, k), −1 for none."""
-    own = gap[contact]
-    if not (own < 0.0 or bonded[contact]):
-        return False
-    for k in range(partner.shape[1]):
-        p = partner[contact, k]
-        if p < 0:
-            continue
-        other = gap[p]
-        if not (other < rounding[contact] and (other < own or (other == own and contact < p) or other >= 0.0)):
-            return False
-    return True
-
-
-@kept(fastmath=False, error_model="numpy", nogil=True)
-def _all_pushing(gap, bonded, partner, rounding):
-    """(n,) of `_pushes`."""
-    out = np.empty(gap.shape[0], np.bool_)
-    for c in range(gap.shape[0]):
-        out[c] = _pushes(c, gap, bonded, partner, rounding)
-    return out
-
-
-@part(fastmath=False, error_model="numpy", nogil=True)
-def _slope(t, start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear, gaps):
-    """How the energy changes along a step, at its part ``t``; ``gaps`` (n,) is scratch. See `LaggedFriction._way`."""
+def _slope(t, start, curved, gap, trial, apart, along, strength, bonded, normal, shear):
+    """How the energy changes along a step, at its part ``t``. See `LaggedFriction._way`."""
     n = gap.shape[0]
-    for c in range(n):
-        gaps[c] = gap[c] + t * apart[c]
     found = start + t * curved
     for c in range(n):
-        if _pushes(c, gaps, bonded, partner, rounding):
-            found += normal[c] * gaps[c] * apart[c]
+        end = gap[c] + t * apart[c]
+        if end < 0.0 or bonded[c]:
+            found += normal[c] * end * apart[c]
         pull = trial[c] - t * shear[c] * along[c]
         found -= min(max(pull, -strength[c]), strength[c]) * along[c]
     return found
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _least_energy(start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear):
+def _least_energy(start, curved, gap, trial, apart, along, strength, bonded, normal, shear):
     """The part of a step at which the energy is least, by halving; arguments as for `_slope`."""
-    gaps = np.empty(gap.shape[0])
-    same = (start, curved, gap, trial, apart, along, strength, bonded, partner, rounding, normal, shear, gaps)
+    same = (start, curved, gap, trial, apart, along, strength, bonded, normal, shear)
     if _slope(1.0, *same) <= 1e-9 * abs(_slope(0.0, *same)):
         return 1.0
     low, high = 0.0, 1.0
@@ -146,7 +118,7 @@ class LaggedFriction:
         return state, np.where(state == SLIP, np.sign(trial), 0.0)
 
     def _closed(self, gap: np.ndarray) -> np.ndarray:
-        return _all_pushing(gap, self._bonded, self._found.partner, self._found.reach)
+        return (gap < 0.0) | self._bonded
 
     def _forces(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return self._gap + motion[:, 0], self._found.shear - self._springs.shear * motion[:, 1]
@@ -187,8 +159,8 @@ class LaggedFriction:
         start = float((turned * self._motion.reshape(-1, 6)).sum() - (rows * self._right).sum())
 
         gap, trial = self._forces(self._contact_motion)
-        springs, found = self._springs, self._found
+        springs = self._springs
         return _least_energy(
             start, curved, gap, trial, np.ascontiguousarray(along[:, 0]), np.ascontiguousarray(along[:, 1]), strength,
-            self._bonded, found.partner, found.reach, springs.normal, springs.shear,
+            self._bonded, springs.normal, springs.shear,
         )  # fmt: skip

@@ -74,20 +74,19 @@ def nodes_in_faces(
     geometry: np.ndarray,
     law: np.ndarray,
     by_length: np.ndarray,
-    partner: np.ndarray,
 ) -> NodesInFaces | None:
     """Those among contacts (n,), pair of blocks by pair, of ``vertex`` and ``edge``; ``owner`` and ``flat`` (n_vertices,)
-    (`Blocks.in_side`), ``geometry`` (n, 7), ``law`` and ``partner`` (n, 2) as in `ContactSet`, ``by_length`` (n,) contacts whose springs go by
-    their lengths. None without any."""
+    (`Blocks.in_side`), ``geometry`` (n, 7) and ``law`` as in `ContactSet`, ``by_length`` (n,) contacts whose springs go by their
+    lengths. None without any."""
     mine = flat[vertex] & by_length & (geometry[:, 4] > 0)
     if not mine.any():
         return None
-    node, neighbours, share = _between(mine, vertex, edge, owner, geometry, law, (partner >= 0).any(axis=1))
+    node, neighbours, share = _between(mine, vertex, edge, owner, geometry, law)
     return NodesInFaces(node, neighbours, share) if len(node) else None
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def _between(mine, vertex, edge, owner, geometry, law, paired):
+def _between(mine, vertex, edge, owner, geometry, law):
     n = vertex.shape[0]
     out = np.zeros(n, np.bool_)
     length = geometry[:, 4].copy()
@@ -102,7 +101,7 @@ def _between(mine, vertex, edge, owner, geometry, law, paired):
             or (owner[vertex[first]] == b and owner[edge[first]] == a)
         ):
             first += 1
-        if not mine[r] or paired[r]:
+        if not mine[r]:
             continue
         nx, ny = geometry[r, 1], geometry[r, 2]
         before, after = -np.inf, np.inf
@@ -111,7 +110,7 @@ def _between(mine, vertex, edge, owner, geometry, law, paired):
             one, two = owner[vertex[q]], owner[edge[q]]
             if not ((one == a and two == b) or (one == b and two == a)):
                 break
-            if q == r or out[q] or paired[q] or law[q] != law[r] or length[q] <= 0.0:
+            if q == r or out[q] or law[q] != law[r] or length[q] <= 0.0:
                 continue
             if abs(nx * geometry[q, 1] + ny * geometry[q, 2]) < ALIGNED:
                 continue

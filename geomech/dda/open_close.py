@@ -16,6 +16,7 @@ lines within an iteration, and the iteration goes on until lines and laws agree 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -28,6 +29,7 @@ from .contacts import ContactSet
 from .convex_rounds import ConvexRounds
 from .curved_joints import CurvedJoints
 from .lagged_friction import LaggedFriction
+from .patches import settled_in_patch
 from .rounded_laws import RoundedLaws
 from .step_equations import Answer, Equations, Settled, States, Unsettled
 
@@ -51,6 +53,9 @@ _SOUGHT, _LATELY, _TOGETHER = 40, 3, 12
 #: It takes two solutions for each contact and one for each set of them: so many in all, as many as twenty iterations of
 #: the path. (A wall under sudden weight has a dozen of sets at once, and takes 27 iterations without.)
 _SOLUTIONS = 60
+#: Where switching does not end and no more than this part of the contacts is wrong, the blocks about them are settled
+#: by themselves, so often in a step; where their number does not fall to this part.
+_FEW_IN_PATCHES, _PATCHES, _FALLS = 0.1, 6, 0.9
 #: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path
 #: takes fifteen; it is asked after so many iterations.
 _FEW, _CAUTIOUS = 40, 12
@@ -219,16 +224,20 @@ def settle(
     curved: CurvedJoints | None = None,
     statics: bool = False,
     patient: bool = True,
+    patches: bool = True,
+    expected: np.ndarray | None = None,
 ) -> Settled:
     """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix``
     (n, 6, 6) and ``right`` (n, 6) are the blocks' own part, ``springs`` and ``gap`` those of this step (dashpots
     included), ``slack`` (n_contacts,) m the gaps that decide nothing. ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations,
-    those along the central path included. Unless ``patient``, systems too large for a dense matrix are not asked for
-    by laws and rounds that take hundreds: a shorter step takes less, of `MANY` in motion at the first sign.
+    those along the central path included. ``expected`` (6 n,) is the motion that velocities alone would make, None where
+    there are none. Unless ``patient``, systems too large for a dense matrix are not asked for by laws and rounds that
+    take hundreds: a shorter step takes less, of `MANY` in motion at the first sign. ``patches``: few contacts that stay
+    wrong are settled by themselves (`patches`).
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
-    equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics)
+    equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics, expected)
     states = States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
     normal_force, slip = found.normal, np.zeros(len(found))
     seen: set[bytes] = set()
@@ -242,6 +251,7 @@ def settle(
     iteration, most = 0, max_iterations
     # Contacts (n,) that were wrong in the last iterations, when few were, and how often they were sought together.
     lately, joint, left = [], 0, _SOLUTIONS
+    best, patched = None, 0
     # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states
     # fits.
     closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
@@ -291,6 +301,18 @@ def settle(
                     states = proposal
                     continue
                 joint = _TOGETHER
+        if best is None or number < _FALLS * best[0]:
+            best = number, states, answer, wrong
+        elif patched < _PATCHES and patches and not small and best[0] <= _FEW_IN_PATCHES * len(found):
+            patched += 1
+            proposal, spent = settled_in_patch(
+                equations, best[3] | wrong, *best[1:3],
+                partial(settle, max_iterations=most, statics=statics, patient=False, patches=False),
+            )  # fmt: skip
+            iteration, best = iteration + round(spent), None
+            if proposal is not None and proposal.key not in seen:
+                states, fewest, tries = proposal, np.inf, 0
+                continue
         tired = caution == _SOME and (returned or tries > _MORE)
         if few and path is None:
             tired = iteration > _CAUTIOUS or (caution == _FIRST and returned)
@@ -303,7 +325,7 @@ def settle(
                 if path is None or not np.array_equal(path.bonded, states.bonded):
                     path = CentralPath(
                         pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded, normal_force,
-                        equations.room,
+                        equations.room, expected,
                     )
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..model import OPEN, SLIP, STICK
 from . import assembly
-from .central_path import WITHIN, acting, add_forces, solution_of
+from .central_path import WITHIN, add_forces, solution_of
 from .contact_set import ContactSet
 from .contact_springs import Springs
 from .contact_states import moved
@@ -44,8 +44,6 @@ class RoundedLaws:
     """Stages of one step's contacts from ``unknowns`` (6 n,) on; other arguments as for `settle`, ``bonded`` (n,) the
     bonds, which hold. ``force`` is f at the start, in units of the load on a contact's blocks. ``solutions`` counts
     factorisations.
-
-    Corners that meet are stood for by one of their lines, as on the central path.
     """
 
     def __init__(
@@ -62,19 +60,18 @@ class RoundedLaws:
         force: float,
     ) -> None:
         self._pattern, self._matrix, self._right = pattern, matrix, right.ravel()
-        some = self._some = np.flatnonzero(acting(found.partner, gap))
         order, self._n = pattern.order, len(found)
-        self._at = found.block[some], found.other[some], order, np.ascontiguousarray(vectors[some])
-        self._upper, self._lower = pattern.upper[some], pattern.lower[some]
-        self._kn, self._ks, self._lift = springs.normal[some], springs.shear[some], springs.lift[some]
-        self._gap, self._before, self._held = gap[some], found.shear[some], bonded[some] > 0
-        slides = found.state[some] == SLIP
-        self._mu = np.where(slides, springs.friction[some], springs.peak[some])
-        self._firm = np.where(slides, springs.sliding[some], springs.hold[some])
+        self._at = found.block, found.other, order, vectors
+        self._upper, self._lower = pattern.upper, pattern.lower
+        self._kn, self._ks, self._lift = springs.normal, springs.shear, springs.lift
+        self._gap, self._before, self._held = gap, found.shear, bonded > 0
+        slides = found.state == SLIP
+        self._mu = np.where(slides, springs.friction, springs.peak)
+        self._firm = np.where(slides, springs.sliding, springs.hold)
         load = np.append(np.abs(right).max(axis=1, initial=0.0), 0.0)
         load = np.maximum(load[order[self._at[0]]], load[order[self._at[1]]])
         # Blocks without load share a little of the others'; without any, any unit will do.
-        self._unit = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
+        self._unit = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(self._n)
         self._load = max(float(np.abs(right).max(initial=0.0)), 1e-300)
         self._data = np.empty(pattern.size)
         self._unknowns, self._force = unknowns.copy(), force
@@ -172,6 +169,6 @@ class RoundedLaws:
         slides = closed & ~self._held & (np.abs(trial) > self._mu * pressed + self._firm)
         smooth = closed & ~self._held & (self._mu == 0.0) & (self._firm == 0.0)
         state, direction = np.full(self._n, OPEN), np.zeros(self._n)
-        state[self._some] = np.where(slides | smooth, SLIP, np.where(closed, STICK, OPEN))
-        direction[self._some] = np.where(slides & ~smooth, np.sign(trial), 0.0)
+        state[:] = np.where(slides | smooth, SLIP, np.where(closed, STICK, OPEN))
+        direction[:] = np.where(slides & ~smooth, np.sign(trial), 0.0)
         return state, direction

@@ -110,6 +110,7 @@ class Equations:
     slack: np.ndarray
     curved: CurvedJoints | None
     statics: bool
+    expected: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         self._data = np.empty(self.pattern.size)
@@ -204,8 +205,7 @@ class Equations:
             )
             missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
         *called, violation = check_states(
-            forces, found.partner, found.reach, found.behind, state, direction, bonded, known.normal, known.shear,
-            known.friction, known.sliding,
+            forces, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
             known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
         )  # fmt: skip
         if (faces := found.faces) is not None:

@@ -165,7 +165,7 @@ class StepLimits:
         rows = result.contacts
         pressed = self._pressed(rows, len(before))
         pair, vertex, edge, kind, depth = crossings(
-            before, after, self._next, self._start, pairs, box, pressed, self._size
+            before, after, self._next, self._start, pairs, box, pressed, self._size, self._finder.rounding
         )
         if len(pair):
             real = self._finder.may_touch(vertex, edge)

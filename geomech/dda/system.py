@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from . import assembly
 from .approach import Windows
 from .attempt import Attempt
@@ -16,6 +16,7 @@ from .contact_set import ContactSet
 from .contacts import ContactFinder
 from .excavation import Excavations, until_next_event
 from .loads import LoadMap
+from .middle import Middle
 from .moments import block_moments
 from .open_close import MANY
 from .overlap import refuse_overlap
@@ -35,8 +36,32 @@ log = logging.getLogger(__name__)
 PATIENT_AFTER = 3
 #: Contacts of one step are sought anew, farther, so often at most; then it is cut.
 _FARTHER = 6
+#: A step is begun again so often where corners meet in another direction than was expected, …
+_REDIRECTED = 3
+#: … by more than this angle (cosine).
+_OTHER_WAY = 0.95
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
+
+
+@dataclass(eq=False)
+class _Search:
+    """What the contacts of a step are sought by, see `ContactFinder.find`."""
+
+    finder: ContactFinder
+    state: State
+    vertices: np.ndarray
+    near: Windows
+    motion: np.ndarray | None
+    margin: float
+    glue_holds: bool = True
+    broken: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def find(self) -> ContactSet:
+        return self.finder.find(
+            self.state, self.vertices, self.near, self.glue_holds, broken=self.broken, motion=self.motion,
+            margin=self.margin,
+        )  # fmt: skip
 
 
 class BlockSystem:
@@ -200,15 +225,15 @@ class BlockSystem:
             self._refuse_unheld(loads, state.time + dt if load_time is None else load_time)
         gravity = loads.gravity.at(state.time + dt)
         dt = self.limits.foreseen(vertices, carried, moments, dt, gravity)
-        near = self._near(state, vertices, carried, moments, dt, gravity)
-        found = self.finder.find(state, vertices, near)
+        search = self._search(state, vertices, carried, moments, dt, gravity)
+        found = search.find()
         if like is not None:
             found = found.like(like.state.contacts)
             if self.scheme.static and found.tried is not None:
                 # (In motion the step's arcs are those that the velocity foresees.)
                 found = found.along(*like.arcs)
-        reason, before, broken = "", np.inf, np.zeros(0, np.int64)
-        cuts, asked, failed, most, farther = 0, dt, "", 1.0, 0
+        reason, before = "", np.inf
+        cuts, asked, failed, most, farther, redirected = 0, dt, "", 1.0, 0, 0
         while True:
             # What was tried before makes room first: its factors may be of other contacts than those of this attempt.
             attempt = result = None
@@ -228,10 +253,16 @@ class BlockSystem:
                 if unheld or lost.any():
                     # Corners that were left out, and springs that were moved, for the sake of a bond are back before it
                     # breaks.
-                    broken = np.append(broken, found.vertex[lost] * len(vertices) + found.edge[lost])
-                    holds = found.relies_on_glue and not unheld
-                    found = self.finder.find(state, vertices, near, holds, broken=broken)
+                    search.broken = np.append(search.broken, found.vertex[lost] * len(vertices) + found.edge[lost])
+                    search.glue_holds = found.relies_on_glue and not unheld
+                    found = search.find()
                     continue
+                if redirected < _REDIRECTED:
+                    # Where corners meet is known once the step's motion is.
+                    again = self._with_corners_of(attempt, search, result.contacts["state"])
+                    if again is not None:
+                        redirected, found = redirected + 1, again
+                        continue
                 used = self.limits.used(attempt, result)
                 reason, guilty = used.reason, (used.why, *used.blocks)
                 if used.share <= 1.0001 * most:
@@ -245,11 +276,12 @@ class BlockSystem:
                             log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
                         result.statistics["limit_share"] = used.share
                         return result
-                    wider = near.widened(crossed.pairs, crossed.motion, self.blocks.n_blocks)
-                    if farther < _FARTHER and wider.reaches_beyond(near):
+                    wider = search.near.widened(crossed.pairs, crossed.motion, self.blocks.n_blocks)
+                    if farther < _FARTHER and wider.reaches_beyond(search.near):
                         # What went in met no contact: with it the step may be as long.
-                        near, farther = wider, farther + 1
-                        found = self.finder.find(state, vertices, near, found.relies_on_glue, broken=broken)
+                        search.near, search.motion, farther = wider, attempt.new_vertices - vertices, farther + 1
+                        search.glue_holds = found.relies_on_glue
+                        found = search.find()
                         continue
                     if cuts >= self.settings.max_step_cuts and not crossed.through:
                         log.warning("step at t = %g s: %s, and no shorter step avoids it", state.time, crossed.reason)
@@ -262,8 +294,9 @@ class BlockSystem:
                     # Static equilibrium under a load that does not shrink with dt: let it move, search far enough.
                     log.info("step at t = %g s: %s, and a shorter step does not help; accepted", state.time, reason)
                     most = 1.1 * used.share
-                    near = near.widened(used.moved.pairs, 1.1 * used.moved.reach, self.blocks.n_blocks)
-                    found = self.finder.find(state, vertices, near, found.relies_on_glue, broken=broken)
+                    search.near = search.near.widened(used.moved.pairs, 1.1 * used.moved.reach, self.blocks.n_blocks)
+                    search.glue_holds = found.relies_on_glue
+                    found = search.find()
                     continue
                 else:
                     before = used.share
@@ -277,8 +310,58 @@ class BlockSystem:
             log.debug("step at t = %g s cut from %.4g to %.4g s: %s", state.time, dt, shorter, reason)
             dt = shorter
             if not self.scheme.static:
-                near = self._near(state, vertices, carried, moments, dt, gravity)
-                found = self.finder.find(state, vertices, near, found.relies_on_glue or not len(broken), broken=broken)
+                shorter = self._search(state, vertices, carried, moments, dt, gravity)
+                search.near, search.motion, search.margin = shorter.near, shorter.motion, shorter.margin
+                search.glue_holds = found.relies_on_glue or not len(search.broken)
+                found = search.find()
+
+    def _search(self, state, vertices, carried, moments, dt, gravity) -> _Search:
+        """How a step of ``dt`` looks for contacts. Two corners may come nearer by their weight than their velocities say;
+        what comes nearer still is looked for once the step is known."""
+        return _Search(
+            self.finder, state, vertices, self._near(state, vertices, carried, moments, dt, gravity),
+            self._expected_motion(vertices, carried, moments, dt),
+            np.inf if self.scheme.static else dt * dt * float(np.hypot(*gravity)),
+        )  # fmt: skip
+
+    def _expected_motion(self, vertices, carried, moments, dt) -> np.ndarray | None:
+        """(n_vertices, 2) m: what the velocities ``carried`` make of a step of ``dt``; None where there are none."""
+        if not carried.any():
+            return None
+        return Middle.of(dt * carried, 1.0, vertices, self.owner, moments).vertices - vertices
+
+    def _with_corners_of(self, attempt: Attempt, search: _Search, state: np.ndarray) -> ContactSet | None:
+        """The contacts with which the step is to be begun again because corners have met on the way that the ``attempt``
+        went, with its contacts in ``state`` (n,), but not where they were expected to; None where all did."""
+        found, moved = attempt.found, attempt.new_vertices - attempt.vertices
+        pressed = bool(((found.corner >= 0) & (state != OPEN)).any())
+        strayed = np.abs(moved if search.motion is None else moved - search.motion).max()
+        if not pressed and not strayed > 0.5 * search.margin:
+            return None
+        search.motion, search.glue_holds = moved, found.relies_on_glue
+        again = search.find()
+        if pressed and self._redirected(found, again, state):
+            return again
+        known = np.isin(again.vertex * len(moved) + again.edge, found.vertex * len(moved) + found.edge)
+        missed = ~known & (self.finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision)
+        return again if missed.any() else None
+
+    def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:
+        """Whether any pair of rounded corners that presses in ``state`` (n,) of ``found`` meets in another direction in
+        ``again``."""
+        known = {pair: c for c, pair in enumerate(zip(again.vertex.tolist(), again.edge.tolist(), strict=True))}
+        previous = self.blocks.previous_vertex
+        for c in np.flatnonzero((found.corner >= 0) & (state != OPEN)):
+            v, w = int(found.vertex[c]), int(found.corner[c])
+            names = ((v, w, 1), (v, int(previous[w]), 1), (w, v, -1), (w, int(previous[v]), -1))
+            ways = [
+                way * float(found.geometry[c, 1:3] @ again.geometry[known[v, e], 1:3])
+                for v, e, way in names
+                if (v, e) in known
+            ]
+            if max(ways, default=-1.0) < _OTHER_WAY:
+                return True
+        return False
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""

@@ -15,6 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..model import Material
+from . import ties
 
 Criterion = Callable[[np.ndarray, np.ndarray, Material], tuple[np.ndarray, np.ndarray]]
 
@@ -244,7 +245,8 @@ def _turning_points(slope: Callable, n_tips: int, grid: np.ndarray) -> tuple[np.
 
 
 def _keep_best(angle: np.ndarray, best: np.ndarray, tip: np.ndarray, theta: np.ndarray, value: np.ndarray) -> None:
-    """For every tip keep the candidate with the largest positive value, the smaller angle where two are equal."""
-    for k in np.lexsort((-np.abs(theta), value)):
-        if value[k] >= best[tip[k]] and value[k] > 0:
-            best[tip[k]], angle[tip[k]] = value[k], theta[k]
+    """For every tip keep the candidate with the largest positive value; of equal ones see `ties.best`."""
+    for j in np.unique(tip[value > 0]).tolist():
+        own = np.flatnonzero(tip == j)
+        k = own[ties.best(value[own], theta[own])]
+        best[j], angle[j] = value[k], theta[k]

@@ -9,7 +9,8 @@ A step is straight, from the tip by its increment along its growth angle. In ord
    without crossing anything, goes there instead;
 4. otherwise ends in the rock, a tip again.
 
-The network stays a planar graph: segments meet at common nodes and nowhere else.
+The network stays a planar graph: segments meet at common nodes and nowhere else. What lies just as far off as would
+be near is not near (`ties`): with 9 mm left and increments of 6 mm that join within 3 mm a tip ends in the rock.
 """
 
 from __future__ import annotations
@@ -24,23 +25,24 @@ from ..model import Cracks, GrowthSettings
 from .approach import longest_advance
 from .network import Network, Obstacle, Point, Row, nearest_on, passage
 from .shared_mouths import beside, chain_between, own_mouth_at, part_mouths
+from .ties import ONE_WAY, in_order, reached
 
 #: Shorter segments than this part of the shortest increment are not made: ends snap to what they nearly touch.
 SLIVER = 0.1
-#: Two paths are kept apart by this part of a sliver.
+#: Two paths are kept apart by this part of a sliver, and lengths are one that differ by less.
 CLEARANCE = 1e-3
 #: A tip (first) or another node (second) is preferred to the bare face when its distance times this is the smaller.
 PREFER_TIP, PREFER_NODE = 0.6, 0.9
 #: A face that is crossed within this part of the join distance from one of its nodes is joined at that node.
 SNAP_TO_TIP, SNAP_TO_NODE = 0.5, 0.1
 #: What is more than this off the direction of growth is not ahead.
-AHEAD = math.cos(math.radians(60.0))
+AHEAD = math.cos(math.radians(60.0) + ONE_WAY)
 #: Two tips meet half way when each lies within this of the other's direction of growth.
-FACING = math.cos(math.radians(45.0))
+FACING = math.cos(math.radians(45.0) + ONE_WAY)
 #: A way that would meet a boundary or a crack at a smaller angle goes straight across to it instead: the mouth, now or
 #: once a block parts along the crack, would be too sharp to be resolved (a body is refused below 3°), and the rock
 #: between is as good as gone.
-GRAZES = math.sin(math.radians(5.0))
+GRAZES = math.sin(math.radians(5.0) - ONE_WAY)
 #: A tip that would turn back along its own crack more sharply than this stands still.
 TURN_BACK = math.radians(170.0)
 
@@ -98,7 +100,7 @@ def advance(
     cycle: int,
     longest: np.ndarray | float = math.inf,
 ) -> Growth:
-    """Advance every tip whose ``k_eq`` has reached ``k_ic`` by one segment.
+    """Advance every tip whose ``k_eq`` has `reached` ``k_ic`` by one segment.
 
     ``loops_of(block)`` gives the block's outline and holes in reference coordinates ([] for an infinite plane);
     ``tips`` are TIP rows with ``k_eq`` and ``angle`` filled; ``k_ic`` (n_tips,) Pa √m; ``cycle`` is the birth cycle of
@@ -111,7 +113,7 @@ def advance(
     k_ic = np.broadcast_to(np.asarray(k_ic, dtype=float), (len(tips),))
     grown = np.zeros(len(tips))
     longest = np.broadcast_to(np.asarray(longest, dtype=float), (len(tips),))
-    growing = np.flatnonzero((tips["k_eq"] >= k_ic) & (tips["k_eq"] > 0) & (longest > 0))
+    growing = np.flatnonzero(reached(tips["k_eq"], k_ic) & (tips["k_eq"] > 0) & (longest > 0))
     if not len(growing):
         return Growth(cracks, grown, ())
     loose = set(cracks.tips.tolist())
@@ -159,6 +161,10 @@ class _Work:
         self.clearance = CLEARANCE * self.sliver
         self.joins: list[Join] = []
 
+    def nearer(self, distance: float, than: float) -> bool:
+        """Whether one length is less than another by more than the clearance."""
+        return distance < than - self.clearance
+
     def log(self, node: int, crack: int, other: int, point: Point) -> None:
         kind = "daylighting" if other < 0 else "self" if other == crack else "coalescence"
         self.joins.append(Join(kind, node, crack, other, point))
@@ -174,21 +180,22 @@ def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[in
             d = (b.start[0] - a.start[0], b.start[1] - a.start[1])
             gap = math.hypot(*d)
             # Nearer than a few slivers there is no room for two segments: one tip then simply reaches the other.
-            if not 4 * work.sliver < gap <= a.length + b.length + work.reach:
+            if not (work.nearer(4 * work.sliver, gap) and work.nearer(gap, a.length + b.length + work.reach)):
                 continue
             d = (d[0] / gap, d[1] / gap)
             if _dot(a.direction, d) >= FACING and -_dot(b.direction, d) >= FACING:
                 pairs.append((gap, a, b))
-    for gap, a, b in sorted(pairs, key=lambda pair: pair[0]):
+    for k in in_order([gap for gap, _, _ in pairs], work.clearance):
+        _, a, b = pairs[k]
         if a.row in met or b.row in met or network.connected(a.node, b.node):
             continue
-        t, u = passage(a.start, a.end, b.start, b.end)
-        if 0 <= t <= 1 and 0 <= u <= 1:  # the steps cross
+        t, u = _crossing(work, a, b)
+        if 0 <= t <= 1 and 0 <= u <= 1:
             at = (a.start[0] + t * a.length * a.direction[0], a.start[1] + t * a.length * a.direction[1])
         else:
             share = a.length / (a.length + b.length)
             at = tuple(p + share * (q - p) for p, q in zip(a.start, b.start))
-        if min(math.dist(a.start, at), math.dist(b.start, at)) < work.sliver:
+        if work.nearer(min(math.dist(a.start, at), math.dist(b.start, at)), work.sliver):
             continue
         if not (_clear(work, a, at, set(), None) and _clear(work, b, at, set(), None)):
             continue
@@ -202,6 +209,18 @@ def _meet_half_way(work: _Work, steps: list[_Step], grown: np.ndarray) -> set[in
         work.log(a.node, crack, other, at)
         met |= {a.row, b.row}
     return met
+
+
+def _crossing(work: _Work, a: _Step, b: _Step) -> tuple[float, float]:
+    """(t, u) of two steps that cross, parts of their lengths; nan for those that do not, and for two along one line, of
+    which only rounding would say where."""
+    if abs(a.direction[0] * b.direction[1] - a.direction[1] * b.direction[0]) < ONE_WAY:
+        return math.nan, math.nan
+    parts = []
+    for part, step in zip(passage(a.start, a.end, b.start, b.end), (a, b)):
+        spare = work.clearance / step.length
+        parts.append(min(max(part, 0.0), 1.0) if -spare <= part <= 1 + spare else math.nan)
+    return parts[0], parts[1]
 
 
 def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
@@ -218,10 +237,11 @@ def _advance_one(work: _Work, step: _Step, grown: np.ndarray) -> None:
             at = beside(mouth, obstacle, step.start, work.sliver)
         if node is None and _grazes(step.start, at, obstacle):
             _, at = nearest_on(step.start, obstacle.a, obstacle.b)
-            if obstacle.row is not None and min(math.dist(at, obstacle.a), math.dist(at, obstacle.b)) < work.sliver:
+            end = min(math.dist(at, obstacle.a), math.dist(at, obstacle.b))
+            if obstacle.row is not None and work.nearer(end, work.sliver):
                 continue  # past its end
         # So near already that a segment would be a sliver: then the tip itself is drawn onto what it meets.
-        drawn = math.dist(step.start, at) < work.sliver
+        drawn = work.nearer(math.dist(step.start, at), work.sliver)
         allowed = set() if node is None else {node}
         if not (_clear_when_drawn if drawn else _clear)(work, step, at, allowed, obstacle):
             continue
@@ -250,14 +270,16 @@ def _grazes(start: Point, at: Point, face: Obstacle) -> bool:
 
 def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
     """Ways to end a step at the first thing it would cross, best first; None when nothing is in its way."""
-    network, first = work.network, None
+    network, met = work.network, []
     for obstacle in network.near(step.block, step.node, step.length + work.reach):
         t = network.first_contact(step.node, step.start, step.end, obstacle, work.clearance)
-        if t is not None and (first is None or t < first[0]):
-            first = (t, obstacle)
-    if first is None:
+        if t is not None:
+            met.append((t, obstacle))
+    if not met:
         return None
-    t, obstacle = first
+    # At a corner, a junction or a mouth it meets several at once: the boundary then counts, which knows its mouths.
+    met.sort(key=lambda each: each[1].row is not None)
+    t, obstacle = met[in_order([t for t, _ in met], work.clearance / step.length)[0]]
     hit = (step.start[0] + t * (step.end[0] - step.start[0]), step.start[1] + t * (step.end[1] - step.start[1]))
     _, at = nearest_on(hit, obstacle.a, obstacle.b)
     ways = []
@@ -266,14 +288,13 @@ def _blocked(work: _Work, step: _Step) -> list[_Way] | None:
         distance = math.dist(point, at)
         # The straight way must still be the way the crack was going, or nearly so.
         ahead = _dot(_towards(step.start, point), step.direction) >= AHEAD or distance <= work.sliver
-        if ahead and distance <= max(work.sliver, snap * work.reach) and not network.connected(step.node, node):
+        near = work.nearer(distance, max(work.sliver, snap * work.reach))
+        if ahead and near and not network.connected(step.node, node):
             ways.append((distance, obstacle, node, point))
-    ways.sort(key=lambda way: way[0])
-    ways = [way[1:] for way in ways]
+    ways = _best_first(work, ways)
     if obstacle.row is None:
-        ways += [
-            (obstacle, None, corner) for corner in (obstacle.a, obstacle.b) if math.dist(corner, at) <= work.sliver
-        ]
+        corners = [corner for corner in (obstacle.a, obstacle.b) if work.nearer(math.dist(corner, at), work.sliver)]
+        ways += [(obstacle, None, corner) for corner in corners]
     return [*ways, (obstacle, None, at)]
 
 
@@ -282,32 +303,37 @@ def _attracted(work: _Work, step: _Step) -> list[_Way]:
     network, ways, seen = work.network, [], set()
     own = network.crack_at(step.node)
     # Its own neighbourhood along the crack is always near and never a thing to join.
-    tail = network.within(step.node, 2 * (step.length + work.reach))
+    tail = network.within(step.node, 2 * (step.length + work.reach) + work.clearance)
     for obstacle in network.near(step.block, step.node, step.length + work.reach):
         if obstacle.row is not None and obstacle.row in tail:
             continue
         distance, at = nearest_on(step.end, obstacle.a, obstacle.b)
         # What a step leaves behind, as a crack that the tip has come past, does not draw it back.
-        if distance > work.reach or distance > nearest_on(step.start, obstacle.a, obstacle.b)[0]:
+        if not work.nearer(distance, min(work.reach, nearest_on(step.start, obstacle.a, obstacle.b)[0])):
             continue
         is_own = obstacle.row is not None and obstacle.row.crack == own
         candidates = [(distance, None, at)]
         for node, point in network.nodes_on(obstacle, step.block):
             away = math.dist(step.end, point)
-            if node not in seen and away <= work.reach:
+            if node not in seen and work.nearer(away, work.reach):
                 seen.add(node)
                 candidates.append((away * (PREFER_TIP if network.is_tip(node) else PREFER_NODE), node, point))
         for score, node, point in candidates:
             origin = step.end if is_own else step.start
             if _dot(_towards(origin, point), step.direction) < AHEAD:
                 continue
-            if node is None and any(math.dist(point, end) < work.sliver for end in (obstacle.a, obstacle.b)):
+            ends = (obstacle.a, obstacle.b)
+            if node is None and any(work.nearer(math.dist(point, end), work.sliver) for end in ends):
                 if obstacle.row is not None:
                     continue  # the node itself is among the candidates
-                point = min((obstacle.a, obstacle.b), key=lambda end: math.dist(point, end))
+                point = min(ends, key=lambda end: math.dist(point, end))
             ways.append((score, obstacle, node, point))
-    ways.sort(key=lambda way: way[0])
-    return [way[1:] for way in ways]
+    return _best_first(work, ways)
+
+
+def _best_first(work: _Work, ways: list[tuple[float, Obstacle, int | None, Point]]) -> list[_Way]:
+    """``ways`` by their scores, m."""
+    return [ways[k][1:] for k in in_order([way[0] for way in ways], work.clearance)]
 
 
 def _clear(work: _Work, step: _Step, at: Point, allowed: set[int], target: Obstacle | None) -> bool:
@@ -320,7 +346,7 @@ def _clear_when_drawn(work: _Work, step: _Step, at: Point, allowed: set[int], ta
     """`_clear` for the tip's last segment, were its end drawn to ``at``."""
     before = work.network.other_end(step.node)
     start = work.network.nodes[before]
-    if math.dist(start, at) < work.sliver or any(work.network.connected(before, node) for node in allowed):
+    if work.nearer(math.dist(start, at), work.sliver) or any(work.network.connected(before, node) for node in allowed):
         return False
     own = work.network.rows_at(step.node)[0]
     return _free_path(work, before, step.block, start, at, allowed, target, own)

@@ -30,6 +30,7 @@ from . import shapes
 from .network import Network, Point, nearest_on
 from .rock import inside
 from .solution import Solution
+from .ties import ONE_WAY, TIED, in_order, reached
 
 #: Where cracks are looked for, by the names that scenes use.
 PLACES = ("", "surface", "everywhere")
@@ -81,7 +82,9 @@ def overstress(stress: np.ndarray, material: Material) -> tuple[np.ndarray, np.n
         shear = np.maximum(radius + mean * math.sin(phi), 0.0) / (material.cohesion * math.cos(phi))
     else:
         shear = np.zeros_like(radius)
-    return tension, shear, 0.5 * np.arctan2(2 * xy, xx - yy)
+    # Under the same pressure on all sides every direction is one of σ1.
+    has_direction = radius > TIED * np.abs(mean)
+    return tension, shear, np.where(has_direction, 0.5 * np.arctan2(2 * xy, xx - yy), 0.0)
 
 
 def births(solution: Solution, material: Material, settings: GrowthSettings, block: int = 0) -> list[Birth]:
@@ -102,7 +105,7 @@ def births(solution: Solution, material: Material, settings: GrowthSettings, blo
     for birth in _candidates(solution, material, settings):
         if birth.overstress <= 0 or (chosen and birth.overstress < (1 - TOGETHER) * chosen[0].overstress):
             break
-        apart = all(math.dist(birth.start, other.start) >= spacing for other in chosen)
+        apart = all(reached(math.dist(birth.start, other.start), spacing) for other in chosen)
         if apart and _has_room(network, birth, settings, block):
             chosen.append(birth)
     return chosen
@@ -154,8 +157,8 @@ def _candidates(solution: Solution, material: Material, settings: GrowthSettings
         found += _from_surface(solution, material, settings, points[free], inward[free], segment[free], stress(free))
     if settings.initiation == "everywhere":
         found += _in_rock(solution, material, settings)
-    # Of what is alike to round-off the place decides, not the round-off.
-    return sorted(found, key=lambda b: (-round(b.overstress, 9), b.place, b.start, b.end))
+    most = max((b.overstress for b in found), default=0.0)
+    return [found[k] for k in in_order([-b.overstress for b in found], TIED * most)]
 
 
 # Points (n, 2) of surfaces, unit vectors into the rock, crack segments (−1 on outlines), and what gives the stress at
@@ -214,7 +217,7 @@ def _on_free_surface(solution: Solution, settings: GrowthSettings):
     below = np.concatenate([*body.loops, body.cracks.nodes, np.empty((0, 2))])
     along = rock.frame(below)[:, 0] if len(below) else np.zeros(1)
     low, high = along.min() - body._extent, along.max() + body._extent
-    n = min(GRID, math.ceil((high - low) / _spacing(settings)))
+    n = min(GRID, math.ceil((1 - TIED) * (high - low) / _spacing(settings)))
     # An odd number, so that symmetric bodies are looked at in the middle.
     x = low + (high - low) * (np.arange(2 * (n // 2) + 1) + 0.5) / (2 * (n // 2) + 1)
     points = np.asarray(rock.point) + x[:, None] * rock.turn[0]
@@ -265,13 +268,13 @@ def _away(cracks: Cracks, points: np.ndarray, own: np.ndarray, settings: GrowthS
     near = np.where(special, _spacing(settings), APART * settings.increment)
     marked = np.flatnonzero((special | _corners(cracks)) & (cracks.valence > 0))
     for node in marked:
-        free &= np.hypot(*(points - cracks.nodes[node]).T) >= near[node]
+        free &= reached(np.hypot(*(points - cracks.nodes[node]).T), near[node])
     start, along = cracks.nodes[cracks.segments[:, 0]], np.diff(cracks.nodes[cracks.segments], axis=1)[:, 0]
     for s in range(cracks.n_segments):
         rel = points - start[s]
         share = np.clip(rel @ along[s] / cracks.lengths[s] ** 2, 0, 1)
         distance = np.hypot(*(rel - share[:, None] * along[s]).T)
-        free &= (own >= 0) | (distance >= APART * settings.increment)
+        free &= (own >= 0) | reached(distance, APART * settings.increment)
     return free
 
 
@@ -327,10 +330,11 @@ def _ways(stress: np.ndarray, material: Material, inward: np.ndarray) -> Iterato
         return way
 
     across = angle + math.pi / 2  # the direction of σ3, along which tension parts the rock
-    yield "tension", into(across, (tension > 0) & (tension >= shear))
+    tears = reached(tension, shear)
+    yield "tension", into(across, (tension > 0) & tears)
     slant = math.pi / 4 - material.friction_angle / 2
     for turn in (slant, -slant):
-        yield "shear", into(across + turn, shear > tension)
+        yield "shear", into(across + turn, ~tears)
 
 
 def _on_plane(kind: str, stress: np.ndarray, way: np.ndarray, material: Material) -> np.ndarray:
@@ -358,14 +362,17 @@ def _in_rock(solution, material, settings) -> Iterator[Birth]:
     step = max(_spacing(settings), math.sqrt(float(np.prod(high - low)) / GRID))
     if not step < (high - low).max():
         return
-    axes = [np.linspace(a, b, max(2, math.ceil((b - a) / step)) + 1) for a, b in zip(low, high)]
+    axes = [np.linspace(a, b, max(2, math.ceil((1 - TIED) * (b - a) / step)) + 1) for a, b in zip(low, high)]
     points = np.stack(np.meshgrid(*[0.5 * (x[1:] + x[:-1]) for x in axes]), axis=-1).reshape(-1, 2)
     points = points[inside(body.limits, points)]
     points = points[_away(body.cracks, points, np.full(len(points), -1), settings)]
     stress = solution.stress(points)
     tension, shear, angle = overstress(stress, material)
-    tears = tension >= shear
+    tears = reached(tension, shear)
     theta = angle + math.pi / 2 + np.where(tears, 0.0, math.pi / 4 - material.friction_angle / 2)
+    # The second of the two ends is the one to the right, of a vertical crack the upper one.
+    quarter = math.pi / 2 - ONE_WAY
+    theta = np.mod(theta + quarter, math.pi) - quarter
     half = 0.5 * settings.increment * np.column_stack([np.cos(theta), np.sin(theta)])
     for k in np.flatnonzero(np.maximum(tension, shear) > 0).tolist():
         value = float(max(tension[k], shear[k]))

@@ -26,7 +26,7 @@ from .influence import ElementSet
 from .proximity import keep_apart
 
 #: Neighbouring segments whose elements differ more than this in length are graded.
-JUMP = 10.0
+JUMP = 10.0 * (1 + 1e-9)
 #: Increments between a slight kink and the tip from which the kink is not graded any more.
 FORGOTTEN = 3
 #: Sides that turn by less than this go straight on, rad, …
@@ -267,7 +267,8 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
     drawn = cracks.birth_cycle == 0
     total = np.bincount(cracks.crack, weights=np.where(drawn, length, 0.0), minlength=cracks.crack.max() + 1)
     share = np.where(drawn, length / np.maximum(total[cracks.crack], 1e-300), 0.0)
-    count = np.maximum(1, np.rint(settings.elements_per_crack * share).astype(int))
+    # To nine digits first: of a crack drawn in two halves, 2½ of five elements each, both get as many.
+    count = np.maximum(1, np.rint(np.round(settings.elements_per_crack * share, 9)).astype(int))
     layers = _node_layers(cracks, length / count, grading, edges)
     inner: list[float] = []
     pieces = np.ones(n, np.int64)

@@ -30,6 +30,7 @@ import numpy as np
 
 from ..model import Cracks
 from .growth import Growth
+from .ties import ONE_WAY
 
 #: A step that turns by more than this starts at a kink.
 KINK = np.radians(20.0)
@@ -124,8 +125,10 @@ class Chords:
         turns = _turns_ahead(tips, grown, ahead, cracks, cycle)
         angle = tips["angle"].copy()
         first = self.looks == 1
-        known = told = np.isfinite(self.kappa)
-        kappa = np.where(known, self.kappa, self._first_guess(turns)) if first else self._secant(turns, angle)
+        known = np.isfinite(self.kappa)
+        kappa, told = (
+            (np.where(known, self.kappa, self._first_guess(turns)), known) if first else self._secant(turns, angle)
+        )
         share = np.maximum(self.share, 1 - 1 / np.maximum(kappa, 1.0))
         rest = share * turns - (1 - share) * (angle - self.start)
         off = np.abs(rest) > TOLERANCE  # not where there is nothing ahead, nan
@@ -141,12 +144,14 @@ class Chords:
         tips["angle"][seen] = np.clip(angle + rest / (1 + share * kappa), self.lowest, self.highest)[seen]
         if first:
             # A first look that turns on a little, the way the trial did, needs no second one: the path is smooth.
-            self.onward = (rest * self.start >= 0) & ~known
+            straight = np.abs(self.start) < ONE_WAY
+            self.onward = (straight | (rest * self.start >= 0)) & seen & ~known
             self.whole = angle + self.share * turns
             smooth = self.onward & (np.abs(rest) < SMOOTH) & (kappa < STIFF)
             unsettled = off & ~np.where(known, left <= TOLERANCE, smooth)
             # … and says so: the next trial has half a turn, which is right where no trial is corrected (`AS_TRIED`).
-            told = known | smooth
+            # A path that goes straight on tells nothing.
+            told = known | (smooth & ~(straight & (np.abs(turns) < ONE_WAY)))
         else:
             unsettled = off & (left > TOLERANCE)
             if self.looks == 2:
@@ -154,7 +159,7 @@ class Chords:
                 gentle = self.onward & (kappa < GENTLE)
                 tips["angle"][gentle], unsettled = self.whole[gentle], unsettled & ~gentle
         self.last_angle, self.last_turns = angle, turns
-        self.kappa = np.where((self.looks > 1) | told, kappa, np.nan)
+        self.kappa = np.where(told, kappa, np.nan)
         if (np.abs(tips["angle"] - angle)[seen] <= AS_TRIED).all():
             tips["angle"] = angle
             return True
@@ -171,19 +176,22 @@ class Chords:
 
     def _first_guess(self, turns: np.ndarray) -> np.ndarray:
         """κ by the turn ahead of a trial along the tangent: on a smooth path, from half a turn before the tip, it is 2
-        + κ times that; of a zigzag about a straight line −κ times. 0 where that is not stiff; kinks do not tell."""
+        + κ times that; of a zigzag about a straight line −κ times. 0 where that is not stiff; kinks do not tell, nor
+        does a path that goes straight on."""
+        turns = np.where(np.maximum(np.abs(turns), np.abs(self.start)) < ONE_WAY, np.nan, turns)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = turns / self.start
         kappa = np.minimum(np.where(ratio > 0, ratio - 2, -ratio), GUESSED)
         return np.where((kappa >= STIFF) & (np.abs(self.start) <= KINK), kappa, 0.0)
 
-    def _secant(self, turns: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """κ by the last two looks; as it was where they are too near to one another to tell."""
+    def _secant(self, turns: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """κ by the last two looks, and whether (n_tips,) it is known; as it was where they are too near to one another
+        to tell, and 0 where it was not known."""
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = (turns - self.last_turns) / (angle - self.last_angle)
         known = np.isfinite(self.kappa)
-        tells = np.isfinite(slope) & (~known | (np.abs(angle - self.last_angle) > TELLING))
-        return np.where(tells, -1 - np.clip(slope, *SLOPES), np.where(known, self.kappa, 0.0))
+        tells = np.isfinite(slope) & (np.abs(angle - self.last_angle) > np.where(known, TELLING, ONE_WAY))
+        return np.where(tells, -1 - np.clip(slope, *SLOPES), np.where(known, self.kappa, 0.0)), known | tells
 
 
 def corrected(

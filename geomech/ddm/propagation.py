@@ -23,6 +23,7 @@ from .initiation import Birth, bear, births
 from .loads import BodyLoad
 from .path import Memory, corrected
 from .solution import Solution
+from .ties import reached
 from .trial_kinks import check_criterion, judged
 
 #: Under a controlled load, tips driven within this part of the most driven one grow with it: K at a graded kink is
@@ -233,7 +234,7 @@ class _Run:
     # -- growth --------------------------------------------------------------------------------------------------
 
     def _grow(self, tips: np.ndarray) -> Growth | None:
-        if self.tip_drive < self.enough:
+        if not reached(self.tip_drive, self.enough):
             return None
         drive = self.tip_drive
         cracks, body, cycle = self.body.cracks, self.body, self.number + 1
@@ -255,7 +256,7 @@ class _Run:
 
     def _bear(self, tips: np.ndarray) -> tuple[Growth | None, Sequence[Birth]]:
         """New cracks when whole rock fails; only where no tip grows, which would relieve it."""
-        if not self.births or self.births[0].overstress < self.enough:
+        if not self.births or not reached(self.births[0].overstress, self.enough):
             return None, ()
         cracks = bear(self.body.cracks, lambda block: self.body.limits, self.births, self.number + 1)
         return Growth(cracks, np.zeros(len(tips)), ()), self.births
@@ -266,7 +267,7 @@ class _Run:
         self, cracks: Cracks, tips: np.ndarray, growth: Growth | None, born: Sequence[Birth]
     ) -> tuple[Event, ...]:
         if growth is None:
-            at = tips["point"][np.argmax(tips["k_eq"])] if len(tips) else np.zeros(2)
+            at = tips["point"][np.argmax(reached(tips["k_eq"], tips["k_eq"].max()))] if len(tips) else np.zeros(2)
             return (self._event("arrest", at, "nothing is driven any more"),)
         names = growth.cracks.names[len(cracks.names) :]
         events = [

@@ -14,6 +14,8 @@ from .network import Network, Obstacle, Point, Row
 
 #: A mouth lies on an edge that is nearer to it than this part of the edge's length.
 _ON_EDGE = 1e-9
+#: Nearer than a distance is what is nearer by more than a thousandth of it: rounding does not decide.
+_LESS = 1 - 1e-3
 
 
 def chain_between(network: Network, tip: int, ends: tuple[int, ...]) -> list[int]:
@@ -83,7 +85,7 @@ def _part(network: Network, block: int, mouth: int, neighbours: tuple[int, int],
         at = (point[0] + share * (end[0] - point[0]), point[1] + share * (end[1] - point[1]))
         far = order[k].end if order[k].start == mouth else order[k].start
         others = [node for node, _ in network.nodes_on(edge, block) if node != mouth]
-        taken = any(math.dist(network.nodes[node], at) < distance for node in others)
+        taken = any(math.dist(network.nodes[node], at) < _LESS * distance for node in others)
         if not taken and free(far, at, edge, order[k]):
             network.detach(order[k], mouth, network.add_node(at, surface=True))
             return
@@ -98,17 +100,18 @@ def own_mouth_at(
         return None
     for row in network.within(tip, math.inf):
         for end in (row.start, row.end):
-            if network.surface[end] and math.dist(network.nodes[end], at) < distance:
+            if network.surface[end] and math.dist(network.nodes[end], at) < _LESS * distance:
                 return network.nodes[end]
     return None
 
 
 def beside(mouth: Point, edge: Obstacle, start: Point, distance: float) -> Point:
-    """The point of the boundary's ``edge`` that is ``distance`` from the ``mouth`` on it, towards ``start``."""
+    """The point of the boundary's ``edge`` that is ``distance`` from the ``mouth`` on it, towards ``start``; onward
+    where that is right across."""
     length = math.dist(edge.a, edge.b)
     x, y = ((edge.b[0] - edge.a[0]) / length, (edge.b[1] - edge.a[1]) / length)
     place, wanted = ((p[0] - edge.a[0]) * x + (p[1] - edge.a[1]) * y for p in (mouth, start))
-    onward = place < distance or (wanted > place and length - place > distance)
+    onward = place < distance or (wanted > place - (1 - _LESS) * distance and length - place > distance)
     place = min(max(place + (distance if onward else -distance), 0.0), length)
     return (edge.a[0] + place * x, edge.a[1] + place * y)
 

@@ -21,6 +21,7 @@ import numpy as np
 from ..model import Cracks, GrowthSettings, Material
 from .criteria import CRITERIA
 from .faces import NotConverged
+from .ties import best as best_direction
 
 if TYPE_CHECKING:
     from .body import Body
@@ -85,7 +86,7 @@ def driven(solution: Solution, length: float, material: Material) -> tuple[np.nd
 def _largest(value: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
     """Angle and K_eq at the largest of ``value`` (n_directions, n_tips), by a parabola through its neighbours."""
     every = np.arange(value.shape[1])
-    at = np.clip(np.argmax(value, axis=0), 1, len(DIRECTIONS) - 2)
+    at = np.clip([best_direction(column, DIRECTIONS) for column in value.T], 1, len(DIRECTIONS) - 2)
     low, best, high = (value[at + side, every] for side in (-1, 0, 1))
     bend = np.minimum(low - 2 * best + high, -np.finfo(float).tiny)
     shift = np.clip(0.5 * (low - high) / bend, -1.0, 1.0)

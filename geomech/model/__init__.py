@@ -12,7 +12,18 @@ from .joint import JointLaw, Roughness
 from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
 from .material import Material
 from .motion import Motion
-from .problem import CHANGES, STOPS, WEIGHT, DdaSettings, DdmSettings, GrowthSettings, Problem, RunSettings, counted
+from .problem import (
+    CHANGES,
+    LARGEST_CORNER,
+    STOPS,
+    WEIGHT,
+    DdaSettings,
+    DdmSettings,
+    GrowthSettings,
+    Problem,
+    RunSettings,
+    counted,
+)  # fmt: skip
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
 from .whole_network import whole_network
 
@@ -21,6 +32,7 @@ __all__ = [
     "CHANGES",
     "CONTACT",
     "GROUND",
+    "LARGEST_CORNER",
     "OPEN",
     "SLIP",
     "STICK",

@@ -25,7 +25,10 @@ class DdaSettings:
     shrink as they prove easy or hard (`dda.StepLength`). ``normal_penalty`` and ``shear_penalty`` are contact spring
     stiffnesses, N/m per metre of thickness (Pa); None picks them from the blocks' stiffness. ``contact`` "augmented"
     adds multipliers to these springs until closed contacts gape and sticking ones give by less than
-    ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``dynamic_factor`` multiplies the
+    ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``corner_rounding`` is the length
+    over which two corners that meet are rounded, in sizes (√area) of the smaller block, at most a quarter of the
+    shortest edge there: corners that overlap by less slide over each other, by more they hold (Itasca's UDEC advises
+    a hundredth of an edge). ``dynamic_factor`` multiplies the
     velocity carried from step to step: 0 is static, 1 fully dynamic. ``newmark`` is (β, γ) of the time scheme: (½, 1)
     is Shi's, (¼, ½) the trapezoidal rule, which has no dissipation; in between it has some; 2β ≥ γ ≥ ½, β ≤ γ − ¼. With γ > ½ it
     is of first order (of second for what only falls and turns, if γ = 2β). ``spectral_radius`` ϱ of 0 to 1 puts the
@@ -57,6 +60,7 @@ class DdaSettings:
     normal_penalty: float | None = None
     shear_penalty: float | None = None
     contact: str = "penalty"
+    corner_rounding: float = 0.01
     penetration_tolerance: float = 1e-8
     max_open_close_iterations: int = 60
     max_step_cuts: int = 12
@@ -81,6 +85,8 @@ class DdaSettings:
             )
 
 
+#: Corners rounded over more than this part of a block's size are no corners any more.
+LARGEST_CORNER = 0.25
 #: What the numbers of `DdaSettings` may be.
 _DDA_NUMBERS = {
     "time_step": Number(closed=False, unit="s"),
@@ -94,6 +100,7 @@ _DDA_NUMBERS = {
     "normal_penalty": Number(closed=False, unit="Pa", optional=True),
     "shear_penalty": Number(closed=False, unit="Pa", optional=True),
     "penetration_tolerance": Number(most=1.0, closed=False),
+    "corner_rounding": Number(most=LARGEST_CORNER),
     "max_open_close_iterations": Number(least=1, whole=True),
     "max_step_cuts": Number(whole=True),
 }

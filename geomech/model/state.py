@@ -26,7 +26,8 @@ CONTACT = np.dtype(
         ("state", np.int64),  # OPEN, STICK or SLIP
         ("position", np.float64),  # along the edge, 0 at its start and 1 at its end
         ("point", np.float64, 2),  # where, current coordinates, m
-        ("normal", np.float64, 2),  # outward normal of the edge: the way the contact pushes the vertex's block
+        ("normal", np.float64, 2),  # outward normal of the edge (of a rounded corner, see ``tilt``): the way it pushes
+        # the vertex's block
         ("normal_force", np.float64),  # N/m, positive in compression
         ("shear_force", np.float64),  # N/m, along the edge's direction
         ("gap", np.float64),  # m, from where the faces meet (beyond ``lift``), negative when penetrating
@@ -43,6 +44,7 @@ CONTACT = np.dtype(
         ("inset", np.bool_),  # a bond whose springs stand inside its face, as the bending of its blocks wants them
         ("bare", np.float64),  # part of its face, from this corner on, that does not touch; −1 where that is not known
         ("stretch", np.float64),  # m, motion along the edge while sticking that a multiplier has still to take back
+        ("tilt", np.float64),  # rad, of the normal against that of the edge, where two rounded corners meet; else 0
     ]
 )
 

@@ -1,5 +1,5 @@
-"""The picture of `geomech bench slopes`: a square a slope, coloured by what became of it; and how near to its bound
-each quantity came."""
+"""The pictures of `geomech bench slopes`, of invariants and of invariance: a square a slope, coloured by what became of
+it; and how near to its bound each quantity came."""
 
 from __future__ import annotations
 
@@ -31,15 +31,24 @@ class Outcome(Protocol):
     seconds: float
 
 
-def draw(slopes: Sequence[Outcome], verdicts: Sequence[str], bounds: Mapping[str, float], path: Path) -> Path:
-    """``slopes`` in the order in which they are drawn; ``bounds``: name of a quantity → its bound."""
+def draw(
+    slopes: Sequence[Outcome],
+    verdicts: Sequence[str],
+    bounds: Mapping[str, float],
+    path: Path,
+    *,
+    title: str = "",
+    meaning: Mapping[str, str] = MEANING,
+) -> Path:
+    """``slopes`` in the order in which they are drawn; ``bounds``: name of a quantity → its bound; ``meaning`` of the
+    verdicts, for the legend."""
     from matplotlib.figure import Figure
 
     down = math.ceil(len(slopes) / ACROSS)
     heights = [0.3 * down + 0.9, 0.28 * len(bounds) + 1.0]
     figure = Figure(figsize=(11.5, sum(heights) + 0.4), dpi=120, layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=heights)
-    _squares(top, slopes, verdicts, down)
+    _squares(top, slopes, verdicts, down, title or f"What became of {len(slopes)} random slopes (their seeds)", meaning)
     quantities, times = bottom.subplots(1, 2, width_ratios=[3, 1.3])
     _quantities(quantities, slopes, bounds)
     _times(times, slopes, verdicts)
@@ -48,7 +57,9 @@ def draw(slopes: Sequence[Outcome], verdicts: Sequence[str], bounds: Mapping[str
     return path
 
 
-def _squares(figure, slopes: Sequence[Outcome], verdicts: Sequence[str], down: int) -> None:
+def _squares(
+    figure, slopes: Sequence[Outcome], verdicts: Sequence[str], down: int, title: str, meaning: Mapping[str, str]
+) -> None:
     from matplotlib.patches import Patch, Rectangle
 
     axes = figure.subplots()
@@ -58,14 +69,14 @@ def _squares(figure, slopes: Sequence[Outcome], verdicts: Sequence[str], down: i
         axes.text(column + 0.5, row + 0.5, str(slope.seed), ha="center", va="center", fontsize=6.5, color="#333333")
     axes.set(xlim=(0, ACROSS), ylim=(down, 0), xticks=[], yticks=[])
     axes.spines[:].set_visible(False)
-    axes.set_title(f"What became of {len(slopes)} random slopes (their seeds)", fontsize=11, loc="left")
+    axes.set_title(title, fontsize=11, loc="left")
     counts = Counter(slope.verdict for slope in slopes)
     reasons = Counter(slope.reason for slope in slopes if slope.verdict == "refused")
     handles, labels = [], []
     for verdict in verdicts:
         if counts[verdict] or verdict == "wrong":
             handles.append(Patch(facecolor=COLOURS[verdict]))
-            labels.append(f"{counts[verdict]} {MEANING[verdict]}")
+            labels.append(f"{counts[verdict]} {meaning[verdict]}")
         if verdict == "refused":
             for reason, count in reasons.most_common():
                 handles.append(Patch(facecolor="none"))

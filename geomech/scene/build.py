@@ -223,6 +223,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
         shear_penalty=d.shear_penalty_pa,
         contact=d.contact,
         penetration_tolerance=d.penetration_tolerance,
+        corner_rounding=d.corner_rounding,
         max_open_close_iterations=d.max_open_close_iterations,
         max_step_cuts=d.max_step_cuts,
     )

@@ -56,7 +56,7 @@ def test_pebbles_below_a_large_block_bear_it(monkeypatch, gravity):
     rock, joint = Material("rock", 20e9, 0.25, density=2600.0), JointLaw("joint", friction_angle=0.6)
     system = dda.BlockSystem(blocks, [rock], [joint], settings=DdaSettings(time_step=0.01, dynamic_factor=1.0))
     asked = []
-    monkeypatch.setattr(attempt, "settle", lambda *given: asked.append(given) or settle(*given))
+    monkeypatch.setattr(attempt, "settle", lambda *given, **named: asked.append(given) or settle(*given, **named))
     system.step(State.at_rest(blocks), Loads(gravity=History.constant(gravity)))
     pattern, matrix, right, found, vectors, springs, gap, *_ = asked[0]
     path = CentralPath(pattern, matrix, right, found, vectors, springs, gap, found.bonded, found.normal)

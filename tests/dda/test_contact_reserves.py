@@ -34,8 +34,7 @@ def test_contacts_leave_their_states_where_nothing_is_left_in_reserve(slack):
     gap = np.where(state == OPEN, -beyond * slack, -normal / springs.normal)
     zero = np.zeros(n)
     after = check_states(
-        np.column_stack([normal, shear, gap, zero]), np.full((n, 2), -1), np.full(n, np.inf), np.zeros(n, bool), state,
-        np.ones(n), bonded, springs.normal, springs.shear, zero, zero, springs.peak, springs.hold, springs.cohesion,
+        np.column_stack([normal, shear, gap, zero]), state, np.ones(n), bonded, springs.normal, springs.shear, zero, zero, springs.peak, springs.hold, springs.cohesion,
         springs.tension, np.zeros(n, bool), zero, np.full(n, slack),
     )[0]  # fmt: skip
     reserve = reserves(state, bonded, normal, shear, gap, springs, slack)

@@ -52,4 +52,7 @@ def test_carried_rows_lie_on_the_new_geometry_and_keep_the_rest(rows):
     assert np.array_equal(new["point"], vertices[rows["vertex"]])
     # The foot is where the vertex stands square on the edge, and the normal is the outward one of unit length.
     assert np.abs(((new["point"] - foot) * along).sum(axis=1)).max() < 1e-12
-    assert np.allclose(new["normal"], np.stack([along[:, 1], -along[:, 0]], 1) / np.hypot(*along.T)[:, None], 1e-14)
+    across = np.stack([along[:, 1], -along[:, 0]], 1) / np.hypot(*along.T)[:, None]
+    # Turned from there by their tilt, normals of rounded corners.
+    (x, y), c, s = across.T, np.cos(rows["tilt"]), np.sin(rows["tilt"])
+    assert np.allclose(new["normal"], np.stack([c * x - s * y, s * x + c * y], 1), 1e-13)

@@ -81,7 +81,7 @@ def test_states_of_a_few_are_those_of_the_whole_step(monkeypatch):
     again while the others stand."""
     known = []
     settle = attempt.settle
-    monkeypatch.setattr(attempt, "settle", lambda *args: known.append((args, settle(*args))) or known[-1][1])
+    monkeypatch.setattr(attempt, "settle", lambda *args, **named: known.append((args, settle(*args, **named))) or known[-1][1])
     from geomech import dda
 
     law = JointLaw("joint", 0.6, normal_stiffness=5e9, shear_stiffness=2e9)

@@ -18,9 +18,9 @@ def test_rounds_come_to_an_end_where_a_block_hangs_on_its_bonds(monkeypatch, gra
     round."""
     asked = []
 
-    def settle(*arguments):
+    def settle(*arguments, **named):
         asked.append(arguments)
-        return true_settle(*arguments)
+        return true_settle(*arguments, **named)
 
     true_settle = attempt.settle
     monkeypatch.setattr(attempt, "settle", settle)

@@ -16,7 +16,7 @@ def given():
     """What `CentralPath` is asked with for a wall whose weight is put on suddenly."""
     asked, blocks, patch = [], block_scenes.wall(100), pytest.MonkeyPatch()
     with patch.context() as patched:
-        patched.setattr(attempt, "settle", lambda *given: asked.append(given) or settle(*given))
+        patched.setattr(attempt, "settle", lambda *given, **named: asked.append(given) or settle(*given, **named))
         system = dda.BlockSystem(blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01))
         system.step(State.at_rest(blocks), block_scenes.WEIGHT)
     pattern, matrix, right, found, vectors, springs, gap, *_ = asked[0]

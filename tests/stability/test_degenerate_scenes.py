@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -207,19 +208,31 @@ def test_a_run_does_not_write_over_its_scene(tmp_path, capfd):
     assert "write over the scene" in capfd.readouterr().err and scene.read_text() == plate()
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_broken_off_run_can_be_read(tmp_path, how):
-    """Ctrl-C and SIGTERM end with exit code 3 and a summary; a kill leaves all but the last cycle's files in good
-    order."""
+def _under_way(tmp_path) -> tuple[subprocess.Popen, Path]:
+    """A run in a process of its own that has written ten cycles, and its folder."""
     scene, out = tmp_path / "plate.toml", tmp_path / "out"
     scene.write_text(plate(increment=2e-5))
     process = subprocess.Popen(
         [sys.executable, "-m", "geomech", "run", str(scene), "--out", str(out)], stderr=subprocess.PIPE, text=True
     )
+    _wait_for_cycles(process, out, 10)
+    return process, out
+
+
+def _wait_for_cycles(process: subprocess.Popen, out: Path, count: int) -> None:
     deadline = time.monotonic() + 60
-    while time.monotonic() < deadline and len(list((out / "vtk").glob("tips_*.vtu"))) < 10:
+    while time.monotonic() < deadline and len(list((out / "vtk").glob("tips_*.vtu"))) < count:
         time.sleep(0.05)
     assert process.poll() is None
+
+
+@pytest.mark.parametrize(
+    "how", [pytest.param(signal.SIGINT, marks=pytest.mark.other_machines), signal.SIGTERM, signal.SIGKILL]
+)
+def test_a_broken_off_run_can_be_read(tmp_path, how, interruptible):
+    """Ctrl-C and SIGTERM end with exit code 3 and a summary; a kill leaves all but the last cycle's files in good
+    order."""
+    process, out = _under_way(tmp_path)
     os.kill(process.pid, how)
     _, shown = process.communicate(timeout=20)
     assert "Traceback" not in shown
@@ -228,3 +241,16 @@ def test_a_broken_off_run_can_be_read(tmp_path, how):
         assert json.loads((out / "summary.json").read_text())["end"] == "interrupted"
     run = Run(out)
     assert len(run.history["cycle"]) >= 9 and list(run.history["cycle"]) == list(range(len(run.history["cycle"])))
+
+
+@pytest.mark.other_machines
+def test_a_run_in_the_background_heeds_sigterm_alone(tmp_path, in_the_background):
+    """What ignores SIGINT from its start, as a shell script's background jobs do, goes on after one; SIGTERM ends
+    it."""
+    process, out = _under_way(tmp_path)
+    os.kill(process.pid, signal.SIGINT)
+    _wait_for_cycles(process, out, len(list((out / "vtk").glob("tips_*.vtu"))) + 3)
+    os.kill(process.pid, signal.SIGTERM)
+    _, shown = process.communicate(timeout=20)
+    assert process.returncode == cli.INTERRUPTED and f"geomech resume {out}" in shown
+    assert json.loads((out / "summary.json").read_text())["end"] == "interrupted"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geomech import dda, ddm
-from geomech.bench import fuzzed_slopes
+from geomech.bench import fuzzed_slopes, limited_runs, seed_rows
 from geomech.bench.fuzzed_slopes import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Watched, outcome, watched
 from geomech.bench.random_slopes import scene_text
 from geomech.bench.refusals import REASONS, reason_of
@@ -58,8 +58,8 @@ def test_what_does_not_hold_is_wrong_unless_a_warning_says_so(monkeypatch):
     monkeypatch.setitem(INVARIANTS, "strain", tight)
     found = watched(34)
     assert found.verdict == WRONG and "strain" in found.faults[0] and "cycle 1:" in found.faults[0]
-    monkeypatch.setattr(fuzzed_slopes._Heard, "said", [f"t = 0 s: rock and cracks {tight.told[0]}"], raising=False)
-    monkeypatch.setattr(fuzzed_slopes._Heard, "__init__", lambda self: super(type(self), self).__init__())
+    monkeypatch.setattr(limited_runs.Heard, "said", [f"t = 0 s: rock and cracks {tight.told[0]}"], raising=False)
+    monkeypatch.setattr(limited_runs.Heard, "__init__", lambda self: super(type(self), self).__init__())
     found = watched(34)
     assert found.verdict == REPORTED and not found.faults and "strain" in found.told[0]
 
@@ -67,7 +67,7 @@ def test_what_does_not_hold_is_wrong_unless_a_warning_says_so(monkeypatch):
 def test_time_that_is_up_in_a_compiled_function_is_no_error(monkeypatch):
     def compiled(problem):
         yield from ()
-        raise SystemError("returned a result with an exception set") from fuzzed_slopes._TimeUp("dda.solve")
+        raise SystemError("returned a result with an exception set") from limited_runs.TimeUp("dda.solve")
 
     monkeypatch.setattr("geomech.coupling.cycles", compiled)
     found = watched(34)
@@ -114,7 +114,7 @@ def test_many_slopes_are_run_once(tmp_path, monkeypatch):
     """Rows are kept: the second time nothing is run, and the picture is drawn anew."""
     first = fuzzed_slopes.measure_many(range(16, 18), folder=tmp_path, workers=1)
     assert "2 slopes" in first.text and (tmp_path / "slopes.png").exists()
-    monkeypatch.setattr(fuzzed_slopes, "ProcessPoolExecutor", None)
+    monkeypatch.setattr(seed_rows, "ProcessPoolExecutor", None)
     (tmp_path / "slopes.png").unlink()
     with (tmp_path / "slopes.jsonl").open("a") as rows:
         rows.write('{"seed": 1')  # a run that was broken off as it wrote
@@ -195,16 +195,14 @@ def test_a_way_along_a_surface_goes_straight_across_to_it(degrees):
 
 
 def test_the_end_of_the_time_is_found_below_the_errors_that_followed_upon_it():
-    from geomech.bench import fuzzed_slopes
-
     try:
         try:
             try:
-                raise fuzzed_slopes._TimeUp("here")
+                raise limited_runs.TimeUp("here")
             except BaseException as up:
                 raise SystemError("returned a result with an exception set") from up
         except SystemError:
             raise ValueError("another") from None
     except ValueError as error:
-        assert str(fuzzed_slopes._time_up(error)) == "here"
-    assert fuzzed_slopes._time_up(ValueError("none")) is None
+        assert str(limited_runs.time_up(error)) == "here"
+    assert limited_runs.time_up(ValueError("none")) is None

@@ -78,6 +78,7 @@ def released(tension, displacement):
     return 0.5 * (force[:-1] * displacement[1:] - force[1:] * displacement[:-1])
 
 
+@pytest.mark.other_machines
 def test_the_load_that_follows_a_crack_across_a_tall_plate():
     """At every increment σ = K_Ic/(F √(πa)), with F by boundary collocation; elements of order 4 keep 2e-5 of K. The
     load falls all the way, and the platen goes back: under a displacement that only rises the crack would run

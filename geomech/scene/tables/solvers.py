@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from ...model import STOPS, rayleigh_coefficients
+from ...model import LARGEST_CORNER, STOPS, rayleigh_coefficients
 from .entries import NotNegative, Pair, Positive, Table
 
 
@@ -70,6 +70,12 @@ class DdaTable(Table):
     penetration_tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
         1e-8,
         description='what "augmented" contacts may still gape or give, in units of the smallest block\'s size, √area',
+    )
+    corner_rounding: Annotated[float, Field(ge=0, le=LARGEST_CORNER)] = Field(
+        0.01,
+        description="length over which two corners that meet are rounded, in units of the smaller block's size, √area "
+        "(at most a quarter of the shortest edge there): corners that overlap by less slide over each other, by more "
+        "they hold",
     )
     max_open_close_iterations: Annotated[int, Field(ge=1)] = Field(
         60, description="open–close iterations before the time step is cut"
