@@ -30,7 +30,7 @@ def found(moved, pressed=0.0, corner=(-0.3, 0.4)):
     box = np.concatenate([np.minimum(one[:, :2], two[:, :2]), np.maximum(one[:, 2:], two[:, 2:])], axis=1)
     return crossings(
         before, after, np.ascontiguousarray(blocks.next_vertex, np.int64), start, np.array([[0, 1]]), box,
-        np.full(8, pressed), np.sqrt(blocks.areas()),
+        np.full(8, pressed), np.sqrt(blocks.areas()), np.zeros(8),
     )  # fmt: skip
 
 
