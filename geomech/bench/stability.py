@@ -1,5 +1,5 @@
 """Where the solvers stay right. The block solver: maps over penalty, time step, contrasts, slivers, offsets, overlaps,
-speeds, debris; cracks and cracked blocks: `crack_limits`.
+speeds, debris, thin walls; cracks and cracked blocks: `crack_limits`.
 
 Every cell is a small scene with a reference that was not computed with it: right (within the bound said), refused with
 a reason, reported (beyond the bound, and a warning says so), or wrong. The bounds leave room for true elasticity only.
@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from ..output.summary import write_json
-from . import crack_limits
+from . import crack_limits, thin_scenes
 from . import stability_scenes as scenes
 from .figures import Measured
 from .stability_grid import OF_BLOCKS, OF_CRACKS, REFUSED, REPORTED, RIGHT, WRONG, Cell, Map, table
@@ -138,4 +138,46 @@ def _maps(quick: bool) -> Iterator[Map]:
         (12,) if quick else (12, 100),
         1e-3,
         scenes.debris,
+    )
+    yield from thin_maps(quick)
+
+
+def thin_maps(quick: bool) -> Iterator[Map]:
+    """Thin walls, spikes and teeth, at speeds to 1000 m/s."""
+    topology = "overlap over half a wall, part of the blocks out, overlaps' energy over a hundredth of all"
+    thin = (1e-3, 1e-1) if quick else (1e-3, 1e-2, 1e-1)
+    fast = (30.0, 1000.0) if quick else (1.0, 30.0, 1000.0)
+    ratio = 0.05
+    for kind, rigid in (("elastic", False), ("rigid", True)):
+        yield Map(
+            f"flying in a ring, {kind}",
+            topology,
+            "wall, m",
+            thin,
+            "speed, m/s",
+            fast,
+            1.0,
+            partial(thin_scenes.ring, rigid, ratio),
+        )
+        yield Map(
+            f"thrown on a spike, {kind}",
+            topology,
+            "foot, m",
+            thin,
+            "speed, m/s",
+            fast,
+            1.0,
+            partial(thin_scenes.spike, rigid),
+        )
+    yield Map("rings in rings", topology, "wall, m", thin, "speed, m/s", fast, 1.0, partial(thin_scenes.nested, ratio))
+    slow = (0.0, 100.0) if quick else (0.0, 10.0, 100.0)
+    for title, scene, walls in (
+        ("a chain of hooks", thin_scenes.chain, (0.003, 0.03)),
+        ("a comb in a comb", thin_scenes.combs, (0.003, 0.03)),
+        ("sticks on sticks", thin_scenes.sticks, (0.001, 0.05)),
+        ("a box of debris", thin_scenes.box_of_debris, (0.003, 0.02)),
+    ):
+        yield Map(title, topology, "wall, m", walls, "speed, m/s", slow, 1.0, partial(scene, ratio))
+    yield Map(
+        "a cog on a cog", topology, "spin, rad/s", (1.0, 30.0), "teeth", (8, 20), 1.0, partial(thin_scenes.cogs, ratio)
     )

@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import dda
 from ..dda.overlap import deepest_overlap
+from ..dda.overlap_energy import WARNED, Overlap, OverlapWatch
 from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, State
 from .stability_scenes import WEIGHT, Outcome, rectangle, turned
 
@@ -65,6 +66,7 @@ def _run(
     joint = JointLaw("joint", friction_angle=math.radians(30))
     system = dda.BlockSystem(blocks, [rock], [joint], settings=settings)
     state, budget, worst, pressed, cuts = State.at_rest(blocks), dda.EnergyBudget(warned=math.inf), 0.0, 0.0, 0
+    overlaps = OverlapWatch()
     if moving is not None:
         moving(state)
     for _ in range(MOST):
@@ -72,13 +74,14 @@ def _run(
             break
         result = system.step(state, loads, min(dt, end - state.time))
         state, budget = result.state, budget.after(result.energy, result.state.time)
+        overlap = None if result.overlap is None else Overlap(*result.overlap)
+        overlaps.check(budget, overlap, blocks.names, state.time)
         moments = dda.block_moments(np.ascontiguousarray(state.vertices), blocks.next_vertex, blocks.vertex_start)
         worst = max(worst, deepest_overlap(blocks, np.ascontiguousarray(state.vertices), moments)[2] / (0.5 * wall))
         pressed = max(pressed, result.statistics["worst_penetration"] / wall)
         cuts += int(result.statistics["step_cuts"])
         worst = max(worst, out(state.vertices, blocks))
-    brought = budget.overlap / max(budget.turnover, 1e-300)
-    return Outcome(max(worst, brought / 0.01), pressed, drift=abs(budget.left_over()), cuts=cuts)
+    return Outcome(max(worst, budget.by_overlap / WARNED), pressed, drift=abs(budget.left_over()), cuts=cuts)
 
 
 def _outside(x0: float, y0: float, x1: float, y1: float, first: int) -> Callable[[np.ndarray, Blocks], float]:
@@ -119,14 +122,11 @@ def nested(ratio: float, wall: float, speed: float) -> Outcome:
 
 def chain(ratio: float, wall: float, speed: float) -> Outcome:
     """Three hooks that hang in one another, the lowest torn down with a speed."""
-    polygons, y = [], 0.0
-    for k in range(3):
-        hook = _hook(1.0, 1.0, wall)
-        if k % 2:
-            hook = np.array([1.0 + 3 * wall, 1.0]) - hook + [0.0, -2 * wall]
-            hook = hook + [0.4, 0.0]
-        polygons.append(hook + [0.0, y])
-        y -= 0.6
+    hook = _hook(1.0, 1.0, wall)
+    # The second hangs with its upper arm in the first, turned about; the third in the second.
+    other = np.array([1.0, 1.0]) - hook + [0.6 - 2 * wall, -0.5]
+    polygons = [hook, other, hook + [0.0, -1.0]]
+
     def moving(state: State) -> None:
         state.velocity[2, 1] = -speed
 
@@ -154,7 +154,8 @@ def combs(ratio: float, tooth: float, speed: float) -> Outcome:
 def cogs(ratio: float, spin: float, teeth: float) -> Outcome:
     """A cog that is thrown on another, both with sharp teeth."""
     n = int(teeth)
-    polygons = [_cog(0.0, 0.0, n, 0.8, 1.0, 0.0), _cog(0.0, 1.9, n, 0.8, 1.0, 0.1 - 0.5 * math.pi)]
+    # The tips of the second begin in gaps of the first, or above its tips.
+    polygons = [_cog(0.0, 0.0, n, 0.8, 1.0, 0.0), _cog(0.0, 2.02, n, 0.8, 1.0, 0.1 - 0.5 * math.pi)]
 
     def moving(state: State) -> None:
         state.velocity[1, 2] = spin

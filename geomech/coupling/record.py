@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..dda.step_limits import shortened
 from ..ddm.work import Work
 from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, Skip, State
 from .bodies import solve_bodies, tip_rows
@@ -49,6 +50,7 @@ def record(
         seconds=dict(now.timed.seconds),
         work=work,
         skips=skips(now, work),
+        shortened=shortened(now.block_work),
     )
     vars(cycle)["motion"] = motion  # known here: the property need not find it again
     del vars(cycle)["faces"]  # found when somebody asks for them

@@ -194,9 +194,7 @@ class Approach:
         (n_blocks, 6) and ``turn`` (n_blocks,) rad as the velocity makes them of ``dt``, ``g`` m/s²."""
         box = boxes(vertices, self._start[:-1])
         pairs = self._of(box, affine, centroid, 0.5 * g * dt * dt, 0.0)
-        time, which = _longest(
-            pairs, affine, turn, centroid, box, vertices, self._next, self._start, self._size, dt, g
-        )
+        time, which = _longest(pairs, affine, turn, centroid, box, vertices, self._next, self._start, self._size, dt, g)
         return time, None if which < 0 else (int(pairs[which, 0]), int(pairs[which, 1]))
 
     def windows(self, vertices: np.ndarray, affine: np.ndarray, centroid: np.ndarray, fall: float, more: float):

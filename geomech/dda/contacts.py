@@ -251,7 +251,7 @@ class ContactFinder:
         vertex, edge = table[:, 0], table[:, 1]
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed,
+            self._owner, closed, True,
         )  # fmt: skip
         keep |= table[:, 2] >= 0
         return (table, met) if keep.all() else (table[keep], met[keep])
@@ -385,6 +385,13 @@ class ContactFinder:
         if self._removed is not None:
             out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
         return out
+
+    def beyond_middle(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
+        return ~from_outside(
+            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            self._owner, np.zeros(0, np.int64), False,
+        )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
         """(n,) m of the contacts ``found`` on the geometry ``before``, at their corners, once the blocks are where

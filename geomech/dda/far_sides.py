@@ -56,10 +56,10 @@ def _convex(vertices, next_vertex, previous_vertex, i):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, closed):
+def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, closed, corners=True):
     """(n,) False for contacts of ``vertex`` with ``edge`` (n,) whose vertex is on the far side of the edge's block;
     ``gap`` (n,) m, ``start`` (n_blocks + 1,) first vertices, ``owner`` (n_vertices,) blocks; ``closed`` (sorted
-    vertex·n_vertices + edge) are the contacts that press already."""
+    vertex·n_vertices + edge) are the contacts that press already. ``corners``: both faces of one corner are kept."""
     keep = np.ones(vertex.shape[0], np.bool_)
     for c in range(vertex.shape[0]):
         v, e = vertex[c], edge[c]
@@ -88,7 +88,7 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
         else:
             x, y = vertices[e, 0] + t * dx, vertices[e, 1] + t * dy
         thick, far = _thickness(vertices, next_vertex, e, start[b], start[b + 1], x, y, nx, ny, _START * depth)
-        if not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
+        if corners and not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
             continue  # both faces of a corner are lines of it
         if depth <= 0.5 * thick:
             continue

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model import OPEN, DdaSettings
+from ..model import OPEN, DdaSettings, Shortened
 from .approach import Windows
 from .contacts import ContactFinder
 from .crossings import INTO, THROUGH, crossings
@@ -40,6 +40,8 @@ _WIDER = 1.5
 _MISFIT = 1e-3
 
 
+#: Contacts pressed in by more than this part of the thinner block's size are asked whether that is through it.
+_DEEP = 0.01
 #: Overlaps that bring more than this part of the energy of all blocks in a step are none that they had.
 _GIVEN = 1e-3
 #: Why steps are shortened, and what to do about it.
@@ -88,6 +90,7 @@ class StepLimits:
         self._finder, self._size, self._start, self._next = finder, finder.widths, vertex_start, next_vertex
         self.displacement = settings.max_displacement_ratio * half_diagonal
         self._work = work
+        self._told: set[tuple[int, int]] = set()
 
     def foreseen(
         self, vertices: np.ndarray, carried: np.ndarray, moments: np.ndarray, dt: float, gravity: np.ndarray
@@ -146,7 +149,9 @@ class StepLimits:
             )
             return Used(float(shares[worst, 1]), reason, moved, APPROACH, (a, b))
         block = int(np.argmax(np.abs(attempt.increment[:, :2]).max(axis=1)))
-        reason = f"a vertex of {self._named(block)} moves {attempt.largest:.3g} m, the limit is {self.displacement:.3g} m"
+        reason = (
+            f"a vertex of {self._named(block)} moves {attempt.largest:.3g} m, the limit is {self.displacement:.3g} m"
+        )
         return Used(float(of_all), reason, moved, DISPLACEMENT, (block,))
 
     def crossed(self, attempt: Attempt, result: StepResult) -> Crossed | None:
@@ -185,7 +190,9 @@ class StepLimits:
     def _pressed(self, rows: np.ndarray, n_vertices: int) -> np.ndarray:
         """(n_vertices,) m: how deep CONTACT ``rows`` at each vertex, or at an edge that it ends, are pressed in. Nodes
         within the faces of joints that give have no contacts: there it is the deepest of their block."""
-        deep = np.where(rows["state"] != OPEN, np.maximum(0.0, -(rows["gap"] + rows["lift"])), 0.0)
+        # Faces that have to come nearer than the geometry says, to meet, lie in each other by that.
+        deep = np.maximum(0.0, -rows["lift"])
+        deep = np.where(rows["state"] != OPEN, np.maximum(deep, -(rows["gap"] + rows["lift"])), deep)
         out = np.zeros(n_vertices)
         if self._finder.has_face_nodes:
             of_block = np.zeros(len(self._size))
@@ -210,6 +217,28 @@ class StepLimits:
         )
         return Crossed(reason, np.zeros((0, 2), np.int64), np.zeros(0), False, (a, b))
 
+    def tell_pressed_through(self, result: StepResult) -> None:
+        """Log a warning, once for two blocks, where a corner is pressed in beyond the middle of what it presses on: there
+        springs no longer know from which side it came."""
+        rows = result.contacts
+        least = np.minimum(self._size[rows["block"]], self._size[rows["other"]])
+        rows = rows[(rows["state"] != OPEN) & (-(rows["gap"] + rows["lift"]) > _DEEP * least)]
+        if not len(rows):
+            return
+        vertices = np.ascontiguousarray(result.state.vertices)
+        vertex, edge = (np.ascontiguousarray(rows[name]) for name in ("vertex", "edge"))
+        for k in np.flatnonzero(self._finder.beyond_middle(vertices, vertex, edge)).tolist():
+            pair = int(rows["block"][k]), int(rows["other"][k])
+            if pair in self._told:
+                continue
+            self._told.add(pair)
+            x, y = vertices[vertex[k]]
+            log.warning(
+                "t = %g s: a corner of %s is pressed %.3g m into %s near x = %.6g, y = %.6g m, beyond the middle of what it "
+                "presses on: contacts are too soft for this speed (dda.normal_penalty_pa)",
+                result.state.time, self._named(pair[0]), -rows["gap"][k], self._named(pair[1]), x, y,
+            )  # fmt: skip
+
     def shortens(self, why: str, *blocks: int) -> None:
         """Count a step that one block has shortened, or two; the tenth, the hundredth … is logged."""
         names = tuple(self._finder.names[b] for b in blocks[:2])
@@ -233,6 +262,14 @@ def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
         held.setdefault(b, {b}).add(a)
     nothing: set[int] = set()
     return np.array([bool(held.get(a, nothing) & held.get(b, nothing)) for a, b in pairs.tolist()], bool)
+
+
+def shortened(work: Work, most: int = 5) -> tuple[Shortened, ...]:
+    """The ``most`` frequent reasons for which steps were shortened, each with its blocks."""
+    return tuple(
+        Shortened(why, tuple(name for name in blocks if name), count, WAY_OUT[why])
+        for (why, *blocks), count in work.shortened.most_common(most)
+    )
 
 
 def _ordinal(count: int) -> str:

@@ -271,6 +271,7 @@ class BlockSystem:
                         crossed = self.limits.pressed_apart(attempt, result)
                     if crossed is None:
                         self._refuse_crushed(result.state)
+                        self.limits.tell_pressed_through(result)
                         if failed:
                             log.info("step at t = %g s cut from %.4g to %.4g s: %s", state.time, asked, dt, failed)
                         result.statistics["limit_share"] = used.share

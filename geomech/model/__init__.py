@@ -24,7 +24,7 @@ from .problem import (
     RunSettings,
     counted,
 )  # fmt: skip
-from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Skip, State
+from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
 from .whole_network import whole_network
 
 __all__ = [
@@ -68,6 +68,7 @@ __all__ = [
     "Problem",
     "Roughness",
     "RunSettings",
+    "Shortened",
     "Skip",
     "State",
     "ViscousBoundary",

@@ -158,6 +158,16 @@ class CrackFaces:
     state: np.ndarray
 
 
+class Shortened(NamedTuple):
+    """Steps that were shortened: ``why``, the names of the ``blocks`` that were the reason (none, one or two), how often
+    (``count``), and what to set."""
+
+    why: str
+    blocks: tuple[str, ...]
+    count: int
+    way_out: str
+
+
 class Skip(NamedTuple):
     """Work that was asked for ``kept`` times more than it was ``done``, since what it had given before still held;
     ``seconds``: what it took where it was done (0: not known)."""
@@ -189,6 +199,7 @@ class Cycle:
     statistics  numbers of the step: open_close_iterations, dt, kinetic_energy, elastic_energy, worst_penetration …
     work        what the crack solver has done so far: assemblies, factorisations, back-substitutions, contact solves
     skips       what was not done so far since nothing had changed, by name
+    shortened   blocks that have shortened most steps so far
     seconds     wall time spent so far in each phase of the solvers (not reproducible, so not in any series)
     """
 
@@ -209,6 +220,7 @@ class Cycle:
     seconds: dict[str, float] = field(default_factory=dict)
     work: dict[str, int] = field(default_factory=dict)
     skips: dict[str, Skip] = field(default_factory=dict)
+    shortened: tuple[Shortened, ...] = ()
 
     @cached_property
     def motion(self) -> Motion:

@@ -17,6 +17,7 @@ from geomech.model import STOPS, Cycle, Problem, counted
 
 from . import checkpoint
 from .condition import closing, told
+from .deepest import limits_line
 from .units import length_text, stress_text
 
 #: So many warnings of a run are shown at its end, each this long at most.
@@ -203,6 +204,7 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
             f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with "
             f"growth, {length_text(summary['crack_growth_m'])} of new crack in {summary.get('wall_s', math.nan):.2f} s"
         )
+    lines += limits_line(summary.get("shortened_steps", []), summary.get("load_steps", 0))
     if "mechanism" in summary.get("first", {}):
         lines.append(f"  {NO_ANSWER}")
     if summary.get("end") in STOPS:

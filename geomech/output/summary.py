@@ -19,10 +19,11 @@ from geomech.model import Cycle, Event, Problem
 
 from .condition import energy_summary, key_block_summary, motion_summary
 from .crack_trust import crack_trust
+from .deepest import Deepest, step_limits
 from .skipped import skipped
 
 #: What a `Summary` has counted.
-_COUNTED = ("_last", "_events", "_peak", "_load_steps", "_growth_passes", "_grown")
+_COUNTED = ("_last", "_events", "_peak", "_load_steps", "_growth_passes", "_grown", "_deepest")
 
 
 class Summary:
@@ -38,6 +39,7 @@ class Summary:
         self._last: Cycle | None = None
         self._events: list[Event] = []
         self._peak, self._load_steps, self._growth_passes, self._grown = 0.0, 0, 0, 0.0
+        self._deepest = Deepest()
 
     def _begin(self, problem: Problem, folder: Path) -> None:
         self._problem, self._path = problem, Path(folder) / "summary.json"
@@ -56,6 +58,7 @@ class Summary:
 
     def on_cycle(self, cycle: Cycle) -> None:
         self._last = cycle
+        self._deepest.look(cycle)
         self._events += cycle.events
         self._peak = max(self._peak, cycle.load, key=abs)
         self._load_steps = max(self._load_steps, cycle.load_step)
@@ -97,6 +100,10 @@ class Summary:
             summary["crack_growth_m"] = self._grown
             summary["crack_length_m"] = float(last.cracks.lengths.sum())
             summary["blocks"] = last.blocks.n_blocks
+            if self._deepest.told is not None:
+                summary["deepest_penetration"] = self._deepest.told
+            if last.shortened:
+                summary["shortened_steps"] = step_limits(last.shortened)
             if last.statistics:
                 summary["motion"], summary["energy"] = motion_summary(last), energy_summary(last)
             if not last.cracks.n_cracks and len(last.state.contacts):

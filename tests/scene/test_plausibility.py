@@ -40,6 +40,45 @@ def test_each_slip_is_told_once(scene_file, change, place, message, way_out):
     assert len(found) == 1 and found[0].place.endswith(f": {place}") and way_out in found[0].way_out
 
 
+SLIVERS = """
+title = "a sliver"
+[[geometry.zones]]
+name = "base"
+polygon = [[-1, -1], [5, -1], [5, 0], [-1, 0]]
+[[geometry.zones]]
+name = "left"
+polygon = [[0, 0], [2, 0], [2, 2], [0, 2]]
+[[geometry.zones]]
+name = "chip"
+polygon = [[2, 0], [2.01, 0], [2.01, 0.01], [2, 0.01]]
+[[geometry.zones]]
+name = "right"
+polygon = [[2.01, 0], [4, 0], [4, 2], [2.01, 2]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2600
+[zones.base]
+fixed = true
+[loads]
+gravity_m_s2 = [0, -9.81]
+[dda]
+dynamic_factor = 1.0
+[run]
+end_time_s = 1.0
+"""
+
+
+@pytest.mark.parametrize(("changes", "told"), [((), 1), (("dda.dynamic_factor=0",), 0)])
+def test_slivers_that_shorten_steps_are_told(scene_file, changes, told):
+    """A chip of 1 cm between blocks of 2 m: its place, and the setting that would merge it. In statics nothing is fast."""
+    found = [w for w in load_scene(scene_file(SLIVERS), changes).warnings if "shorten the time step" in w.message]
+    assert len(found) == told
+    for warning in found:
+        assert "near x = 2.005, y = 0.005 m has 0.0001 m²" in warning.message
+        assert "geometry.smallest_block_m2 = 0.04" in warning.way_out
+
+
 BRIDGES = """
 [[geometry.joint_sets]]
 name = "bedding"
