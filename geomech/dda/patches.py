@@ -19,10 +19,9 @@ from .contact_springs import Springs
 from .contact_states import moved
 from .step_equations import Answer, Equations, Settled, States, Unsettled
 
-#: A patch reaches so many blocks beyond those whose contacts are wrong, …
-_RINGS = 2
-#: … and is no patch any more if it takes more than this part of all blocks.
-_LARGEST = 0.4
+#: A patch reaches so many blocks beyond those whose contacts are wrong, fewer where it would take more than this part of
+#: all blocks.
+_RINGS, _LARGEST = 2, 0.4
 
 
 def settled_in_patch(
@@ -34,18 +33,19 @@ def settled_in_patch(
     order, n = pattern.order, pattern.n
     if pattern.links is not None or equations.curved is not None:
         return None, 0.0
-    inside = np.append(np.zeros(n, bool), False)
     ends = order[found.block], order[found.other]
-    some = which
+    inside, some, rows = np.zeros(n, bool), which, None
     for _ in range(_RINGS + 1):
+        wider = np.append(inside, False)
         for end in ends:
-            inside[end[some]] = True
-        inside[-1] = False
-        some = inside[ends[0]] | inside[ends[1]]
-    inside = inside[:-1]
-    if not inside.any() or inside.sum() > _LARGEST * n:
+            wider[end[some]] = True
+        wider[-1] = False
+        if wider.sum() > _LARGEST * n:
+            break
+        inside, some = wider[:-1], wider[ends[0]] | wider[ends[1]]
+        rows = np.flatnonzero(some)
+    if rows is None or not inside.any():
         return None, 0.0
-    rows = np.flatnonzero(some)
     number = np.append(np.where(inside, np.cumsum(inside) - 1, -1), -1)
     within = number[order]
     around = np.where(within >= 0, -1, order)
