@@ -129,7 +129,7 @@ def _cost(problem: Problem, slope: Slope, rigid: Slab | None, dt: float, longest
         while now.time < END * (1 - 1e-12):
             asked, factored = min(length.dt, END - now.time), system.work.factorisations
             result = system.step(now, problem.loads, asked)
-            length.after(result, asked, system.allowed_ratio)
+            length.after(result, asked)
             # Attempts that were cut have taken theirs, which the step does not count.
             counted = result.statistics["open_close_iterations"]
             iterations.append(max(counted, system.work.factorisations - factored))

@@ -35,6 +35,12 @@ _LEAN = 0.01
 _ENDS = 1e-4
 # Corners are nearer to one than to another when their distances squared differ by more than this part.
 _NEARER = 1e-2
+#: A vertex and a face; two corners; two corners that may overlap by a little.
+FACE, CORNERS, SMOOTHED = 0, 1, 2
+# Corners whose lines may come within the window of both are so many windows apart at most.
+_CORNERS = 1.5
+# Contacts are sought so many rounding lengths away at least.
+_ZONE = 2.0
 # Corners may come nearer by so many times the motion that is expected of them.
 _HASTE = 2.0
 # cos of the angle between edges that count as mating faces, for tributary lengths.
@@ -82,6 +88,13 @@ def _nearer(vertices, here, one, other):
     ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
     bx, by = vertices[here, 0] - vertices[other, 0], vertices[here, 1] - vertices[other, 1]
     return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _by(vertices, v, w, window):
+    """Whether two corners are so near that their lines may come within the ``window`` of both."""
+    dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
+    return dx * dx + dy * dy <= (_CORNERS * window) ** 2
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)
@@ -153,8 +166,8 @@ def find_contacts(
 ) -> tuple[np.ndarray, np.ndarray]:
     """All contacts of the ``pairs`` (k, 2) of blocks, the lower number first, that are nearer than ``window`` (m, of all or
     (k,) of each), pair by pair: a table (n, 4) of vertex, edge, the corner of the edge's block that the vertex meets where
-    it is two rounded corners that meet (−1: a vertex meets a line), and whether corners that meet on a line may overlap
-    by a step that rounding smooths (1, else 0); and (n, 3) the normal that pushes the vertex's block and the gap (m) of
+    it is two rounded corners that meet (−1: a vertex meets a line), and what meets: `FACE`, `CORNERS`, or `SMOOTHED` where
+    these may overlap by a step that rounding smooths; and (n, 3) the normal that pushes the vertex's block and the gap (m) of
     rounded corners.
 
 
@@ -205,22 +218,28 @@ def _look_at(
     )  # normal that pushes block i (2), gap, distance outside the edge, edge length, distance inside, sine away from it
     twin = np.empty(4, np.int64)  # the other end of the same face
     for pair in range(pairs.shape[0]):
-        a, b, window = pairs[pair, 0], pairs[pair, 1], windows[pair]
+        a, b = pairs[pair, 0], pairs[pair, 1]
+        # Where corners are rounded their lines do not act by themselves.
+        zone = rounding_length(
+            min(rounding[vertex_start[a]], rounding[vertex_start[b]]), np.inf, max(pressed[a], pressed[b])
+        )
+        window = max(windows[pair], _ZONE * zone)
         if box[a, 0] > box[b, 2] + window or box[b, 0] > box[a, 2] + window:
             continue
         if box[a, 1] > box[b, 3] + window or box[b, 1] > box[a, 3] + window:
             continue
         first = count
         # The strip both boxes share, widened: nothing outside it can be in reach.
-        x_lo, x_hi = max(box[a, 0], box[b, 0]) - window, min(box[a, 2], box[b, 2]) + window
-        y_lo, y_hi = max(box[a, 1], box[b, 1]) - window, min(box[a, 3], box[b, 3]) + window
+        wide = _CORNERS * window
+        x_lo, x_hi = max(box[a, 0], box[b, 0]) - wide, min(box[a, 2], box[b, 2]) + wide
+        y_lo, y_hi = max(box[a, 1], box[b, 1]) - wide, min(box[a, 3], box[b, 3]) + wide
         # 1. Corner to corner.
         for v in range(vertex_start[a], vertex_start[a + 1]):
             if not convex[v] or not (x_lo <= vertices[v, 0] <= x_hi and y_lo <= vertices[v, 1] <= y_hi):
                 continue
             for w in range(vertex_start[b], vertex_start[b + 1]):
                 dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
-                if dx * dx + dy * dy > 2.25 * window * window or not convex[w]:
+                if not convex[w] or not _by(vertices, v, w, window):
                     continue
                 if not _meet(vertices, next_vertex, previous_vertex, v, w):
                     continue
@@ -302,7 +321,7 @@ def _look_at(
                             continue
                         count += 1
                         sign = 1.0 if pick_vertex[k] == v else -1.0
-                        table[row, 2] = w if pick_vertex[k] == v else v
+                        table[row, 2], table[row, 3] = w if pick_vertex[k] == v else v, CORNERS
                         met[row, 0], met[row, 1], met[row, 2] = sign * mx, sign * my, gap
                         continue
                 for k in range(n_lines):
@@ -312,7 +331,7 @@ def _look_at(
                         continue
                     row = _add(table, count, first, pick_vertex[k], pick_edge[k])
                     if row == count:
-                        table[row, 3] = 1 if two >= 0 and pick[k, 2] > -EASED * length else 0
+                        table[row, 3] = SMOOTHED if two >= 0 and pick[k, 2] > -EASED * length else CORNERS
                         count += 1
         # 2. Corner to edge, and corner into a re-entrant corner.
         for role in range(2):
@@ -346,12 +365,12 @@ def _look_at(
                         continue
                     # Corner to corner is done above, for corners that meet; of others the shallower edge is met within
                     # its ends.
-                    if convex[edge] and along <= window:
+                    if convex[edge] and (along <= window or _by(vertices, v, edge, window)):
                         if along < 0.0 or _meet(vertices, next_vertex, previous_vertex, v, edge):
                             continue
                         if not _shallower(vertices, next_vertex, previous_vertex, v, gap, previous_vertex[edge]):
                             continue
-                    if convex[end] and along >= length - window:
+                    if convex[end] and (along >= length - window or _by(vertices, v, end, window)):
                         if along > length or _meet(vertices, next_vertex, previous_vertex, v, end):
                             continue
                         if not _shallower(vertices, next_vertex, previous_vertex, v, gap, end):
@@ -452,7 +471,7 @@ def _describe(
         nx, ny = geometry[row, 1], geometry[row, 2]
         for corner in (edge, next_vertex[edge]):
             dx, dy = vertices[vertex, 0] - vertices[corner, 0], vertices[vertex, 1] - vertices[corner, 1]
-            if dx * dx + dy * dy > 2.25 * window[row] * window[row]:
+            if dx * dx + dy * dy > (_CORNERS * window[row]) ** 2:
                 continue
             for c in range(4):
                 # The same meeting under another name: the next edge round the corner, or the roles exchanged.

@@ -11,7 +11,7 @@ from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
 from . import contact_rows
 from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
-from .contact_search import Corners, convex_corners, describe_contacts, find_contacts
+from .contact_search import FACE, SMOOTHED, Corners, convex_corners, describe_contacts, find_contacts
 from .contact_set import ContactSet
 from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
 from .curved_joints import CurvedJoints
@@ -146,7 +146,7 @@ class ContactFinder:
         # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
         # no energy: there contacts begin without force.
         hair = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
-        smoothed = (table[:, 3] == 1) | ((geometry[:, 3] > -hair) & (len(old) > 0))
+        smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -hair) & (len(old) > 0))
         smoothed &= (remembered["state"] == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < remembered["lift"])
         remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
         vertex, edge, corner = (column.copy() for column in table[:, :3].T)
@@ -251,7 +251,7 @@ class ContactFinder:
         vertex, edge = table[:, 0], table[:, 1]
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed, True,
+            self._owner, closed, table[:, 3] != FACE,
         )  # fmt: skip
         keep |= table[:, 2] >= 0
         return (table, met) if keep.all() else (table[keep], met[keep])
@@ -390,7 +390,7 @@ class ContactFinder:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, np.zeros(0, np.int64), False,
+            self._owner, np.zeros(0, np.int64), np.zeros(len(vertex), bool),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:

@@ -6,8 +6,9 @@ middle of the wall, of the thickness T below its foot on the edge,
 
     −g > T / 2,
 
-it has come to the other side of the wall, or lies outside beyond that. The faces of one corner, of which each is the
-other's far side, are told apart where their states are sought (`ContactSet.behind`). A contact that was closed before is what it was.
+it has come to the other side of the wall, or lies outside beyond that: of a corner's two faces it touches the one that
+it is before. (Two corners that meet have one contact, see `rounded_corners`.) A contact that was closed before is what
+it was.
 """
 
 from __future__ import annotations
@@ -56,10 +57,11 @@ def _convex(vertices, next_vertex, previous_vertex, i):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, closed, corners=True):
+def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, closed, corners):
     """(n,) False for contacts of ``vertex`` with ``edge`` (n,) whose vertex is on the far side of the edge's block;
     ``gap`` (n,) m, ``start`` (n_blocks + 1,) first vertices, ``owner`` (n_vertices,) blocks; ``closed`` (sorted
-    vertex·n_vertices + edge) are the contacts that press already. ``corners``: both faces of one corner are kept."""
+    vertex·n_vertices + edge) are the contacts that press already. Of ``corners`` (n,) True for corners that meet, both faces
+    are kept."""
     keep = np.ones(vertex.shape[0], np.bool_)
     for c in range(vertex.shape[0]):
         v, e = vertex[c], edge[c]
@@ -88,8 +90,8 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
         else:
             x, y = vertices[e, 0] + t * dx, vertices[e, 1] + t * dy
         thick, far = _thickness(vertices, next_vertex, e, start[b], start[b + 1], x, y, nx, ny, _START * depth)
-        if corners and not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
-            continue  # both faces of a corner are lines of it
+        if corners[c] and not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
+            continue
         if depth <= 0.5 * thick:
             continue
         key = v * vertices.shape[0] + e

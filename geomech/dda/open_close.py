@@ -56,6 +56,9 @@ _SOLUTIONS = 60
 #: Where switching does not end and no more than this part of the contacts is wrong, the blocks about them are settled
 #: by themselves, so often in a step; where their number does not fall to this part.
 _FEW_IN_PATCHES, _PATCHES, _FALLS = 0.1, 6, 0.9
+#: States that return, and are wrong at no more contacts than this, by no more than this part of the largest force on
+#: either of their blocks, stand: the friction of a pebble beside a block of a hundred tons.
+_SLIVERS, _NOTHING = 8, 1e-4
 #: Where there are so few contacts the worst are switched first of all, which takes three iterations where the path
 #: takes fifteen; it is asked after so many iterations.
 _FEW, _CAUTIOUS = 40, 12
@@ -93,6 +96,19 @@ def hurries(patient: bool, statics: bool, n: int) -> bool:
     """Whether a step of ``n`` free blocks is cut at the first sign that it does not settle, see `MANY`; arguments as for
     `settle`."""
     return not (patient or statics) and n >= MANY
+
+
+def _negligible(answer: Answer, found: ContactSet, number: int) -> bool:
+    """Whether all contacts that are wrong, ``number`` of them, are so by next to nothing beside what others of their
+    blocks bear: of a sliver between blocks that bear a slope no set of states may fit."""
+    if number > _SLIVERS:
+        return False
+    largest = np.zeros(int(max(found.block.max(), found.other.max())) + 1)
+    for blocks in (found.block, found.other):
+        np.maximum.at(largest, blocks, np.abs(answer.forces[:, 0]))
+    wrong = np.flatnonzero(answer.violation > 0)
+    bears = np.maximum(largest[found.block[wrong]], largest[found.other[wrong]])
+    return bool((answer.violation[wrong] <= _NOTHING * bears).all())
 
 
 def _worst_of_their_blocks(
@@ -251,7 +267,7 @@ def settle(
     iteration, most = 0, max_iterations
     # Contacts (n,) that were wrong in the last iterations, when few were, and how often they were sought together.
     lately, joint, left = [], 0, _SOLUTIONS
-    best, patched = None, 0
+    best, patched, proposed = None, 0, False
     # What closes sticking, is pulled open by its own shear and closes again can only slide: neither of the two states
     # fits.
     closed, sheared = np.zeros(len(found), np.int64), np.zeros(len(found))
@@ -283,6 +299,8 @@ def settle(
         closed += closing
         returned = states.key in seen
         seen.add(states.key)
+        if returned and _negligible(answer, found, number):
+            return equations.settled(states, answer, iteration)
         tries = 0 if number <= _FEWER * fewest else tries + 1
         fewest = min(fewest, number)
         most_tries = -1 if hurried else _TRIES
@@ -301,15 +319,18 @@ def settle(
                     states = proposal
                     continue
                 joint = _TOGETHER
-        if best is None or number < _FALLS * best[0]:
+        # What a path leaves is what it could not decide: small blocks between large ones, mostly.
+        if not proposed and (best is None or number < _FALLS * best[0]):
             best = number, states, answer, wrong
-        elif patched < _PATCHES and patches and not small and best[0] <= _FEW_IN_PATCHES * len(found):
+        elif patched < _PATCHES and patches and not small and (number if proposed else best[0]) <= _FEW_IN_PATCHES * len(found):
             patched += 1
+            if proposed:
+                best = number, states, answer, wrong
             proposal, spent = settled_in_patch(
                 equations, best[3] | wrong, *best[1:3],
                 partial(settle, max_iterations=most, statics=statics, patient=False, patches=False),
             )  # fmt: skip
-            iteration, best = iteration + round(spent), None
+            iteration, best, proposed = iteration + round(spent), None, False
             if proposal is not None and proposal.key not in seen:
                 states, fewest, tries = proposal, np.inf, 0
                 continue
@@ -344,7 +365,7 @@ def settle(
                 # What it takes is its own affair: without it the step would be cut, and cut again.
                 iteration, max_iterations = iteration + spent, max_iterations + spent + _FINISH
             if proposal is not None:
-                states, caution, fewest, tries = proposal, _ALL, np.inf, 0
+                states, caution, fewest, tries, best, proposed = proposal, _ALL, np.inf, 0, None, True
                 continue
             stuck = True
         if stuck and caution != _SOME or tired:

@@ -20,8 +20,8 @@ from .contact_states import moved
 from .step_equations import Answer, Equations, Settled, States, Unsettled
 
 #: A patch reaches so many blocks beyond those whose contacts are wrong, fewer where it would take more than this part of
-#: all blocks.
-_RINGS, _LARGEST = 2, 0.4
+#: all blocks, or more than so many: its factors stand beside those of all.
+_RINGS, _LARGEST, _MOST = 2, 0.4, 2000
 
 
 def settled_in_patch(
@@ -40,7 +40,7 @@ def settled_in_patch(
         for end in ends:
             wider[end[some]] = True
         wider[-1] = False
-        if wider.sum() > _LARGEST * n:
+        if wider.sum() > min(_LARGEST * n, _MOST):
             break
         inside, some = wider[:-1], wider[ends[0]] | wider[ends[1]]
         rows = np.flatnonzero(some)

@@ -8,7 +8,7 @@ import pytest
 
 from geomech import dda
 from geomech.bench import block_scenes
-from geomech.dda import assembly, block_solver, dissection, open_close
+from geomech.dda import assembly, block_solver, dissection, open_close, patches
 from geomech.dda import system as stepping
 from geomech.dda.block_solver import BlockSolver
 from geomech.dda.multifrontal import Factors
@@ -20,7 +20,7 @@ def alive(monkeypatch):
     """As of 100 000 blocks: how many `Factors` are alive whenever some are made, and whether these are single."""
     for module, name, value in (
         (block_solver, "SINGLE", 0), (dissection, "KEPT", 0), (assembly, "DENSE_BLOCKS", 0), (open_close, "MANY", 0),
-        (stepping, "MANY", 0),
+        (stepping, "MANY", 0), (patches, "_MOST", 0),  # of 100 000, those of a patch are none beside the others
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     made, told, factor = weakref.WeakSet(), [], Factors.factor

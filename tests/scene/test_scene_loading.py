@@ -139,6 +139,7 @@ normal_penalty_pa = 1e12
 shear_penalty_pa = 5e11
 contact = "augmented"
 penetration_tolerance = 1e-6
+corner_rounding = 0.02
 max_open_close_iterations = 9
 max_step_cuts = 5
 [ddm]
@@ -206,6 +207,7 @@ def test_every_setting_arrives(scene_file):
         "shear_penalty": 5e11,
         "contact": "augmented",
         "penetration_tolerance": 1e-6,
+        "corner_rounding": 0.02,
         "max_open_close_iterations": 9,
         "max_step_cuts": 5,
     }
