@@ -324,14 +324,16 @@ def _look_at(
                         table[row, 2], table[row, 3] = w if pick_vertex[k] == v else v, CORNERS
                         met[row, 0], met[row, 1], met[row, 2] = sign * mx, sign * my, gap
                         continue
+                met_on = one if line == 1 else two
+                kind = SMOOTHED if two >= 0 and pick[met_on, 2] > -EASED * length else CORNERS
                 for k in range(n_lines):
-                    if k != (one if line == 1 else two) and twin[k] != (one if line == 1 else two):
+                    if k != met_on and twin[k] != met_on:
                         continue
                     if pick[k, 2] > reach or pick[k, 2] < -window:
                         continue
                     row = _add(table, count, first, pick_vertex[k], pick_edge[k])
                     if row == count:
-                        table[row, 3] = SMOOTHED if two >= 0 and pick[k, 2] > -EASED * length else CORNERS
+                        table[row, 3] = kind
                         count += 1
         # 2. Corner to edge, and corner into a re-entrant corner.
         for role in range(2):

@@ -149,6 +149,10 @@ class ContactFinder:
         smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -hair) & (len(old) > 0))
         smoothed &= (remembered["state"] == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < remembered["lift"])
         remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
+        # What has come up a ramp goes on from there as it is pressed.
+        up = np.flatnonzero((table[:, 3] == SMOOTHED) & (remembered["state"] != OPEN) & (parent >= 0))
+        up = up[old["tilt"][parent[up]] != 0.0] if len(up) else up
+        remembered["lift"][up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
         vertex, edge, corner = (column.copy() for column in table[:, :3].T)
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
