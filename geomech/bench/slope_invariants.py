@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import dda
+from ..dda.crossings import ROUNDED_OVERLAP
 from ..dda.energy import GAIN
 from ..dda.overlap import REFUSED, deepest_overlap
 from ..ddm.rock import inside
@@ -35,7 +36,7 @@ _UNSETTLED = "left with a violation"
 INVARIANTS = {
     "area": Invariant("area of all blocks, as drawn or parted, off what it was", 1e-9),
     "strain": Invariant("strain of a block: rock in the elastic range has less", 1e-2, (_STRAINED,)),
-    "overlap": Invariant("depth of a block in another, over the smaller one's size", REFUSED, (_HANGS, _STRAINED)),
+    "overlap": Invariant("depth of a block in another, over the smaller one's size (rounded corners: 3e-3 more)", REFUSED, (_HANGS, _STRAINED)),
     "motion": Invariant("equations of motion of all blocks, over the largest force", 1e-6),
     # Beyond the strain, see `Invariants._balance`.
     "balance": Invariant(
@@ -75,6 +76,8 @@ class Invariants:
         self.faults: list[str] = []
         self.told: list[str] = []
         self._static = problem.dda.dynamic_factor == 0.0
+        # Corners that pass each other within their rounding lie in each other by a part of it.
+        self._rounded = ROUNDED_OVERLAP * problem.dda.corner_rounding
         self._tough = np.array([material.k_ic for material in problem.materials])
         self._bond = max(law.tensile_strength for law in problem.face_laws)
         self._stop_at = problem.run.stop_at
@@ -105,7 +108,7 @@ class Invariants:
     def _take(self, name: str, value: float, where: str) -> None:
         self.worst[name] = max(self.worst[name], value)
         invariant = INVARIANTS[name]
-        bound = invariant.bound + (self._strain if name == "balance" else 0.0)
+        bound = invariant.bound + {"balance": self._strain, "overlap": self._rounded}.get(name, 0.0)
         if value > bound:
             lines = self.heard()[0 if invariant.lasting else self._heard_at[0] :]
             said = any(words in line for words in invariant.told for line in lines)

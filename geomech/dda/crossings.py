@@ -3,7 +3,8 @@
 In the frame of an edge, which moves with its block, a vertex goes from (s, g) to (s′, g′): its place along the edge and
 its gap as the step begins and as it ends; between them the path is straight but for r²/8 of its distance from the edge
 where the blocks turn by r (continuous collision detection: Provot 1997; Li et al. 2020, Lan et al. 2022 for affine
-bodies). Of two outlines a vertex of one goes first through an edge of the other. A vertex has gone
+bodies). Of two outlines a vertex of one goes first through an edge of the other, but for corners that meet tip to tip on
+a common line: there two edges cross in the end. A vertex has gone
 
 - *into* a block where it lies inside as the step ends, deeper than it did and than contacts of the block press;
 - *through* it where it leaves by an edge f, from deeper behind that than contacts press, and has come in by another, e,
@@ -24,10 +25,12 @@ _DEPTH = 1e-5
 _PRESSED = 2.0
 #: Where rounded corners pass each other, one may lie in the other by this part of their rounding length, so near to it
 #: in rounding lengths: an arc leaves 1 − cos 45° of the corner that it rounds.
-_ROUNDED, _NEAR = 0.3, 1.6
+ROUNDED_OVERLAP, _NEAR = 0.3, 1.6
 #: What goes round a corner may cut it: by this part of the smaller block's size along the outline, or so many rounding
 #: lengths.
 _CORNER, _CUT = 1e-2, 2.5
+#: Edges of rounded corners that pass each other cross by so many rounding lengths at most.
+_TIPS = 1.2
 #: Kinds of crossings.
 INTO, THROUGH = 0, 1
 
@@ -102,6 +105,39 @@ def _rounded_off(v, vertices, rounding, first, last):
     return longest
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _crossed(vertices, next_vertex, start, a, b, pressed, least, length):
+    """A vertex and an edge of two blocks of which edges cross, and by how much the nearest end of both is beyond the
+    other's line, m; −1 where they cross by no more than contacts press there, ``least`` and the ``length`` of tips."""
+    for e in range(start[a], start[a + 1]):
+        f = next_vertex[e]
+        ex, ey = vertices[e, 0], vertices[e, 1]
+        x_lo, x_hi = min(ex, vertices[f, 0]), max(ex, vertices[f, 0])
+        y_lo, y_hi = min(ey, vertices[f, 1]), max(ey, vertices[f, 1])
+        for g in range(start[b], start[b + 1]):
+            h = next_vertex[g]
+            if min(vertices[g, 0], vertices[h, 0]) > x_hi or max(vertices[g, 0], vertices[h, 0]) < x_lo:
+                continue
+            if min(vertices[g, 1], vertices[h, 1]) > y_hi or max(vertices[g, 1], vertices[h, 1]) < y_lo:
+                continue
+            one, _, _ = _seen(vertices, next_vertex, ex, ey, g)
+            two, _, _ = _seen(vertices, next_vertex, vertices[f, 0], vertices[f, 1], g)
+            if one * two >= 0.0:
+                continue
+            three, _, _ = _seen(vertices, next_vertex, vertices[g, 0], vertices[g, 1], e)
+            four, _, _ = _seen(vertices, next_vertex, vertices[h, 0], vertices[h, 1], e)
+            if three * four >= 0.0:
+                continue
+            mine, theirs = min(abs(one), abs(two)), min(abs(three), abs(four))
+            deep = max(max(pressed[e], pressed[f]), max(pressed[g], pressed[h]))
+            if min(mine, theirs) <= _PRESSED * deep + least + length:
+                continue
+            if mine <= theirs:
+                return (e if abs(one) <= abs(two) else f), g, mine
+            return (g if abs(three) <= abs(four) else h), e, theirs
+    return -1, -1, 0.0
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def _find(pairs, before, after, next_vertex, start, box, pressed, size, rounding, found):
     """Number of crossings of ``pairs``, the first of them in ``found`` (m, 6) as far as it has room."""
@@ -112,6 +148,7 @@ def _find(pairs, before, after, next_vertex, start, box, pressed, size, rounding
             continue
         smaller = min(size[a], size[b])
         least = _DEPTH * smaller
+        known = count
         for role in range(2):
             i, j = (a, b) if role == 0 else (b, a)
             first, last = start[j], start[j + 1]
@@ -126,7 +163,7 @@ def _find(pairs, before, after, next_vertex, start, box, pressed, size, rounding
                 now, near = _depth(x1, y1, after, next_vertex, first, last)
                 was, beside = np.inf, -1
                 if now > allowed:
-                    allowed += _ROUNDED * _rounded_off(v, after, rounding, first, last)
+                    allowed += ROUNDED_OVERLAP * _rounded_off(v, after, rounding, first, last)
                 if now > allowed:
                     was, beside = _depth(x0, y0, before, next_vertex, first, last)
                     if now > was + least:
@@ -173,6 +210,15 @@ def _find(pairs, before, after, next_vertex, start, box, pressed, size, rounding
                         found[count, 0], found[count, 1], found[count, 2] = k, v, edge
                         found[count, 3], found[count, 4] = kind, depth
                     count += 1
+        if count > known:
+            continue
+        length = _TIPS * min(rounding[start[a]], rounding[start[b]])
+        vertex, edge, depth = _crossed(after, next_vertex, start, a, b, pressed, least, length)
+        if vertex >= 0 and _crossed(before, next_vertex, start, a, b, pressed, least, length)[0] < 0:
+            if count < found.shape[0]:
+                found[count, 0], found[count, 1], found[count, 2] = k, vertex, edge
+                found[count, 3], found[count, 4] = INTO, depth
+            count += 1
     return count
 
 
