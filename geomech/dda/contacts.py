@@ -119,7 +119,7 @@ class ContactFinder:
         table, met = find_contacts(
             vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
         )
-        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]))
+        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]), corners.pressed)
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
             table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
@@ -249,13 +249,16 @@ class ContactFinder:
         np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
         return Windows(window.pairs, reach)
 
-    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray):
+    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray, pressed):
         """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
-        (sorted keys), and corners that meet corners, have."""
+        (sorted keys), and corners that meet corners, have; faces of blocks are ``pressed`` (n_blocks,) m in."""
         vertex, edge = table[:, 0], table[:, 1]
+        block, other = self._owner[vertex], self._owner[edge]
+        shallow = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed, table[:, 3] != FACE,
+            self._owner, closed, np.where(table[:, 3] == FACE, -1.0, shallow),
         )  # fmt: skip
         keep |= table[:, 2] >= 0
         return (table, met) if keep.all() else (table[keep], met[keep])
@@ -394,7 +397,7 @@ class ContactFinder:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, np.zeros(0, np.int64), np.zeros(len(vertex), bool),
+            self._owner, np.zeros(0, np.int64), np.full(len(vertex), -1.0),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:

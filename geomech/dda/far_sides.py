@@ -19,8 +19,6 @@ from ..compiled import kept, part
 
 #: A vertex is behind an edge by more than this part of the edge's length, or touches it.
 _BEHIND = 1e-9
-#: Of two corners one may lie before the other's far face and behind the near one by this part of the near one's length.
-_SHALLOW = 1e-4
 #: What a wall is measured from is no part of its far side: nearer than this part of the depth there is none.
 _START = 1e-6
 
@@ -59,11 +57,11 @@ def _convex(vertices, next_vertex, previous_vertex, i):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, closed, corners):
+def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, closed, shallow):
     """(n,) False for contacts of ``vertex`` with ``edge`` (n,) whose vertex is on the far side of the edge's block;
     ``gap`` (n,) m, ``start`` (n_blocks + 1,) first vertices, ``owner`` (n_vertices,) blocks; ``closed`` (sorted
-    vertex·n_vertices + edge) are the contacts that press already. Of ``corners`` (n,) True for corners that meet, both faces
-    are kept unless the vertex lies before one and deep behind the other."""
+    vertex·n_vertices + edge) are the contacts that press already. Of corners that meet both faces are kept, unless
+    the vertex lies before one and deeper than ``shallow`` (n,) m behind the other; −1 for what is no corner."""
     keep = np.ones(vertex.shape[0], np.bool_)
     for c in range(vertex.shape[0]):
         v, e = vertex[c], edge[c]
@@ -92,11 +90,11 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
         else:
             x, y = vertices[e, 0] + t * dx, vertices[e, 1] + t * dy
         thick, far = _thickness(vertices, next_vertex, e, start[b], start[b + 1], x, y, nx, ny, _START * depth)
-        if corners[c] and not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
+        if shallow[c] >= 0.0 and not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
             g = next_vertex[far]
             ux, uy = vertices[g, 0] - vertices[far, 0], vertices[g, 1] - vertices[far, 1]
             before = (vertices[v, 0] - vertices[far, 0]) * uy - (vertices[v, 1] - vertices[far, 1]) * ux
-            if before <= 0.0 or depth <= _SHALLOW * length:
+            if before <= 0.0 or depth <= shallow[c]:
                 continue
         if depth <= 0.5 * thick:
             continue

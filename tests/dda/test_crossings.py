@@ -69,7 +69,7 @@ def test_a_vertex_meets_no_face_from_behind_a_wall():
         return bool(
             from_outside(
                 np.array([5]), np.array([edge]), gap, vertices, next_vertex, previous, start, owner,
-                np.array(closed, np.int64), np.zeros(1, bool),
+                np.array(closed, np.int64), np.full(1, -1.0),
             )[0]
         )  # fmt: skip
 
