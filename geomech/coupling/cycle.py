@@ -26,7 +26,7 @@ from ..dda.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
 from .balance import Balance, balanced, toughness
 from .budget_watch import BudgetWatch
-from .collapse import lost, relax, unheld
+from .collapse import collapse_in_situ, lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .endless import out_of_sight, solved_pass
 from .event_steps import SETTLED, TOGETHER, EventSteps
@@ -134,7 +134,9 @@ class Coupling:
 
     def _from_the_start(self) -> Iterator[Cycle]:
         now = self.now
-        collapse = relax(now, now.state.time) if self.problem.dda.equilibrium else ()
+        collapse = collapse_in_situ(now)
+        if not collapse and self.problem.dda.equilibrium:
+            collapse = relax(now, now.state.time)
         yield self._still(collapse)
         if not collapse:
             yield from self._load_steps()
