@@ -110,6 +110,16 @@ class ByMeanStress:
         self.solutions[block], self.stress[block] = known, (own, limit)
         return known
 
+    def limits(self, block: int) -> bool:
+        """Whether ``block`` was taken for no softer than so much in the last pass."""
+        return not np.array_equal(self.stress[block][1], np.eye(3))
+
+    def strained(self, block: int, solution: Solution | EvenSolution) -> tuple[np.ndarray, np.ndarray]:
+        """The mean stress of the last pass (3,), Pa, and the strain (3,) that the cracks of ``solution``, under what the
+        limit leaves of it, bring; in the block's own axes."""
+        stress, limit = self.stress[block]
+        return stress, limit.T @ solution.crack_strain
+
     def take_step(self) -> None:
         """Go on from the end of a step."""
         self._memory = {b: known.memory for b, known in self.solutions.items() if known.memory is not None}

@@ -147,8 +147,8 @@ class GrowthTable(Table):
     )
     max_passes: Annotated[int, Field(ge=1)] = Field(
         200,
-        description="growth passes of a load step; at rest the load then waits for tips that still run, from where the step has led, for "
-        "up to 200 in all",
+        description="growth passes of a load step; at rest the load then waits for tips that still run, from where the step "
+        "has led, for up to 200 in all",
     )
     correct: bool = Field(
         True, description="predict each step, then bend it towards where it would go on: paths of second order"
