@@ -119,11 +119,14 @@ class ContactFinder:
         table, met = find_contacts(
             vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
         )
-        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]), corners.pressed)
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
             table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
         )
+        known = np.append((old["state"] != OPEN) | (old["lift"] < 0.0), False)[parent]
+        keep = self._from_outside(table, vertices, known, corners.pressed)
+        if not keep.all():
+            table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
@@ -249,19 +252,19 @@ class ContactFinder:
         np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
         return Windows(window.pairs, reach)
 
-    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray, pressed):
-        """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
-        (sorted keys), and corners that meet corners, have; faces of blocks are ``pressed`` (n_blocks,) m in."""
+    def _from_outside(self, table: np.ndarray, vertices: np.ndarray, known: np.ndarray, pressed: np.ndarray):
+        """(n,) whether vertices of the rows of `find_contacts` may have come to their edges from outside: rows that are
+        ``known`` (n,), as they continue contacts that press or begin to behind the line, and corners that meet corners,
+        have; faces of blocks are ``pressed`` (n_blocks,) m in."""
         vertex, edge = table[:, 0], table[:, 1]
         block, other = self._owner[vertex], self._owner[edge]
         shallow = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
         shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed, np.where(table[:, 3] == FACE, -1.0, shallow),
+            self._owner, known, np.where(table[:, 3] == FACE, -1.0, shallow),
         )  # fmt: skip
-        keep |= table[:, 2] >= 0
-        return (table, met) if keep.all() else (table[keep], met[keep])
+        return keep | (table[:, 2] >= 0)
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
@@ -397,7 +400,7 @@ class ContactFinder:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, np.zeros(0, np.int64), np.full(len(vertex), -1.0),
+            self._owner, np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
