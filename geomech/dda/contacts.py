@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State, corner_lengths
 from . import contact_rows
 from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
@@ -20,7 +20,6 @@ from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
-from .rounded_corners import LARGEST_SHARE
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -432,14 +431,6 @@ class ContactFinder:
         x, y = found.geometry[contact, 5:7]
         a, b = self.names[found.block[contact]], self.names[found.other[contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
-
-
-def corner_lengths(blocks: Blocks, share: float) -> tuple[np.ndarray, np.ndarray]:
-    """(n_vertices,) m twice: the rounding length of every corner of ``blocks``, ``share`` times the block's size
-    (√area), and the longest that fits beside its shorter edge."""
-    edges = np.hypot(*(blocks.vertices[blocks.next_vertex] - blocks.vertices).T)
-    longest = LARGEST_SHARE * np.minimum(edges, edges[blocks.previous_vertex])
-    return share * np.sqrt(blocks.areas())[blocks.vertex_block], longest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:
