@@ -4,10 +4,11 @@ released by cement that breaks and at tips as they grow, and set free where bloc
 The block solver knows the work of its mean stress on the strain of its cracks, A σ : dε_c. By Clapeyron's theorem a
 body with jumps [u] whose faces bear t where the same loads would bring t₀ without them stores ½ ∫ (t₀ − t)·[u] more;
 what a tip releases over an increment is ∫ G da, G = (K_I² + K_II²)/E' (Irwin 1957), by the trapezoidal rule of G
-before, of K_eq, for the way it turns, and after, each K once at the load of the step's end and once at that of its
-begin. So four quantities found apart from each other have to add up; what is left over is told. K is that of the forces
-whose strain the blocks feel: where that is their mean stress alone (`by_mean_stress`), that stress brings it; where they
-are taken for no softer than so much, what they release is what lies between the lines on which they are loaded.
+before, of K_eq, for the way it turns, and after (where it falls, as an exponential does), each K once at the load of the
+step's end and once at that of its begin. So four quantities found apart from each other have to add up; what is left
+over is told. K is that of the forces whose strain the blocks feel: where that is their mean stress alone
+(`by_mean_stress`), that stress brings it; where they are taken for no softer than so much and answer in proportion, what
+they release is what lies between the lines on which they are loaded.
 
 At rest forces have to be passed on as they are spread, and open cracks by more than their mean stress does. There the
 work of all of them counts (`work_on_cracks`), also where faces hold until these have come to their strength (`Released`);
@@ -40,6 +41,9 @@ _Key = tuple[int, int]
 
 #: rad; the series of kinks is good for no larger ones.
 _LARGEST_KINK = 2.2
+#: Energy around cracks is half of stress times strain to this part of itself where they answer in proportion: to what
+#: elements leave of reciprocity.
+PROPORTIONAL = 1e-3
 
 
 def _keys(tips: np.ndarray) -> list[_Key]:
@@ -90,6 +94,14 @@ def _kink_release(tips: np.ndarray) -> np.ndarray:
     return np.maximum(k[:, 0], 0.0) ** 2 + k[:, 1] ** 2
 
 
+def _mean_release(before: float, after: float) -> float:
+    """G over an increment, by the trapezoidal rule, and as of an exponential where it falls: growth that comes to rest may
+    take nearly all of it on the first part of a long one."""
+    if not 0 < after < before:
+        return 0.5 * (before + after)
+    return (before - after) / np.log(before / after)
+
+
 @dataclass(frozen=True)
 class _Growing:
     """A tip in ``block`` that grows by ``way``, m; what it released before, and what rock takes (``cost``), J/m²; what
@@ -100,6 +112,23 @@ class _Growing:
     block: int
     cost: float
     share: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Loaded:
+    """A block under its mean ``stress``, Pa, and the ``strain`` of its cracks, in its own axes; ``in_proportion``: it
+    stores half of their product, as where no face rubs or has closed."""
+
+    stress: np.ndarray
+    strain: np.ndarray
+    in_proportion: bool
+
+    @classmethod
+    def of(cls, block: int, solution: Solution, by_mean_stress: ByMeanStress) -> _Loaded:
+        stress, strain = by_mean_stress.strained(block, solution)
+        product = 0.5 * solution.body.area * float(stress @ strain)
+        in_proportion = abs(solution.crack_energy - product) <= PROPORTIONAL * abs(product)
+        return cls(stress, strain, in_proportion)
 
 
 @dataclass(eq=False)
@@ -144,10 +173,13 @@ class CrackEnergy:
     #: block → whether it feels its mean stress only.
     _hangs: dict[int, bool] = field(default_factory=dict)
     _growing: dict[_Key, _Growing] = field(default_factory=dict)
+    #: block with tips that grow → its mean stress, Pa, its limit, the strain of its cracks then, and the share as of a
+    #: tip.
+    _limited: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict)
     #: Blocks taken for no softer than so much (`ByMeanStress.limit`) in which tips have grown in the present step.
-    _limited: set[int] = field(default_factory=set)
-    #: block that feels its mean stress → that stress, Pa, and the strain of its cracks as the present step began.
-    _hung: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    _grown: set[int] = field(default_factory=set)
+    #: block that feels its mean stress → how it was loaded as the present step began.
+    _hung: dict[int, _Loaded] = field(default_factory=dict)
     #: At rest: block → its solution as the present step began, and what rock has taken in it since then, J/m.
     _rested: dict[int, Solution] = field(default_factory=dict)
     _taken: dict[int, float] = field(default_factory=dict)
@@ -155,6 +187,10 @@ class CrackEnergy:
     _began: _FeltTips | None = None
     _first: _FeltTips | None = None
     _last: _FeltTips | None = None
+    #: … and the crack strains of blocks that feel their mean stress.
+    _strain_began: dict[int, np.ndarray] = field(default_factory=dict)
+    _strain_first: dict[int, np.ndarray] = field(default_factory=dict)
+    _strain_last: dict[int, np.ndarray] = field(default_factory=dict)
 
     def passed(
         self,
@@ -169,12 +205,13 @@ class CrackEnergy:
         about to grow, or none; ``felt`` is block → the `ddm.Solution` that it is strained by, those ``by_mean_stress``
         by no more than their mean stress."""
         hang = {block: of for block, of in felt.items() if block in by_mean_stress}
+        self._strain_last = {block: of.crack_strain for block, of in hang.items()}
         self._last = _FeltTips(tips, hang)
         if self._first is None:
-            self._first = self._last
+            self._first, self._strain_first = self._last, self._strain_last
         if not len(tips):
             self._parted |= bool(self._growing)
-            self._growing = {}
+            self._growing, self._limited = {}, {}
             return
         if not (self._growing or (tips["grown"] > 0).any()):
             return
@@ -189,15 +226,22 @@ class CrackEnergy:
             taken = of.way * of.cost
             _add(self._taken, of.block, taken)
             if of.block in by_mean_stress and by_mean_stress.limits(of.block):
-                self._limited.add(of.block)
+                self._grown.add(of.block)
             if key in now:
-                released = 0.5 * of.way * of.share * (of.before + now[key])
+                released = of.way * of.share * _mean_release(of.before, now[key])
                 _add(self._released, of.block, released)
                 _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
                 # A tip that has met something: G rises without bound as the last ligament goes, its integral by no
                 # rule.
                 self._parted = True
+        for block, (stress, limit, strain, share) in self._limited.items():
+            # What is taken for no softer than so much (`ByMeanStress.limit`) spends less on growth as its limit falls.
+            if block in felt:
+                now_stress, now_limit = by_mean_stress.stress[block]
+                less, known = now_limit - limit, felt[block]
+                both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
+                _add(self._released, block, 0.5 * known.body.area * share * both)
         turned = np.where(hangs, _kink_release(tips), tips["k_eq"] ** 2) / modulus
         shares = self._shares(stressed)
         grows = np.flatnonzero(tips["grown"] > 0)
@@ -211,6 +255,11 @@ class CrackEnergy:
                 shares.get(keys[row], 1.0),
             )
             for row in grows.tolist()
+        }
+        self._limited = {
+            block: (*by_mean_stress.stress[block], felt[block].crack_strain, self._share_of(block, stressed))
+            for block in np.unique(tips["block"][grows]).tolist()
+            if block in by_mean_stress
         }
         self._asked += float(tips["grown"][grows] @ cost[grows])
 
@@ -232,13 +281,22 @@ class CrackEnergy:
                 shares[key] = max(0.0, float((k_i * row["k_i"] + k_ii * row["k_ii"]) / size))
         return shares
 
+    def _share_of(self, block: int, stressed: bool) -> float:
+        """The same of what goes with the square of the ``block``'s load, from the strain of its cracks."""
+        if self._began is None and not stressed:
+            return 0.0
+        before, first = self._strain_began.get(block), self._strain_first.get(block)
+        if before is None or first is None or not first.any():
+            return 1.0
+        return max(0.0, float(before @ first) / float(first @ first))
+
     def parts(self, parent: np.ndarray) -> None:
         """Blocks part in the present step; from then on they are those of which ``parent`` (n_blocks,) were whole."""
         self._parted = True
-        self._hangs = {}
+        self._hangs, self._limited, self._strain_last = {}, {}, {}
         whole = np.bincount(parent)[parent] == 1
         now = {int(parent[child]): child for child in np.flatnonzero(whole).tolist()}
-        self._limited = {now[block] for block in self._limited if block in now}
+        self._grown = {now[block] for block in self._grown if block in now}
         self._hung = {now[block]: of for block, of in self._hung.items() if block in now}
         if not self.static:
             return
@@ -336,25 +394,27 @@ class CrackEnergy:
         self.stored, self.friction, self.bond = stored, self.friction + friction, self.bond + bond
         self._released, self._lost, self._taken = {}, {}, {}
         self._asked, self._parted = 0.0, False
-        self._began, self._first = self._last, None
+        self._began, self._first, self._strain_began = self._last, None, self._strain_last
         # What grows now does so as the next step begins.
         self._growing = {key: replace(of, share=1.0) for key, of in self._growing.items()}
-        self._limited = set()
-        self._hung = {block: by_mean_stress.strained(block, of) for block, of in felt.items() if hangs[block]}
+        self._limited = {block: (*of[:3], 1.0) for block, of in self._limited.items()}
+        self._grown = set()
+        self._hung = {block: _Loaded.of(block, of, by_mean_stress) for block, of in felt.items() if hangs[block]}
         self._rested = dict(felt) if self.static else {}
 
     def _release_of_limited(self, felt: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
-        """What is taken for no softer than so much spends less on growth as its limit falls, and what it releases is no
-        integral of K: it is what lies between the lines on which it was loaded before and after, ½ A (σ₀·ε₁ − σ₁·ε₀),
-        from where the present step began."""
-        for block in self._limited:
+        """What is taken for no softer than so much releases, where it answers in proportion to its load, what lies between
+        the lines on which it is loaded before and after, ½ A (σ₀·ε₁ − σ₁·ε₀), from where the present step began: K falls
+        by much in an increment, and the limit with it."""
+        for block in self._grown:
             if block not in felt or block not in by_mean_stress:
                 continue
-            stress, strain = by_mean_stress.strained(block, felt[block])
-            stress_before, strain_before = self._hung.get(block, (np.zeros(3), np.zeros(3)))
-            between = float(stress_before @ strain - stress @ strain_before)
-            self._released[block] = released = 0.5 * felt[block].body.area * between
-            self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
+            now = _Loaded.of(block, felt[block], by_mean_stress)
+            before = self._hung.get(block, _Loaded(np.zeros(3), np.zeros(3), True))
+            if now.in_proportion and before.in_proportion:
+                between = float(before.stress @ now.strain - now.stress @ before.strain)
+                self._released[block] = released = 0.5 * felt[block].body.area * between
+                self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
 
     def _work_at_rest(
         self, before: State, felt: dict[int, Solution], hangs: dict[int, bool], by_mean: np.ndarray
