@@ -123,7 +123,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
             if static:
                 _remember(now, answer)
             # In a step that has been cut short by a chase blocks agree as their inertia holds them: that is no rest.
-            give_way = chased if static and dt != asked and tried_whole else set()
+            give_way = _softest(now, chased) if static and dt != asked and tried_whole else set()
             if not static or dt == asked or ((tried_whole or doubt < CERTAIN) and not give_way):
                 break
             # What cut a static step short may have been a strain that the first passes assumed.
@@ -131,7 +131,7 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
         else:
             chasing = set(np.array(list(now.bodies), int)[differences > NO_ANSWER].tolist())
             chased |= chasing
-            give_way = chasing if attempt + 1 == PATIENCE else set()
+            give_way = _softest(now, chasing) if attempt + 1 == PATIENCE else set()
         for block in sorted(give_way):
             now.by_mean_stress.add(block)
         if give_way:
@@ -158,6 +158,13 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
     if not static:
         now.cannot_grow.solved(now, tips, toughness(now, tips))
     return Balance(result, now.solutions, tips, statistics, left_out), differences
+
+
+def _softest(now: CrackedBlocks, chasing: set[int]) -> set[int]:
+    """The ``chasing`` blocks without those that soft ones drag along: where some chase, after a few passes rounding
+    decides whether their neighbours do, and what gives way is not to depend on it."""
+    soft = {b for b in chasing if now.by_mean_stress.soft(b, now.bodies[b], now.system.compliance[b])}
+    return soft or chasing
 
 
 def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:

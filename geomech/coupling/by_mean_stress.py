@@ -73,7 +73,7 @@ class ByMeanStress:
         for block in np.unique([pressed["block"], pressed["other"]]).tolist():
             if block not in bodies or block in self._blocks:
                 continue
-            if self._soft(block, bodies[block], elastic[block]) > SOFT:
+            if self.soft(block, bodies[block], elastic[block]):
                 self._blocks.add(block)
 
     def limit(self, block: int, body: Body, elastic: np.ndarray) -> np.ndarray:
@@ -133,6 +133,10 @@ class ByMeanStress:
         )
         own = {b for b in whole.tolist() if parent[b] in self._blocks}
         return ByMeanStress(solutions, memory, stress, softness, own)
+
+    def soft(self, block: int, body: Body, elastic: np.ndarray) -> bool:
+        """Whether open cracks make ``block`` more than `SOFT` times as soft as its rock in some direction."""
+        return self._soft(block, body, elastic) > SOFT
 
     def _soft(self, block: int, body: Body, elastic: np.ndarray) -> float:
         """How many times the ``elastic`` compliance (3, 3) open cracks add, in the direction in which they add most."""
