@@ -24,13 +24,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import Blocks, Material, State
+from .release import FeltTips, Loaded, kink_release, mean_release
 from .work_on_cracks import first_work_on_cracks, work_on_cracks
 
 if TYPE_CHECKING:
@@ -39,12 +38,6 @@ if TYPE_CHECKING:
 
 _Key = tuple[int, int]
 
-#: rad; the series of kinks is good for no larger ones.
-_LARGEST_KINK = 2.2
-#: Energy around cracks is half of stress times strain to this part of itself where they answer in proportion: to what
-#: elements leave of reciprocity.
-PROPORTIONAL = 1e-3
-
 
 def _keys(tips: np.ndarray) -> list[_Key]:
     return list(zip(tips["crack"].tolist(), tips["end"].tolist()))
@@ -52,54 +45,6 @@ def _keys(tips: np.ndarray) -> list[_Key]:
 
 def _add(sums: dict[int, float], block: int, energy: float) -> None:
     sums[block] = sums.get(block, 0.0) + energy
-
-
-class _FeltTips:
-    """``tips``, and those of blocks that were left out, with the K that the mean stress brings in blocks that feel no
-    more, ``hang`` (block → solution); found when something grows."""
-
-    def __init__(self, tips: np.ndarray, hang: dict[int, Solution]) -> None:
-        self._tips, self._hang = tips, hang
-
-    def __getstate__(self) -> dict[str, np.ndarray]:
-        return {"rows": self.rows}
-
-    @cached_property
-    def rows(self) -> np.ndarray:
-        """(n_tips,) TIP."""
-        there = set(self._tips["block"].tolist())
-        left_out = [of.tips for block, of in self._hang.items() if block not in there]
-        out = np.concatenate([self._tips, *left_out])
-        for first, last in _runs(out["block"]):
-            solution = self._hang.get(int(out["block"][first]))
-            if solution is not None:
-                for name in ("k_i", "k_ii"):
-                    out[name][first:last] = solution.tips[name]
-        return out
-
-
-def _runs(number: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Where rows of one ``number`` (n,) begin and end; those of a block stand together."""
-    marks = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
-    return pairwise(marks) if len(number) else iter(())
-
-
-def _kink_release(tips: np.ndarray) -> np.ndarray:
-    """(n,) k₁² + k₂² at the tips of kinks of no length by the growth angles of ``tips`` (Amestoy & Leblond 1992), of
-    those that close k₂² alone."""
-    from ..ddm.criteria import kink_factors
-
-    angle = np.clip(tips["angle"], -_LARGEST_KINK, _LARGEST_KINK)
-    k = (kink_factors(angle) @ np.stack([tips["k_i"], tips["k_ii"]], axis=-1)[..., None])[..., 0]
-    return np.maximum(k[:, 0], 0.0) ** 2 + k[:, 1] ** 2
-
-
-def _mean_release(before: float, after: float) -> float:
-    """G over an increment, by the trapezoidal rule, and as of an exponential where it falls: growth that comes to rest may
-    take nearly all of it on the first part of a long one."""
-    if not 0 < after < before:
-        return 0.5 * (before + after)
-    return (before - after) / np.log(before / after)
 
 
 @dataclass(frozen=True)
@@ -112,23 +57,6 @@ class _Growing:
     block: int
     cost: float
     share: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Loaded:
-    """A block under its mean ``stress``, Pa, and the ``strain`` of its cracks, in its own axes; ``in_proportion``: it
-    stores half of their product, as where no face rubs or has closed."""
-
-    stress: np.ndarray
-    strain: np.ndarray
-    in_proportion: bool
-
-    @classmethod
-    def of(cls, block: int, solution: Solution, by_mean_stress: ByMeanStress) -> _Loaded:
-        stress, strain = by_mean_stress.strained(block, solution)
-        product = 0.5 * solution.body.area * float(stress @ strain)
-        in_proportion = abs(solution.crack_energy - product) <= PROPORTIONAL * abs(product)
-        return cls(stress, strain, in_proportion)
 
 
 @dataclass(eq=False)
@@ -179,14 +107,14 @@ class CrackEnergy:
     #: Blocks taken for no softer than so much (`ByMeanStress.limit`) in which tips have grown in the present step.
     _grown: set[int] = field(default_factory=set)
     #: block that feels its mean stress → how it was loaded as the present step began.
-    _hung: dict[int, _Loaded] = field(default_factory=dict)
+    _hung: dict[int, Loaded] = field(default_factory=dict)
     #: At rest: block → its solution as the present step began, and what rock has taken in it since then, J/m.
     _rested: dict[int, Solution] = field(default_factory=dict)
     _taken: dict[int, float] = field(default_factory=dict)
     #: Tips with K as it is felt, as the present step began, in its first pass and in its last one.
-    _began: _FeltTips | None = None
-    _first: _FeltTips | None = None
-    _last: _FeltTips | None = None
+    _began: FeltTips | None = None
+    _first: FeltTips | None = None
+    _last: FeltTips | None = None
     #: … and the crack strains of blocks that feel their mean stress.
     _strain_began: dict[int, np.ndarray] = field(default_factory=dict)
     _strain_first: dict[int, np.ndarray] = field(default_factory=dict)
@@ -206,7 +134,7 @@ class CrackEnergy:
         by no more than their mean stress."""
         hang = {block: of for block, of in felt.items() if block in by_mean_stress}
         self._strain_last = {block: of.crack_strain for block, of in hang.items()}
-        self._last = _FeltTips(tips, hang)
+        self._last = FeltTips(tips, hang)
         if self._first is None:
             self._first, self._strain_first = self._last, self._strain_last
         if not len(tips):
@@ -228,7 +156,7 @@ class CrackEnergy:
             if of.block in by_mean_stress and by_mean_stress.limits(of.block):
                 self._grown.add(of.block)
             if key in now:
-                released = of.way * of.share * _mean_release(of.before, now[key])
+                released = of.way * of.share * mean_release(of.before, now[key])
                 _add(self._released, of.block, released)
                 _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
@@ -242,7 +170,7 @@ class CrackEnergy:
                 less, known = now_limit - limit, felt[block]
                 both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
                 _add(self._released, block, 0.5 * known.body.area * share * both)
-        turned = np.where(hangs, _kink_release(tips), tips["k_eq"] ** 2) / modulus
+        turned = np.where(hangs, kink_release(tips), tips["k_eq"] ** 2) / modulus
         shares = self._shares(stressed)
         grows = np.flatnonzero(tips["grown"] > 0)
         cost = np.array([m.k_ic for m in materials])[rock] ** 2 / modulus
@@ -399,7 +327,7 @@ class CrackEnergy:
         self._growing = {key: replace(of, share=1.0) for key, of in self._growing.items()}
         self._limited = {block: (*of[:3], 1.0) for block, of in self._limited.items()}
         self._grown = set()
-        self._hung = {block: _Loaded.of(block, of, by_mean_stress) for block, of in felt.items() if hangs[block]}
+        self._hung = {block: Loaded.of(block, of, by_mean_stress) for block, of in felt.items() if hangs[block]}
         self._rested = dict(felt) if self.static else {}
 
     def _release_of_limited(self, felt: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
@@ -409,8 +337,8 @@ class CrackEnergy:
         for block in self._grown:
             if block not in felt or block not in by_mean_stress:
                 continue
-            now = _Loaded.of(block, felt[block], by_mean_stress)
-            before = self._hung.get(block, _Loaded(np.zeros(3), np.zeros(3), True))
+            now = Loaded.of(block, felt[block], by_mean_stress)
+            before = self._hung.get(block, Loaded(np.zeros(3), np.zeros(3), True))
             if now.in_proportion and before.in_proportion:
                 between = float(before.stress @ now.strain - now.stress @ before.strain)
                 self._released[block] = released = 0.5 * felt[block].body.area * between
