@@ -171,10 +171,14 @@ def _passes(now: CrackedBlocks, dt: float, load_time: float | None, soft_ones_ha
 
 
 def _softest(now: CrackedBlocks, chasing: set[int]) -> set[int]:
-    """The ``chasing`` blocks without those that soft ones drag along: where some chase, after a few passes rounding
-    decides whether their neighbours do, and what gives way is not to depend on it."""
-    soft = {b for b in chasing if now.by_mean_stress.soft(b, now.bodies[b], now.system.compliance[b])}
-    return soft or chasing
+    """The soft one of the ``chasing`` blocks, without those that it drags along; where there are more, all soft blocks: they
+    drag each other along, and after a few passes rounding decides which of them do."""
+
+    def soft(block: int) -> bool:
+        return now.by_mean_stress.soft(block, now.bodies[block], now.system.compliance[block])
+
+    found = {block for block in chasing if soft(block)}
+    return {block for block in now.bodies if soft(block)} if len(found) > 1 else found or chasing
 
 
 def toughness(now: CrackedBlocks, tips: np.ndarray) -> np.ndarray:

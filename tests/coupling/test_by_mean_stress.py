@@ -167,12 +167,16 @@ def test_growth_never_stiffens_a_limited_block():
 
 
 def test_of_blocks_that_chase_their_cracks_the_soft_ones_give_way():
-    """What they drag along gives way only where no soft one chases: which neighbours do, rounding decides."""
-    bodies = {b: ddm.Body([BAR], edge_crack(ratio, np.inf, 0), ROCK) for b, ratio in ((3, 0.2), (5, 0.75), (8, 0.3))}
+    """What one drags along gives way only where no soft one chases; where more of them do, all that are soft: which
+    neighbours they drag along, rounding decides."""
+    bodies = {
+        b: ddm.Body([BAR], edge_crack(ratio, np.inf, 0), ROCK)
+        for b, ratio in ((3, 0.2), (5, 0.75), (6, 0.75), (7, 0.8), (8, 0.3))
+    }
+    compliance = np.tile(ROCK.compliance(), (9, 1, 1))
     now = SimpleNamespace(
-        bodies=bodies,
-        by_mean_stress=ByMeanStress(),
-        system=SimpleNamespace(compliance=np.tile(ROCK.compliance(), (9, 1, 1))),
+        bodies=bodies, by_mean_stress=ByMeanStress(), system=SimpleNamespace(compliance=compliance)
     )
     assert _softest(now, {3, 5, 8}) == {5} and _softest(now, {5}) == {5}
+    assert _softest(now, {3, 5, 6}) == {5, 6, 7}
     assert _softest(now, {3, 8}) == {3, 8} and _softest(now, set()) == set()
