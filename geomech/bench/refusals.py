@@ -30,12 +30,6 @@ REASONS = (
         drawn=True,
     ),
     Reason(
-        "no rest in situ",
-        dda.NoInSituEquilibrium,
-        r"no equilibrium: blocks have moved",
-        "joints of this strength do not hold the stress asked for: blocks move on, and are named",
-    ),
-    Reason(
         "in-situ stress not found",
         dda.NoInSituEquilibrium,
         r"after \d+ (steps|cuts)",
