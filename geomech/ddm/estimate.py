@@ -27,6 +27,8 @@ _log = logging.getLogger(__name__)
 SAFETY = 2.0
 #: An estimated error above this part of the largest K is told to the log.
 WORTH_A_WARNING = 0.01
+#: K below this part of the stress on closed cracks times the root of their length is no K.
+ROUND_OFF = 1e-11
 
 
 def tip_errors(solution: Solution) -> np.ndarray:
@@ -52,6 +54,11 @@ def factors(solution: Solution) -> np.ndarray:
 def largest(k: np.ndarray) -> float:
     """The largest √(K_I² + K_II²) of (n_tips, 2) factors: what errors are relative to."""
     return float(np.hypot(*k.T).max(initial=0.0))
+
+
+def negligible(solution: Solution) -> float:
+    """Pa √m: K that is round-off of the stress on the cracks, where faces in contact let none of it reach the tips."""
+    return ROUND_OFF * float(np.abs(solution.face_load).max(initial=0.0)) * float(np.sqrt(solution.body.faces.length.sum()))
 
 
 def warn(errors: np.ndarray, k: np.ndarray) -> None:

@@ -166,6 +166,8 @@ class _Run:
         else:
             load = self._load_at(factor, body.cracks)
             solution = body.solve(load, warm=self.solution, history=history)
+            if body is self.body:  # a finer one may meet the target error
+                self.body = solution.body
             tips = solution.tips.copy()
             tips["angle"], tips["k_eq"] = judged(solution, self.growth, self.material)
         self._last = factor, solution, history, tips

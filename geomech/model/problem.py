@@ -122,7 +122,7 @@ class DdmSettings:
     Kinks get more than the ``grading_layers``, by their angle: 2 leave an error of 5e-4 in K, every one more halves it.
 
     With ``target_error``, the relative error of K that is asked for, order, elements and grading follow from it
-    instead. With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs
+    instead, and solutions are compared with those of finer meshes until they meet it. With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs
     there, in place of ``grading_layers`` everywhere.
     """
 
