@@ -26,6 +26,7 @@ from .automatic import finer, for_target, met
 from .bordered import SMALLEST, Bordered
 from .boundary import BoundarySystem
 from .boundary_iteration import is_iterated
+from .chords import rounder
 from .contact import settle_faces
 from .crack_system import CrackSystem
 from .even_stress import EvenResponse, even_response, scales
@@ -178,6 +179,11 @@ class Body:
             self._finer = self.remeshed(finer(self.settings), self._finer_before)
             self._finer.asked, self._finer_before = self.asked, None
         return self._finer
+
+    @cached_property
+    def rounder(self) -> Body | None:
+        """See `chords.rounder`."""
+        return rounder(self)
 
     def _in_half_plane(self, edges: np.ndarray) -> np.ndarray:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""

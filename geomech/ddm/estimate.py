@@ -2,7 +2,7 @@
 
 Estimates from one solution alone (decay of its coefficients, order p against p−1) follow the error of K only within
 factors of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ.
-One order more, graded one step deeper, sees what is there.
+One order more, graded one step deeper, sees what is there; but for what the chords of curved walls do (`chords`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import automatic
+from .chords import chord_errors
 from .grading import Grading, ungraded
 from .mesh import interior_angles, wedges
 
@@ -41,7 +42,7 @@ def tip_errors(solution: Solution) -> np.ndarray:
     other = body.remeshed(automatic.finer(body.settings)).solve(
         solution.load, equilibrium_tolerance=np.inf, history=solution.began
     )
-    errors = SAFETY * np.abs(factors(other) - k) + floor(body) * largest(k)
+    errors = SAFETY * (np.abs(factors(other) - k) + chord_errors(solution)) + floor(body) * largest(k)
     warn(errors, k)
     return errors
 
