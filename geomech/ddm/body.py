@@ -301,7 +301,7 @@ class Body:
             return direct - ((w @ self._cg.of(r).T) if len(k) == c.n else w.of(k) @ self._cg.of(r).T).T
 
         known = old.crack_system.matrix if kept else None
-        if known is None or not known.n or self.rough or c.n_unknowns < SMALLEST:
+        if known is None or not known.n or c.n_unknowns < SMALLEST:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
             matrix = Bordered.whole(c, whole)
         else:

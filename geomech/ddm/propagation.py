@@ -205,7 +205,7 @@ class _Run:
         def excess(factor: float) -> float:
             nonlocal found
             found = self._drives(factor)
-            return self.drive - 1
+            return self.drive - 1 if abs(self.drive - 1) > PRECISION else 0.0
 
         low = high = None
         factor = min(self.factor or 1.0, self.max_factor)
