@@ -312,9 +312,7 @@ class Coupling:
         return record(self.now, self.now.state, np.empty(0, TIP), {}, events, growth_pass, {})
 
     def _stops(self, events: tuple[Event, ...]) -> bool:
-        # What a split leaves of rock without an end nothing holds.
-        ends = ("split",) if self.problem.endless is not None else ()
-        return any(event.kind in (*self.problem.run.stop_at, *ends) for event in events)
+        return any(event.kind in self.problem.ends_at for event in events)
 
 
 def _go_on() -> None:

@@ -178,8 +178,8 @@ class RunTable(Table):
     stop_at: Annotated[tuple[Literal[STOPS], ...], Strict(False)] = Field(
         ("coalescence", "split"),
         description="the run ends at the first event of these kinds; a mechanism is when blocks of a static run slide or turn "
-        "without bound. Of the contacts of two blocks, or the faces of a crack, the first that opens is an opening, the last "
-        "one a parting; the first that slips a slip, the last one a sliding; what meets a closure, what sticks again a stick, "
+        'without bound, and ends stepping "events" whatever is said here. Of the contacts of two blocks, or the faces of a '
+        "crack, the first that opens is an opening, the last one a parting; the first that slips a slip, the last one a sliding; what meets a closure, what sticks again a stick, "
         'a lost bond a debonding: these need stepping "events", or run.events',
     )
     stepping: Literal["fixed", "events"] = Field(
