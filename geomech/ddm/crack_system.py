@@ -88,7 +88,7 @@ class CrackSystem:
             return free, self.open_factor
         few = self.n >= WORTHWHILE and self.n - len(free) < MOST_HELD * self.n and not rows.spring.any()
         if few and self.open_factor is not None:
-            return free, HeldFactor(rows, self.open_factor, self._inverse_columns, SINGULAR)
+            return free, HeldFactor(rows, self.open_factor, self, SINGULAR)
         whole = self.matrix.dense
         matrix = whole[np.ix_(free, free)]
         if len(moving):
@@ -137,7 +137,7 @@ class CrackSystem:
             self._work.crack_factorisations += 1
         return self._factors[key]
 
-    def _inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
+    def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, len(unknowns)) columns of S⁻¹; they outlast the load."""
         missing = unknowns[self._column_at[unknowns] < 0]
         if len(missing):
@@ -155,7 +155,7 @@ class CrackSystem:
         """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; mostly the same faces stay closed for long."""
         key = at.tobytes()
         if self._held_now is None or self._held_now[0] != key:
-            columns = self._inverse_columns(at)
+            columns = self.inverse_columns(at)
             factor = Factor(columns[at], "closed faces leave a part of the body without hold")
             self._held_now = key, columns, factor
         return self._held_now[1:]

@@ -11,8 +11,7 @@ a factor of that size, not one of all unknowns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -23,19 +22,26 @@ if TYPE_CHECKING:
     from .crack_system import Rows
 
 
+class InverseColumns(Protocol):
+    """Who keeps columns of S⁻¹."""
+
+    def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n, len(unknowns)) columns of S⁻¹."""
+
+
 class HeldFactor:
     """Solves the equations of the free unknowns that ``rows`` leave of S, without springs; ``open_factor`` are factors
-    of S, ``columns(unknowns)`` gives columns of its inverse. Raises LinAlgError, with ``what``, where they are
+    of S, ``inverse`` knows columns of its inverse. Raises LinAlgError, with ``what``, where they are
     singular."""
 
     def __init__(
         self,
         rows: Rows,
         open_factor: Factor | BorderedFactor,
-        columns: Callable[[np.ndarray], np.ndarray],
+        inverse: InverseColumns,
         what: str,
     ):
-        self.open, self._columns = open_factor, columns
+        self.open, self._inverse = open_factor, inverse
         self._free, self._held = np.flatnonzero(~rows.held), np.flatnonzero(rows.held)
         along = np.flatnonzero(rows.mixed)
         across, mixed = along + rows.per, rows.mixed[along]
@@ -47,9 +53,9 @@ class HeldFactor:
         self._slides = along[~loose], at[across[~loose]], mixed[~loose]
         of, into, factor = self._slides
         needed = np.concatenate([self._held, of])
-        inverse = columns(needed)
-        self._response = inverse[:, : len(self._held)].copy(order="F")
-        self._response[:, into] -= inverse[:, len(self._held) :] * factor
+        columns = inverse.inverse_columns(needed)
+        self._response = columns[:, : len(self._held)].copy(order="F")
+        self._response[:, into] -= columns[:, len(self._held) :] * factor
         self._small = Factor(self._response[self._held], what)
         self.rcond = min(open_factor.rcond, self._small.rcond)
 
@@ -61,7 +67,7 @@ class HeldFactor:
         w = opened.copy()
         pushed = np.flatnonzero(shear)
         if len(pushed):
-            w += self._columns(pushed) @ shear[pushed]
+            w += self._inverse.inverse_columns(pushed) @ shear[pushed]
         missing = np.zeros_like(w)
         missing[self._held] = self._small.solve(w[self._held] - fixed[self._held])
         w -= self._response @ missing[self._held]
