@@ -74,9 +74,7 @@ class CoupledRun:
         self.group = Group(observers)
         self.checkpoints = next((each for each in self.group.observers if isinstance(each, Checkpoints)), None)
         self.interruption = Interruption()
-        self.stops_at = (*problem.run.stop_at, "collapse")
-        if problem.endless is not None:
-            self.stops_at += ("split", "out of sight")
+        self.stops_at = (*problem.ends_at, "collapse", *(("out of sight",) if problem.endless is not None else ()))
         self.stopping = [] if stored is None else [kind for kind in stored["stopping"] if kind in self.stops_at]
         self.ended = stored is not None and stored["ended"] and bool(self.stopping)
         self.spent = 0.0 if stored is None else stored["wall_s"]

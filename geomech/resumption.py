@@ -147,9 +147,11 @@ def _told_end(folder: Path) -> str | None:
 
 def _refuse_finished(end: str, changes: Mapping[str, Any], header: Mapping[str, Any], scene: Any) -> None:
     """Unless what ended the run has been changed so that it goes on."""
-    if scene is None or end in ("collapse", "out of sight"):
+    settings = None if scene is None else scene.problem().run
+    # Steps to events have none to go to where nothing holds the blocks.
+    no_further = end == "mechanism" and settings is not None and settings.stepping == "events"
+    if settings is None or no_further or end in ("collapse", "out of sight"):
         raise Finished(f"the run has ended ({end}): there is nothing to go on with")
-    settings = scene.problem().run
     if end == "end of the scene":
         if settings.end_time > header["time_s"] * (1 + 1e-12):
             return

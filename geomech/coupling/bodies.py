@@ -186,9 +186,19 @@ def solve_bodies(
             # (Others have more than a message, as `ddm.OutOfEquilibrium`.)
             if type(failure) not in (ValueError, ddm.NotConverged):
                 raise
-            raise type(failure)(f"{names[b] if b < len(names) else f'block {b}'}: {failure}") from failure
+            raise type(failure)(f"{_called(b, names)}: {failure}") from failure
+        except ddm.TargetMissed as failure:
+            raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
 
-    return dict(zip(bodies, side_by_side(solved, list(bodies), threads_for(bodies))))
+    solutions = dict(zip(bodies, side_by_side(solved, list(bodies), threads_for(bodies))))
+    if any(body.asked.target_error is not None for body in bodies.values()):
+        # Those that meet the target error may be of finer bodies.
+        bodies.update((b, solution.body) for b, solution in solutions.items())
+    return solutions
+
+
+def _called(block: int, names: Sequence[str]) -> str:
+    return names[block] if block < len(names) else f"block {block}"
 
 
 #: Unknowns of a body from which solving it on a thread of its own pays: what is smaller takes about a millisecond, most

@@ -1,4 +1,4 @@
-"""Tells when the energy of a run is no longer accounted for."""
+"""Tells when the energy of a run is no longer accounted for, and when cracks take none from the blocks they break."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ import logging
 from ..dda.energy import GAIN
 
 log = logging.getLogger(__name__)
+
+#: Part of what rock takes as it breaks that its blocks need not have given: increments and steps leave some per cent.
+UNPAID = 0.25
 
 
 class BudgetWatch:
@@ -25,4 +28,29 @@ class BudgetWatch:
             "time step, where cracks grow also growth.increment_m",
             time,
             share,
+        )
+
+
+class BendingWatch:
+    """Logs a warning, once, when cracks in motion took less from their blocks than rock takes as it breaks: a block has
+    one strain and does not store what bends it, so that cracks which bending opens cost it nothing."""
+
+    def __init__(self) -> None:
+        self._told, self._before = False, 0.0
+
+    def check(self, toughness: float, spent: float, time: float) -> None:
+        """After every step: ``toughness`` is what rock took until ``time``, s, ``spent`` what blocks gave for it, J/m.
+        What grows in a step releases some of that in the next."""
+        before, self._before = self._before, toughness
+        if self._told or not before - spent > UNPAID * before:
+            return
+        self._told = True
+        log.warning(
+            "t = %g s: of the %.3g J/m that cracks took as they broke the rock, their blocks gave %.3g: blocks of one "
+            "strain do not store bending, so that cracks which it opens take no energy from the motion, and K of a blow "
+            "may be several times too high (unpaid_toughness in summary.json): glue the block from smaller ones, which "
+            "bend together, or take such cracks for a bound",
+            time,
+            before,
+            spent,
         )

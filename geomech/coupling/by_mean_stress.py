@@ -106,7 +106,7 @@ class ByMeanStress:
         known = scaled(body, even, before) if skip else None
         if known is None:
             load = ddm.BodyLoad(remote_stress=even)
-            known = body.solve(load, warm=before, history=self._memory.get(block, began))
+            known = body.solve(load, warm=before, history=self._memory.get(block, began), meet_target=False)
         self.solutions[block], self.stress[block] = known, (own, limit)
         return known
 

@@ -25,7 +25,7 @@ from ..dda.excavation import until_next_event
 from ..dda.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
 from .balance import Balance, balanced, toughness
-from .budget_watch import BudgetWatch
+from .budget_watch import BendingWatch, BudgetWatch
 from .collapse import collapse_in_situ, lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .endless import out_of_sight, solved_pass
@@ -100,7 +100,7 @@ class Coupling:
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
-        self.energy, self.overlaps = BudgetWatch(), OverlapWatch()
+        self.energy, self.bending, self.overlaps = BudgetWatch(), BendingWatch(), OverlapWatch()
         self.under_way: UnderWay | None = None
         #: s, when the present load step began.
         self.began = self.now.state.time
@@ -250,6 +250,9 @@ class Coupling:
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual, now.crack_energy.uneven)
             self.energy.check(statistics["budget_residual"], result.state.time)
+            cracks = now.crack_energy
+            if ends and not static:
+                self.bending.check(cracks.toughness, cracks.fracture + cracks.parting, result.state.time)
             overlap = None if result.overlap is None else Overlap(*result.overlap)
             self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
             if self.tips is not None and (len(tips) or found.left_out):
@@ -328,9 +331,7 @@ class Coupling:
         return record(self.now, self.now.state, np.empty(0, TIP), {}, events, growth_pass, {})
 
     def _stops(self, events: tuple[Event, ...]) -> bool:
-        # What a split leaves of rock without an end nothing holds.
-        ends = ("split",) if self.problem.endless is not None else ()
-        return any(event.kind in (*self.problem.run.stop_at, *ends) for event in events)
+        return any(event.kind in self.problem.ends_at for event in events)
 
 
 def _go_on() -> None:

@@ -29,6 +29,7 @@ _PUBLIC = {
     "Solution": ".solution",
     "Work": ".work",
     "propagate": ".propagation",
+    "TargetMissed": ".automatic",
     "solve_to": ".automatic",
 }
 _MODULES = ("criteria", "growth", "initiation", "shapes")
@@ -43,6 +44,7 @@ __all__ = [
     "Pressure",
     "Solution",
     "Support",
+    "TargetMissed",
     "Work",
     "criteria",
     "growth",

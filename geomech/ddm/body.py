@@ -22,10 +22,11 @@ import numpy as np
 from ..model import Cracks, DdmSettings, JointLaw, Material
 from ..model.polygon import area_moments
 from .applied import Applied, apply, check_equilibrium
-from .automatic import for_target
+from .automatic import finer, for_target, met
 from .bordered import SMALLEST, Bordered
 from .boundary import BoundarySystem
 from .boundary_iteration import is_iterated
+from .chords import rounder
 from .contact import settle_faces
 from .crack_system import CrackSystem
 from .even_stress import EvenResponse, even_response, scales
@@ -79,7 +80,14 @@ class Body:
     ):
         self.half_plane = half_plane
         self.material, self.cracks = material, cracks
-        self.settings = settings = for_target(DdmSettings() if settings is None else settings)
+        #: What was asked for; ``settings`` are those of the mesh, which a target error decides.
+        self.asked = DdmSettings() if settings is None else settings
+        self.settings = settings = for_target(self.asked)
+        self._finer: Body | None = None
+        self._finer_before: Body | None = None
+        if previous is not None and previous.asked == self.asked:
+            self.settings = settings = previous.settings
+            self._finer_before = previous._finer or previous._finer_before
         self.supports, self.face_laws = tuple(supports), tuple(face_laws)
         check_laws(self.face_laws, cracks)
         self.rough = not all_smooth(self.face_laws)
@@ -148,19 +156,34 @@ class Body:
     def nu(self) -> float:
         return self.material.effective_poissons_ratio
 
-    def remeshed(self, settings: DdmSettings) -> Body:
-        """The same body with another mesh."""
+    def remeshed(self, settings: DdmSettings, previous: Body | None = None) -> Body:
+        """The same body with another mesh; ``previous`` as of `Body`."""
         n_outlines = int(self.outlined)
         return Body(
             self.loops[:n_outlines],
             self.cracks,
             self.material,
             settings,
+            previous=previous,
             holes=self.loops[n_outlines:],
             supports=self.supports,
             face_laws=self.face_laws,
             half_plane=self.half_plane,
         )
+
+    @property
+    def one_finer(self) -> Body:
+        """The same body with the next finer mesh (at the highest order the one below), kept; it goes by what this body
+        was ``asked`` for, too."""
+        if self._finer is None:
+            self._finer = self.remeshed(finer(self.settings), self._finer_before)
+            self._finer.asked, self._finer_before = self.asked, None
+        return self._finer
+
+    @cached_property
+    def rounder(self) -> Body | None:
+        """See `chords.rounder`."""
+        return rounder(self)
 
     def _in_half_plane(self, edges: np.ndarray) -> np.ndarray:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""
@@ -278,7 +301,7 @@ class Body:
             return direct - ((w @ self._cg.of(r).T) if len(k) == c.n else w.of(k) @ self._cg.of(r).T).T
 
         known = old.crack_system.matrix if kept else None
-        if known is None or not known.n or self.rough or c.n_unknowns < SMALLEST:
+        if known is None or not known.n or c.n_unknowns < SMALLEST:
             whole = reuse(None if known is None else known.dense, c_old, c_old, c, c, schur)
             matrix = Bordered.whole(c, whole)
         else:
@@ -312,8 +335,12 @@ class Body:
         warm: Solution | None = None,
         equilibrium_tolerance: float = 1e-6,
         history: Solution | FaceMemory | None = None,
+        meet_target: bool = True,
     ) -> Solution:
         """The body under ``load``.
+
+        Where a ``target_error`` was asked for, its K are compared with those of a finer mesh, unless ``meet_target`` is
+        False: the solution then has `tip_errors` below the target and may be of a finer ``body`` than this one.
 
         ``history``: the solution, of this or an earlier body, from which the load went on to this one, or its
         ``memory``. Faces with friction begin with its slip and its broken cement, so that the answer is a step of a
@@ -321,8 +348,13 @@ class Body:
         first guess of the contact, by default ``history``; smooth faces have no memory and need nothing else.
 
         Raises OutOfEquilibrium when force or moment do not vanish within the tolerance, relative to the loads' size;
-        `faces.NotConverged` when the contact of crack faces does not settle.
+        `faces.NotConverged` when the contact of crack faces does not settle; `TargetMissed` when no mesh meets the
+        target.
         """
+        target = self.asked.target_error
+        if target is not None and meet_target and len(self.cracks.tips):
+            rough = self.solve(load, warm, equilibrium_tolerance, history, False)
+            return met(rough, target, lambda body: body.solve(load, warm, np.inf, history, False))
         try:
             return self._solved(load, warm, equilibrium_tolerance, history)
         except NotSolved as failure:

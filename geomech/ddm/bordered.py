@@ -200,6 +200,8 @@ class Bordered:
 
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
         """S ``w`` (n,) or (n, k)."""
+        if "dense" in vars(self):
+            return self.dense @ w
         n, x = self.n_firm, np.zeros((self.n_firm + len(self.loose.corner), *w.shape[1:]))
         x[self.places] = w
         first, last = x[:n], x[n:]

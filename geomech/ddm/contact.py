@@ -76,7 +76,7 @@ def settle_faces(
         respond(closed)
         return FaceAnswer(state["w"], state["traction"], closed, 1)
     warm = history if warm is None and not isinstance(history, FaceMemory) else warm
-    if warm is not None:
+    if warm is not None and warm.body.faces.per == c.per:  # a first guess: nodes of another order have none
         at = c.found_in(warm.body.faces)
         rows = np.zeros((c.n, 2 * c.per), bool)
         rows[at >= 0] = warm.closed.reshape(-1, 2 * c.per)[at[at >= 0]]

@@ -34,8 +34,8 @@ def _ends_at(segments, valence):
 
 
 @_jit
-def straight_on(nodes, segments, crack, surface, size, shut, first, ends, kink, jump):
-    """(n_nodes,) bool: nodes of two segments of one crack that turns by less than ``kink``, rad, with elements, of
+def straight_on(nodes, segments, surface, size, shut, first, ends, kink, jump):
+    """(n_nodes,) bool: nodes of two segments, of one crack or of two, that turn by less than ``kink``, rad, with elements, of
     ``size`` (n_segments,), of which none is ``jump`` times as long as the other, and not both ``shut`` (n_segments,)."""
     out = np.zeros(len(nodes), np.bool_)
     for k in range(len(nodes)):
@@ -43,7 +43,7 @@ def straight_on(nodes, segments, crack, surface, size, shut, first, ends, kink, 
             continue
         one, two = ends[first[k]], ends[first[k] + 1]
         s, r = one // 2, two // 2
-        if crack[s] != crack[r] or (shut[s] and shut[r]) or max(size[s], size[r]) >= jump * min(size[s], size[r]):
+        if (shut[s] and shut[r]) or max(size[s], size[r]) >= jump * min(size[s], size[r]):
             continue
         p, q = segments[s, 1 - one % 2], segments[r, 1 - two % 2]
         ux, uy = nodes[k, 0] - nodes[p, 0], nodes[k, 1] - nodes[p, 1]

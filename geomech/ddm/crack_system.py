@@ -14,10 +14,13 @@ import numpy as np
 
 from .bordered import LOSS, SINGULAR, Bordered, BorderedFactor
 from .factor import Factor
+from .held_factor import HeldFactor
 from .work import Work
 
 #: Reciprocal condition of S below which contact is not built on its inverse.
 _SAFE = 1e-11
+#: From so many unknowns on, of which less than this part is held, contact goes by the factors of S.
+WORTHWHILE, MOST_HELD = 400, 0.4
 #: Factors for so many sets of free unknowns are kept.
 _KEPT = 8
 
@@ -78,11 +81,14 @@ class CrackSystem:
         reaction[at] = (right - self.matrix @ w)[at]
         return w, reaction
 
-    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor]:
+    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | HeldFactor]:
         """The unknowns that are not held (indices) and factors of their equations."""
         free, moving = np.flatnonzero(~rows.held), np.flatnonzero(rows.mixed)
         if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
             return free, self.open_factor
+        few = self.n >= WORTHWHILE and self.n - len(free) < MOST_HELD * self.n and not rows.spring.any()
+        if few and self.open_factor is not None:
+            return free, HeldFactor(rows, self.open_factor, self, SINGULAR)
         whole = self.matrix.dense
         matrix = whole[np.ix_(free, free)]
         if len(moving):
@@ -131,10 +137,14 @@ class CrackSystem:
             self._work.crack_factorisations += 1
         return self._factors[key]
 
-    def _inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
+    def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
         """(n, len(unknowns)) columns of S⁻¹; they outlast the load."""
         missing = unknowns[self._column_at[unknowns] < 0]
         if len(missing):
+            # Of whole elements: many columns take little more time than one, and neighbours will be asked for.
+            width = 2 * self.matrix.elements.per
+            missing = (np.unique(missing // width)[:, None] * width + np.arange(width)).ravel()
+            missing = missing[self._column_at[missing] < 0]
             right = np.zeros((self.n, len(missing)), order="F")
             right[missing, np.arange(len(missing))] = 1.0
             self._column_at[missing] = self._columns.shape[1] + np.arange(len(missing))
@@ -145,7 +155,7 @@ class CrackSystem:
         """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; mostly the same faces stay closed for long."""
         key = at.tobytes()
         if self._held_now is None or self._held_now[0] != key:
-            columns = self._inverse_columns(at)
+            columns = self.inverse_columns(at)
             factor = Factor(columns[at], "closed faces leave a part of the body without hold")
             self._held_now = key, columns, factor
         return self._held_now[1:]

@@ -2,7 +2,7 @@
 
 Estimates from one solution alone (decay of its coefficients, order p against p−1) follow the error of K only within
 factors of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ.
-One order more, graded one step deeper, sees what is there.
+One order more, graded one step deeper, sees what is there; but for what the chords of curved walls do (`chords`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import automatic
+from .chords import chord_errors
 from .grading import Grading, ungraded
 from .mesh import interior_angles, wedges
 
@@ -27,6 +28,8 @@ _log = logging.getLogger(__name__)
 SAFETY = 2.0
 #: An estimated error above this part of the largest K is told to the log.
 WORTH_A_WARNING = 0.01
+#: K below this part of the stress on closed cracks times the root of their length is no K.
+ROUND_OFF = 1e-11
 
 
 def tip_errors(solution: Solution) -> np.ndarray:
@@ -39,7 +42,7 @@ def tip_errors(solution: Solution) -> np.ndarray:
     other = body.remeshed(automatic.finer(body.settings)).solve(
         solution.load, equilibrium_tolerance=np.inf, history=solution.began
     )
-    errors = SAFETY * np.abs(factors(other) - k) + floor(body) * largest(k)
+    errors = SAFETY * (np.abs(factors(other) - k) + chord_errors(solution)) + floor(body) * largest(k)
     warn(errors, k)
     return errors
 
@@ -52,6 +55,11 @@ def factors(solution: Solution) -> np.ndarray:
 def largest(k: np.ndarray) -> float:
     """The largest √(K_I² + K_II²) of (n_tips, 2) factors: what errors are relative to."""
     return float(np.hypot(*k.T).max(initial=0.0))
+
+
+def negligible(solution: Solution) -> float:
+    """Pa √m: K that is round-off of the stress on the cracks, where faces in contact let none of it reach the tips."""
+    return ROUND_OFF * float(np.abs(solution.face_load).max(initial=0.0)) * float(np.sqrt(solution.body.faces.length.sum()))
 
 
 def warn(errors: np.ndarray, k: np.ndarray) -> None:

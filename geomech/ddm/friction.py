@@ -28,6 +28,7 @@ from .crack_system import CrackSystem, Rows
 from .face_laws import FaceLaws, FaceMemory, FaceStates, Released
 from .faces import NotConverged
 from .factor import Factor
+from .held_factor import HeldFactor
 from .iterative import Iterated, IterativeCrackSystem
 from .work import Work
 
@@ -48,7 +49,8 @@ class FaceEquations:
 
     def __init__(self, system: CrackSystem | IterativeCrackSystem, laws: FaceLaws, work: Work):
         self.system, self.laws, self._work = system, laws, work
-        self._factors: dict[bytes, tuple[np.ndarray, Factor | Iterated]] = {}
+        self._factors: dict[bytes, tuple[np.ndarray, Factor | HeldFactor | Iterated]] = {}
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
 
     def solve(
         self, right: np.ndarray, states: FaceStates, memory: FaceMemory, limit: np.ndarray | None = None
@@ -63,10 +65,15 @@ class FaceEquations:
         w[~held] = 0.0
         bound = laws.held_by_cohesion(memory.broken) if limit is None else limit
         bound = np.where(states.way != 0, bound, 0.0)  # it may be infinite where nothing slips
+        free, factor = self._factor(states, limit is not None)
+        if isinstance(factor, HeldFactor):
+            extra[t] = states.way * bound
+            w, reaction = factor.respond(self._opened(right, factor), extra, w)
+            reaction[t] = np.where(states.way != 0, -(extra[t] + slides * reaction[a]), reaction[t])
+            return w, reaction
         extra[t] = states.way * bound + slides * right[a]
         extra[a] += spring[a] * laws.aperture
         extra[t] -= spring[t] * memory.rest
-        free, factor = self._factor(states, limit is not None)
         pull = s @ w if w.any() else np.zeros_like(w)
         known = right + extra - pull
         known[t] -= slides * pull[a]
@@ -85,6 +92,13 @@ class FaceEquations:
         slipping = states.way != 0
         reaction[t[slipping]] = -(states.way * bound + slides * reaction[a])[slipping]
         return w, reaction
+
+    def _opened(self, right: np.ndarray, factor: HeldFactor) -> np.ndarray:
+        """S⁻¹ ``right``, for one load after the other."""
+        if self._last is None or self._last[0] is not right:
+            self._work.back_substitutions += 1
+            self._last = right, factor.open.solve(right)
+        return self._last[1]
 
     def tangent(self, right: np.ndarray, states: FaceStates) -> np.ndarray:
         """(n, k) change of the jumps per change of ``right`` (n, k) while no node changes state."""

@@ -138,7 +138,10 @@ class Grading:
         return max(1, self._at_kink(turn, KINK_ERROR) + self.layers - KINK_LAYERS)
 
     def at_node(self, wedges: np.ndarray, where: str) -> int:
-        """At a junction ("crack") or "mouth" whose faces enclose ``wedges`` (n,) of rock, rad, for the target."""
+        """At a junction ("crack") or, for the target, at a "mouth" whose faces enclose ``wedges`` (n,) of rock, rad.
+        Without a target a junction gets what a kink about its widest wedge does, and no fewer than any node."""
+        if self.target is None:
+            return max(self.layers, self.at_kink(float(max(wedges, default=0.0)) - math.pi, False))
         return max((self.needed(float(angle), where) for angle in wedges), default=0)
 
     def finest(self, point: np.ndarray, length: float, extent: float) -> float:

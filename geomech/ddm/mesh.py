@@ -295,16 +295,16 @@ def _cracks(cracks: Cracks, settings: DdmSettings, grading: Grading, extent: flo
 def _node_layers(cracks: Cracks, size: np.ndarray, grading: Grading, edges: np.ndarray) -> np.ndarray:
     """(n_segments, 2) graded layers at the start and end of every segment; ``size`` its element length."""
     layers = np.zeros((cracks.n_segments, 2), int)
-    closed, crack, surface = _closed(cracks), cracks.crack, cracks.surface
+    closed, surface = _closed(cracks), cracks.surface
     first, ends = ends_at(cracks)
     plain = (cracks.valence == 0) | ((cracks.valence == 1) & ~surface)
     if grading.target is None:
         nodes, segments = np.ascontiguousarray(cracks.nodes), np.ascontiguousarray(cracks.segments, dtype=np.int64)
         # Well below what counts, which round-off does not decide here.
-        plain |= straight_on(nodes, segments, crack, surface, size, closed, first, ends, 0.9 * KINK, 0.9 * JUMP)
+        plain |= straight_on(nodes, segments, surface, size, closed, first, ends, 0.9 * KINK, 0.9 * JUMP)
     for node in np.flatnonzero(~plain).tolist():
         here = [divmod(end, 2) for end in ends[first[node] : first[node + 1]].tolist()]
-        if len(here) != 2 or surface[node] or crack[here[0][0]] != crack[here[1][0]]:
+        if len(here) != 2 or surface[node]:
             deep = _layers_at(cracks, node, edges, grading)
             for at in here:
                 layers[at] = deep
@@ -342,7 +342,7 @@ def _closed(cracks: Cracks) -> np.ndarray:
 
 def _layers_at(cracks: Cracks, node: int, edges: np.ndarray, grading: Grading) -> int:
     """Graded layers at a junction or mouth."""
-    if grading.target is None:
+    if grading.target is None and cracks.surface[node]:
         return grading.layers
     return grading.at_node(wedges(cracks, node, edges), "mouth" if cracks.surface[node] else "crack")
 

@@ -166,6 +166,8 @@ class _Run:
         else:
             load = self._load_at(factor, body.cracks)
             solution = body.solve(load, warm=self.solution, history=history)
+            if body is self.body:  # a finer one may meet the target error
+                self.body = solution.body
             tips = solution.tips.copy()
             tips["angle"], tips["k_eq"] = judged(solution, self.growth, self.material)
         self._last = factor, solution, history, tips
@@ -203,7 +205,7 @@ class _Run:
         def excess(factor: float) -> float:
             nonlocal found
             found = self._drives(factor)
-            return self.drive - 1
+            return self.drive - 1 if abs(self.drive - 1) > PRECISION else 0.0
 
         low = high = None
         factor = min(self.factor or 1.0, self.max_factor)

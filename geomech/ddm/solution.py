@@ -37,7 +37,8 @@ class Solution:
 
     ``jumps`` (n_unknowns,) are slip and opening at the collocation nodes of the crack elements, times 2μ, ``closed``
     which openings are used up; ``solves`` counts the contact's passes. ``memory`` is what rough faces keep for the next
-    load and ``began`` what they had from the last (None: all faces are smooth).
+    load and ``began`` what they had from the last (None: all faces are smooth); ``face_load`` (n_unknowns,) what the load
+    brings to closed faces, Pa.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class Solution:
         self.closed, self.memory, self.began = answer.closed, answer.memory, answer.began
         self._applied, self._eliminated = applied, eliminated
         self.jumps, self._traction = answer.jumps, answer.traction
-        self._boundary_load, self._face_load, self._imposed = boundary_load, face_load, imposed
+        self._boundary_load, self.face_load, self._imposed = boundary_load, face_load, imposed
         self._edge_density = edge_density
 
     @property
@@ -67,7 +68,7 @@ class Solution:
     def scaled(self, load: BodyLoad, factor: float) -> Solution:
         """What the body answers to the ``load``, which is ``factor`` (positive) times this one, where it `scales`."""
         answer = FaceAnswer(factor * self.jumps, factor * self._traction, self.closed, 0)
-        parts = (factor * x for x in (self._boundary_load, self._face_load, self._imposed))
+        parts = (factor * x for x in (self._boundary_load, self.face_load, self._imposed))
         edge_density = None if self._edge_density is None else factor * self._edge_density
         return Solution(self.body, apply(load, self.body), factor * self._eliminated, answer, *parts, edge_density)
 
@@ -219,7 +220,7 @@ class Solution:
     @property
     def closed_traction(self) -> np.ndarray:
         """(n_crack_unknowns,) Pa: the same of this load, t₀, as `Body.closed_traction` has it."""
-        return self._face_load - self.body._cg @ self._eliminated if self.jumps.size else np.zeros(0)
+        return self.face_load - self.body._cg @ self._eliminated if self.jumps.size else np.zeros(0)
 
     def work_at_cracks(self, closed: np.ndarray) -> float:
         """J/m ∫ t₀·[u] ds: by reciprocity the work of the load that brings t₀, ``closed`` (n_crack_unknowns,), to closed
@@ -239,7 +240,7 @@ class Solution:
         follows = body._w @ self.jumps if self.jumps.size else np.zeros_like(self._u)
         on_boundary = body._outside.times(self._x + follows, lifted=follows) + self._boundary_load
         on_faces = (
-            body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self._face_load - self._traction
+            body.crack_system.matrix @ self.jumps + body._cg @ (self._x + follows) + self.face_load - self._traction
         )
         scale = self._acting
         left = max((float(np.abs(x).max()) for x in (on_boundary, on_faces) if x.size), default=0.0)
@@ -253,7 +254,7 @@ class Solution:
         """Pa: the largest traction of loads at collocation nodes of boundary and cracks, of fluid and contact on crack
         faces, or the stress 2μ u/L that an imposed displacement u means over the body's extent L."""
         body, imposed = self.body, self._imposed
-        on_boundary, on_faces = self._boundary_load, self._face_load
+        on_boundary, on_faces = self._boundary_load, self.face_load
         if imposed.size:
             # What supports impose is among the loads, as the jump it is at their ends: the finer the elements there,
             # the larger.

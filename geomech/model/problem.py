@@ -128,7 +128,7 @@ class DdmSettings:
     Kinks get more than the ``grading_layers``, by their angle: 2 leave an error of 5e-4 in K, every one more halves it.
 
     With ``target_error``, the relative error of K that is asked for, order, elements and grading follow from it
-    instead. With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs
+    instead, and solutions are compared with those of finer meshes until they meet it. With ``grading_error`` each corner, kink, junction and mouth gets the layers that this error of K needs
     there, in place of ``grading_layers`` everywhere.
     """
 
@@ -216,7 +216,8 @@ STOPS = ("initiation", "birth", "coalescence", "self", "daylighting", "split", "
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``.
+    """Load stepping. The scene ends at ``end_time`` s or at the first event whose kind is in ``stop_at``; steps to
+    "events" also at a mechanism, after which no load has an equilibrium that they could look for.
 
     ``stepping`` "fixed": steps of `DdaSettings.time_step`; "events": static steps that end where a tip has just reached
     its toughness or, as ``events`` says, a contact or a crack face changes its state, otherwise as long as blocks may
@@ -273,6 +274,13 @@ class Problem:
     monitors: dict[str, tuple[int, tuple[float, float]]] = field(default_factory=dict)
     origin: tuple[float, float] = (0.0, 0.0)  # world coordinates of (0, 0), m
     endless: EndlessRock | None = None
+
+    @property
+    def ends_at(self) -> tuple[str, ...]:
+        """The kinds of events that end the run: those of ``run.stop_at``, a split of rock without an end, which nothing
+        holds, and a mechanism where steps lead to events."""
+        split = ("split",) if self.endless is not None else ()
+        return (*self.run.stop_at, *split, *(("mechanism",) if self.run.stepping == "events" else ()))
 
     @property
     def inventory(self) -> str:

@@ -62,7 +62,8 @@ def motion_summary(cycle: Cycle) -> dict[str, Any]:
 
 def energy_summary(cycle: Cycle) -> dict[str, float]:
     """The energy budget of the run, J/m, ``budget_residual`` as a part of all energy turned over: for ``summary.json``.
-    Empty without one."""
+    Empty without one. ``unpaid_toughness``: what rock took in a run in motion as it broke and blocks, which store no
+    bending, did not give."""
     names = (
         "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",
         "friction_loss",
@@ -70,7 +71,11 @@ def energy_summary(cycle: Cycle) -> dict[str, float]:
         "uneven_work", "set_free_energy", "crack_elastic", "crack_friction", "crack_bond_loss", "fracture_energy",
         "runaway_loss", "parting_energy", "toughness_energy", "crack_residual", "budget_residual",
     )  # fmt: skip
-    return {name: float(cycle.statistics[name]) for name in names if name in cycle.statistics}
+    found = {name: float(cycle.statistics[name]) for name in names if name in cycle.statistics}
+    if found.get("toughness_energy") and "runaway_loss" not in found:
+        given = found["fracture_energy"] + found["parting_energy"]
+        found["unpaid_toughness"] = max(0.0, found["toughness_energy"] - given)
+    return found
 
 
 def key_block_summary(cycle: Cycle, problem: Problem) -> list[dict[str, Any]]:

@@ -207,7 +207,7 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
     lines += limits_line(summary.get("shortened_steps", []), summary.get("load_steps", 0))
     if "mechanism" in summary.get("first", {}):
         lines.append(f"  {NO_ANSWER}")
-    if summary.get("end") in STOPS:
+    if summary.get("end") in STOPS and summary["end"] != "mechanism":
         lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")
     return [*lines, f"  {folder}"]
 

@@ -53,6 +53,11 @@ def add_energy(page: Page, energy: Mapping[str, float]) -> None:
     said = []
     if energy.get("toughness_energy"):
         said.append(f"Rock takes {energy['toughness_energy']:.4g} J/m, K_Ic²/E' of all new crack, as it breaks.")
+    if energy.get("unpaid_toughness"):
+        said.append(
+            f"Of that blocks did not give {energy['unpaid_toughness']:.4g} J/m: they store no bending, and cracks that "
+            "it opens take no energy from the motion."
+        )
     if energy.get("budget_residual") is not None:
         said.append(
             f"Of all energy turned over, of blocks and cracks together, {abs(energy['budget_residual']):.1e} is not "

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from geomech.coupling import cycles
-from geomech.coupling.budget_watch import BudgetWatch
+from geomech.coupling.budget_watch import UNPAID, BendingWatch, BudgetWatch
 from geomech.dda.energy import GAIN
-from geomech.model import Blocks, Cracks, DdaSettings, History, JointLaw, Loads, Material, Problem, RunSettings
+from geomech.output.condition import energy_summary
+from geomech.model import Blocks, Cracks, DdaSettings, GrowthSettings, History, JointLaw, Loads, Material, Problem, RunSettings
 
 
 def test_a_share_beyond_the_bound_is_told_once(caplog):
@@ -21,6 +22,45 @@ def test_a_share_beyond_the_bound_is_told_once(caplog):
             watch.check(share, time)
     (line,) = [record.getMessage() for record in caplog.records]
     assert line.startswith("t = 3 s: -0.015 of all energy") and "shorten" in line
+
+
+def test_cracks_that_blocks_did_not_pay_for_are_told_of_once(caplog):
+    watch = BendingWatch()
+    with caplog.at_level(logging.WARNING):
+        for time, toughness, spent in ((1.0, 0.0, 0.0), (2.0, 4.0, 0.0), (3.0, 8.0, 4.0), (4.0, 8.0, 7.9 - UNPAID),
+                                       (5.0, 8.0, 2.0), (6.0, 9.0, 0.0)):  # fmt: skip
+            watch.check(toughness, spent, time)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert line.startswith("t = 5 s: of the 8 J/m that cracks took") and "blocks gave 2:" in line
+
+
+def notched_beam(height: float, speed: float) -> Problem:
+    """A beam with a notch below its middle, that comes down on two supports near its ends."""
+    beam = np.array([[-1.0, height], [1.0, height], [1.0, height + 0.4], [-1.0, height + 0.4]])
+    supports = [np.array([[x, -0.2], [x + 0.1, -0.2], [x + 0.1, 0.0], [x, 0.0]]) for x in (-0.85, 0.75)]
+    return Problem(
+        title="a dropped beam",
+        blocks=Blocks.from_polygons([beam, *supports], fixed=[False, True, True]),
+        cracks=Cracks.from_polylines(
+            [np.array([[0.0, height], [0.0, height + 0.1]])], block=[0], surface=[(True, False)]
+        ),
+        materials=(Material("rock", 20e9, 0.2, density=2400.0, k_ic=1e6),),
+        joints=(JointLaw("joint", friction_angle=0.5),),
+        loads=Loads(gravity=History.constant([0.0, -speed])),
+        dda=DdaSettings(time_step=1e-4, dynamic_factor=1.0),
+        growth=GrowthSettings(increment=0.02, min_increment=2e-3),
+        run=RunSettings(end_time=2e-3, stop_at=()),
+    )
+
+
+def test_a_crack_that_bending_opens_in_motion_is_told_of(caplog):
+    """A weight that comes at once, forty times the earth's: the block does not bend and gives its crack nothing."""
+    with caplog.at_level(logging.WARNING):
+        last = list(cycles(notched_beam(0.0, 400.0)))[-1]
+    assert last.statistics["toughness_energy"] > 0
+    assert last.statistics["fracture_energy"] < 0.1 * last.statistics["toughness_energy"]
+    assert sum("do not store bending" in record.getMessage() for record in caplog.records) == 1
+    assert energy_summary(last)["unpaid_toughness"] > 0.9 * last.statistics["toughness_energy"]
 
 
 def test_a_beam_that_turns_far_in_a_static_step_is_told_of(caplog):

@@ -62,6 +62,15 @@ def test_a_run_may_end_at_a_mechanism():
     assert seen[-1].number < 10 and seen[-1].events[-1].kind == "mechanism"
 
 
+def test_steps_to_events_end_at_a_mechanism(caplog):
+    """Whatever they are to stop at: no load has an equilibrium behind it."""
+    problem = on_a_slope(30.0, 20.0, stepping="events", stop_at=(), longest_step=0.01)
+    with caplog.at_level(logging.WARNING, "geomech"):
+        seen = list(cycles(problem))
+    assert seen[-1].events[-1].kind == "mechanism" and seen[-1].state.time < 0.15
+    assert "the run ends: no load has an equilibrium" in caplog.text
+
+
 @pytest.mark.parametrize("friction_deg", [31.0, 40.0])
 def test_what_friction_holds_is_no_mechanism(friction_deg):
     assert not [event for cycle in cycles(on_a_slope(30.0, friction_deg)) for event in cycle.events]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.model import Cracks, GrowthSettings, JointLaw, Material
+from geomech.model import Cracks, DdmSettings, GrowthSettings, JointLaw, Material
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=1e6)
 HALF = 10e-3
@@ -183,3 +183,21 @@ def test_a_step_of_a_smooth_path_takes_little_more_than_one_body(monkeypatch):
     assert len(steps) == 16 and all((step.tips["k_ii"][step.tips["grown"] > 0] != 0).all() for step in steps)
     assert len(made) <= 23
     assert len(solved) == len(made)
+
+
+@pytest.mark.parametrize("law", [None, JointLaw("rough", friction_angle=0.4)])
+def test_every_step_meets_a_target_error(law):
+    """Open slots and a rough crack: meshes of other orders on the way, whose faces begin anew or with their memory."""
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+    lines = [np.array([[-0.1, -0.1], [0.1, 0.1]]), np.array([[0.2, -0.05], [0.4, 0.1]])]
+    cracks = Cracks.from_polylines(lines[:1] if law else lines)
+    load = ddm.BodyLoad(remote_stress=[-1e4, -1e6, 0] if law else [0, 1e6, 0])
+    growth = GrowthSettings(increment=0.02)
+    more = {} if law is None else {"face_laws": [law]}
+    steps = ddm.propagate(
+        [square], cracks, Material("rock", 17e9, 0.21, k_ic=1e6), load, growth, DdmSettings(target_error=1e-3),
+        control="toughness", max_steps=2, **more,
+    )  # fmt: skip
+    for step in steps:
+        k = np.hypot(step.solution.tips["k_i"], step.solution.tips["k_ii"]).max()
+        assert step.solution.tip_errors.max() <= 1e-3 * k and step.growth is not None

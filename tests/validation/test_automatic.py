@@ -117,14 +117,18 @@ def test_references_agree_with_closed_forms_and_tables(exact):
 
 
 @pytest.mark.parametrize("target", [1e-3, 1e-5])
-def test_target_is_reached(exact, target, caplog):
-    """The error stays below the target and below what `tip_errors` says, but for the last digits of the references."""
+def test_target_is_reached(exact, target):
+    """The error stays below the target and below what `tip_errors` says, but for the last digits of the references; or
+    the target is refused, with a solution that says how good it is."""
     for name, (loops, cracks, load) in BATTERY.items():
-        solution = ddm.solve_to(loops, cracks, ROCK, load, target)
+        try:
+            solution = ddm.solve_to(loops, cracks, ROCK, load, target)
+        except ddm.TargetMissed as missed:
+            assert name in HARDEST and missed.reached == said(missed.solution) > target
+            solution = missed.solution
         error = off(solution, exact[name])
         assert error < max(target, HARDEST.get(name, 0)), name
         assert error < said(solution) + 1e-7, name
-        assert said(solution) <= target or (name in HARDEST and "not to the target" in caplog.text), name
 
 
 def test_estimates_of_any_solution(exact):
@@ -137,11 +141,84 @@ def test_estimates_of_any_solution(exact):
 
 
 def test_meshes_for_a_target_without_a_second_one(exact):
-    """`DdmSettings(target_error=…)` alone: the median error is a tenth of the target, the worst ten times it."""
+    """The first mesh of `DdmSettings(target_error=…)`: the median error is a tenth of the target, the worst ten times
+    it."""
     for target in (1e-2, 1e-4, 1e-6):
         settings = DdmSettings(target_error=target)
-        errors = [off(ddm.Body(*BATTERY[n][:2], ROCK, settings).solve(BATTERY[n][2]), exact[n]) for n in BATTERY]
+        bodies = {n: ddm.Body(*BATTERY[n][:2], ROCK, settings) for n in BATTERY}
+        errors = [off(bodies[n].solve(BATTERY[n][2], meet_target=False), exact[n]) for n in BATTERY]
         assert np.median(errors) < 0.5 * target and max(errors) < max(10 * target, 2e-5), errors
+
+
+#: Eight cracks at random that cross and nearly meet (ends, in pairs): at 1e-2 the first mesh is 2 % off.
+NETWORK = [
+    ([0.2141, 0.2939], [0.8623, 0.3926]),
+    ([0.1608, 0.2156], [0.5773, 0.5334]),
+    ([1.1051, 0.5728], [0.8698, 0.6928]),
+    ([0.5986, -0.0218], [0.7501, 0.6818]),
+    ([0.7352, -0.0077], [0.6246, 0.2536]),
+    ([-0.1633, 0.7633], [0.2667, 0.9371]),
+    ([-0.2212, 0.8262], [0.2390, 1.1313]),
+    ([0.8253, 0.5895], [0.8287, 0.9809]),
+]
+
+
+def network():
+    """`NETWORK`, with nodes where cracks cross."""
+    cracks = []
+    for a, d in ((np.array(p), np.array(q) - np.array(p)) for p, q in NETWORK):
+        at = {0.0, 1.0}
+        for b, e in ((np.array(p), np.array(q) - np.array(p)) for p, q in NETWORK):
+            across = d[0] * e[1] - d[1] * e[0]
+            if across:
+                s, t = (((b - a)[0] * v[1] - (b - a)[1] * v[0]) / across for v in (e, d))
+                at |= {s} if 0 < s < 1 and 0 < t < 1 else set()
+        cracks.append([a + s * d for s in sorted(at)])
+    return lines(*cracks, join=True)
+
+
+OPEN = [((0, 90), math.inf), ((0, 45), math.inf), ((0, 30), math.inf), ((0, 15, 30), math.inf), ((0, 45, 90), math.inf)]
+
+
+@pytest.mark.parametrize(("angles", "aperture"), [*OPEN, ((0, 90), 0.0), ((0, 45), 0.0), ((0, 30), 0.0)])
+def test_nodes_that_cracks_share(angles, aperture):
+    """Arms from one point, cracks of their own, of which the last is short: at default settings right to 3e-4 (two
+    layers whatever the angle: 8e-4 to 7e-3), and as one line would be."""
+    arms = [np.array([[0, 0], [math.cos(math.radians(a)), math.sin(math.radians(a))]]) for a in angles]
+    arms[-1] = 0.2 * arms[-1]
+    cracks = Cracks.from_polylines(arms, aperture=aperture, join=True)
+    load = ddm.BodyLoad(remote_stress=[0.6, 1.0, 0.3])
+    fine = replace(for_target(DdmSettings(target_error=1e-6)), order=8)
+    best = factors(ddm.Body([], cracks, ROCK, fine).solve(load, meet_target=False))
+    tolerance = 3e-4 if aperture else 2e-3
+    assert off(ddm.Body([], cracks, ROCK).solve(load), best) < tolerance
+    if len(arms) == 2:
+        line = Cracks.from_polylines([np.array([arms[0][1], arms[0][0], arms[1][1]])], aperture=aperture)
+        assert off(ddm.Body([], line, ROCK).solve(load), best) < tolerance
+
+
+def test_a_target_that_settings_ask_for_is_met():
+    """By a finer mesh where the first one misses it."""
+    best = ddm.solve_to([], network(), ROCK, MIXED, 1e-5)
+    for target in (1e-2, 1e-4):
+        body = ddm.Body([], network(), ROCK, DdmSettings(target_error=target))
+        assert target < 1e-3 or off(body.solve(MIXED, meet_target=False), factors(best)) > target
+        solution = body.solve(MIXED)
+        assert off(solution, factors(best)) < said(solution) + 1e-5 and said(solution) <= target
+        # The next body begins with the mesh that was needed.
+        assert ddm.Body([], network(), ROCK, body.asked, solution.body).settings == solution.body.settings
+
+
+def test_a_target_that_no_mesh_meets_is_refused():
+    """Closed faces that part somewhere on an element: K gains a digit an order, not more."""
+    cracks = Cracks.from_polylines([np.array([[-1, 0], [0, 0.1], [1, 0]])])
+    bending = ddm.BodyLoad(remote_stress=[1.0, 0.1, -0.4])
+    with pytest.raises(ddm.TargetMissed, match=r"not to the target_error of 1.0e-11; the worst are at the tip at") as one:
+        ddm.Body([], cracks, ROCK, DdmSettings(target_error=1e-11)).solve(bending)
+    with pytest.raises(ddm.TargetMissed) as other:
+        ddm.solve_to([], cracks, ROCK, bending, 1e-11)
+    for missed in (one.value, other.value):
+        assert 1e-11 < missed.reached == said(missed.solution)
 
 
 @pytest.mark.parametrize("nodes", ["chebyshev", "gauss", "equal"])

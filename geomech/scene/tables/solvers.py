@@ -109,7 +109,8 @@ class DdaTable(Table):
 
 class DdmTable(Table):
     target_error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        None, description="relative error of K asked for; order, elements and grading then follow from it"
+        None, description="relative error of K asked for; order, elements and grading then follow from it, every solution is "
+        "compared with that of a finer mesh, and a run ends where no mesh meets it"
     )
     order: Annotated[int, Field(ge=0, le=12)] = Field(4, description="polynomial order of the elements")
     nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points of an element")
@@ -187,8 +188,8 @@ class RunTable(Table):
     stop_at: Annotated[tuple[Literal[STOPS], ...], Strict(False)] = Field(
         ("coalescence", "split"),
         description="the run ends at the first event of these kinds; a mechanism is when blocks of a static run slide or turn "
-        "without bound. Of the contacts of two blocks, or the faces of a crack, the first that opens is an opening, the last "
-        "one a parting; the first that slips a slip, the last one a sliding; what meets a closure, what sticks again a stick, "
+        'without bound, and ends stepping "events" whatever is said here. Of the contacts of two blocks, or the faces of a '
+        "crack, the first that opens is an opening, the last one a parting; the first that slips a slip, the last one a sliding; what meets a closure, what sticks again a stick, "
         'a lost bond a debonding: these need stepping "events", or run.events',
     )
     stepping: Literal["fixed", "events"] = Field(
