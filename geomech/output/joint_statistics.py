@@ -45,6 +45,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
     zone = np.array(drawing.zones)[free]
     rock = {(): shapely.union_all(polygons)}
     crack_set = np.array([name.rpartition(" ")[0] for name in cracks.names])
+    partings = {parting.name: parting for parting in drawing.jointed.cutting.partings}
     entries = []
     for joint in drawing.jointed.joints:
         name = joint.name.removeprefix(JOINT)
@@ -60,6 +61,8 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
             "name": name,
             "kind": "drawn" if shape is None else shape.kind,
             **_got(joint, region, shape),
+            "cutting_traces": partings[joint.name].cutting,
+            "cut_length_m": partings[joint.name].length,
             "cracks": int(own.sum()),
             "crack_length_m": float(cracks.lengths[own[cracks.crack]].sum()) if cracks.n_segments else 0.0,
         }
@@ -102,11 +105,13 @@ def _got(joint: Any, region: Any, shape: Any) -> dict[str, Any]:
 
 
 def table(entries: Sequence[dict[str, Any]]) -> list[str]:
-    """``entries`` side by side with what was asked, a row each."""
+    """``entries`` side by side with what was asked, a row each: how many traces there are, how many of them part
+    blocks, and along what length."""
     if not entries:
         return []
     wide = max(8, *(len(entry["name"]) for entry in entries))
-    rows = [f"{'joints':{wide}}       " + "".join(f" {heading:>14}" for heading, *_ in _COLUMNS) + f"{'traces':>8}"]
+    rows = [f"{'joints':{wide}}       " + "".join(f" {heading:>14}" for heading, *_ in _COLUMNS)]
+    rows[0] += f"{'traces':>8}{'cutting':>9}{'cut m':>9}"
     for entry in entries:
         wanted = entry.get("asked")
         if wanted is not None:
@@ -114,7 +119,7 @@ def table(entries: Sequence[dict[str, Any]]) -> list[str]:
         rows.append(
             f"{'' if wanted is not None else entry['name']:{wide}}  got  "
             + _row(entry, wanted)
-            + f"{entry['traces']:8d}"
+            + f"{entry['traces']:8d}{entry['cutting_traces']:9d}{entry['cut_length_m']:9.4g}"
         )
         if entry.get("ends_on"):
             rows[-1] += f"  (ends on {', '.join(entry['ends_on'])})"

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..model import Blocks, Cracks
 from ..shapes import EdgeLine, Flaw, Joint, Mark, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
+from ..shapes.curves import Chords, ended_on
 from ..shapes.parts import JOINT
 from .errors import Fault
 from .field_files import read_traces
@@ -90,6 +91,7 @@ class _Parts:
     marks: list[Mark] = field(default_factory=list)
     sources: dict[tuple[str, int | str], tuple[Path, str]] = field(default_factory=dict)
     only_in: dict[int, Sequence[str]] = field(default_factory=dict)  # names of zones that a joint cuts
+    chords: Chords = field(default_factory=Chords.none)  # that stand for curves of models and files
 
     def add(self, read, source: Callable[[str, int], tuple[Path, str]], zones: Sequence[str] = ()) -> None:
         """What a file holds: zones, traces, joints (that cut the named ``zones`` alone), marks, and edges where it has
@@ -104,6 +106,7 @@ class _Parts:
             for k, item in enumerate(own):
                 self.sources[part, len(mine)] = source(part, k)
                 mine.append(item)
+        self.chords = Chords.joined([self.chords, read.chords])
         for part, mine, own in (("joints", self.joints, read.joints), ("marks", self.marks, read.marks)):
             for k, item in enumerate(own):
                 self.sources.setdefault((part, item.name), source(part, k))
@@ -123,6 +126,7 @@ class _Parts:
 
         self.zones = [replace(zone, loops=tuple(loop - origin for loop in zone.loops)) for zone in self.zones]
         self.traces, self.joints, self.marks = lines(self.traces), lines(self.joints), lines(self.marks)
+        self.chords = self.chords.moved(origin)
         x, y = origin.tolist()
         self.edges = [
             replace(e, start=(e.start[0] - x, e.start[1] - y), end=(e.end[0] - x, e.end[1] - y)) for e in self.edges
@@ -167,6 +171,7 @@ def draw(
             )
         )
         return None
+    parts.traces = ended_on(parts.traces, parts.chords)
     _refuse_two_of_a_name(parts, place, faults)
     known = list(dict.fromkeys(zone.name for zone in parts.zones))
     for k, entry in enumerate(geometry.traces):
@@ -261,7 +266,7 @@ def _assembled(
         for k, only in parts.only_in.items():
             parts.joints[k] = within(parts.joints[k], [zone for zone in parts.zones if zone.name in only])
         _tell_outside(geometry, parts, place, warnings)
-        cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints)
+        cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints, parts.chords)
     except ShapeError as error:
         counted_from = f"; coordinates count from ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
         # Joints are counted by name: the scene's own, then those of files.
