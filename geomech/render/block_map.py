@@ -66,8 +66,8 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
             axes.add_collection(LineCollection(edges[own], colors=colour[name], linewidths=thin, capstyle="round"))
         label = name.removeprefix(JOINT)
         if name in statistics:
-            entry = statistics[name]
-            label += f"  {entry['mean_angle_deg']:.0f}°, P21 {entry['p21_per_m']:.2g} m/m²"
+            angle, density = statistics[name]["mean_angle_deg"], statistics[name]["p21_per_m"]
+            label += "  none in the rock" if angle is None else f"  {angle:.0f}°, P21 {density:.2g} m/m²"
         keys.append(Line2D([], [], color=colour[name], lw=2.2, label=f"joints {label}"))
 
     if cracks.n_segments:
