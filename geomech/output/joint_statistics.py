@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from geomech.scene.jointing import asked
+from geomech.shapes.assembly import TOLERANCE
 from geomech.shapes.fracture_statistics import line_statistics, set_statistics
-from geomech.shapes.parts import JOINT
+from geomech.shapes.parts import JOINT, extent_of
+from geomech.shapes.rock_outline import rock_of
 
 #: Columns of the table: heading, key, key of what stands behind a ±.
 _COLUMNS = (
@@ -39,11 +41,10 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
         return []
     geometry = scene.tables.geometry
     shapes = {shape.name: shape for shape in geometry.joint_sets}
-    polygons = np.array(
-        [shapely.Polygon(loops[0], loops[1:]) for loops in map(blocks.loops, np.flatnonzero(free).tolist())]
-    )
-    zone = np.array(drawing.zones)[free]
-    rock = {(): shapely.union_all(polygons)}
+    zone = np.array(drawing.zones)
+    # What the drawing takes to touch the rim ends on it.
+    tolerance = geometry.tolerance_m or TOLERANCE * extent_of([blocks.vertices])
+    rock = {(): rock_of(blocks, np.flatnonzero(free).tolist())}
     crack_set = np.array([name.rpartition(" ")[0] for name in cracks.names])
     partings = {parting.name: parting for parting in drawing.jointed.cutting.partings}
     entries = []
@@ -52,7 +53,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
         shape = shapes.get(name)
         zones = () if shape is None else tuple(shape.zones)
         if zones not in rock:
-            rock[zones] = shapely.union_all(polygons[np.isin(zone, zones)])
+            rock[zones] = rock_of(blocks, np.flatnonzero(free & np.isin(zone, zones)).tolist())
         region = rock[zones]
         if shape is not None and shape.region is not None:
             region = shapely.intersection(region, shapely.Polygon(np.reshape(shape.region, (-1, 2)) - drawing.origin))
@@ -60,7 +61,7 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
         entry = {
             "name": name,
             "kind": "drawn" if shape is None else shape.kind,
-            **_got(joint, region, shape),
+            **_got(joint, region, shape, tolerance),
             "cutting_traces": partings[joint.name].cutting,
             "cut_length_m": partings[joint.name].length,
             "cracks": int(own.sum()),
@@ -78,14 +79,15 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
     return entries
 
 
-def _got(joint: Any, region: Any, shape: Any) -> dict[str, Any]:
-    found = set_statistics(joint, region)
+def _got(joint: Any, region: Any, shape: Any, tolerance: float) -> dict[str, Any]:
+    found = set_statistics(joint, region, tolerance=tolerance)
     out = {
         "traces": found.traces,
         "p10_per_m": found.p10,
         "p20_per_m2": found.p20,
         "p21_per_m": found.p21,
         "mean_length_m": found.mean_length,
+        "mean_length_in_window_m": found.window_length,
         "length_deviation_m": found.seen_length_deviation,
         "spacing_m": found.mean_spacing,
         "spacing_deviation_m": found.spacing_deviation,

@@ -24,6 +24,7 @@ class SetStatistics:
                        traces, their middles
     p21                m/m²: length of trace for each area
     mean_length        m: p21 / p20, the mean of whole traces of which the window cuts some off (Mauldon 1998)
+    window_length      m: the mean of what the region shows of each trace that reaches into it
     seen_length, seen_length_deviation   m: of the traces that lie inside with both ends
     mean_spacing, spacing_deviation      m: between neighbours along the scan-lines
     mean_angle, angle_deviation          rad: of the traces, the mean weighed by their length
@@ -35,6 +36,7 @@ class SetStatistics:
     p20: float
     p21: float
     mean_length: float
+    window_length: float
     seen_length: float
     seen_length_deviation: float
     mean_spacing: float
@@ -54,9 +56,9 @@ class LineStatistics:
     persistence: float
 
 
-def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics:
+def set_statistics(joint: Joint, region, scan_lines: int = 200, tolerance: float = 0.0) -> SetStatistics:
     """Statistics of ``joint`` inside ``region``, (n, 2) or a shapely polygon; ``p10`` and spacings on equidistant
-    ``scan_lines`` at right angles to its mean direction."""
+    ``scan_lines`` at right angles to its mean direction. Ends within ``tolerance`` m of the region's rim are on it."""
     import shapely
 
     area = shapely.Polygon(region) if isinstance(region, np.ndarray) else region
@@ -66,13 +68,13 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics
     kept = length > 0
     if not kept.any():
         nan = float("nan")
-        return SetStatistics(joint.name, 0, 0.0, 0.0, 0.0, *(nan,) * 7)
+        return SetStatistics(joint.name, 0, 0.0, 0.0, 0.0, *(nan,) * 8)
     ends = np.array([line[[0, -1]] for line in joint.lines])[kept]
     inside, length = inside[kept], length[kept]
     mean, off = mean_direction(ends, length)
     at = shapely.points(ends)
     # An end on the rim is where the region stops, not the trace.
-    reach = _ON_ONE_LINE * float(np.hypot(*np.subtract(area.bounds[2:], area.bounds[:2])))
+    reach = max(tolerance, _ON_ONE_LINE * float(np.hypot(*np.subtract(area.bounds[2:], area.bounds[:2]))))
     rim = area.boundary
     shapely.prepare(rim)
     free = shapely.covers(area, at) & ~shapely.dwithin(rim, at, reach)
@@ -89,6 +91,7 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics
         p20=per_area,
         p21=float(length.sum()) / area.area,
         mean_length=float(length.sum()) / area.area / per_area if free.any() else float("nan"),
+        window_length=_mean(length),
         seen_length=_mean(seen),
         seen_length_deviation=_deviation(seen),
         mean_spacing=_mean(between),
