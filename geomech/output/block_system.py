@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from geomech.model import Blocks, Cracks, counted
+from geomech.scene.actions import deepest_pond, said_of_pond
 from geomech.shapes.fracture_statistics import Topology, block_sizes, passing_curve
 from geomech.shapes.rock_bridges import rock_bridges
 
@@ -125,9 +126,17 @@ def _statistics(
     mends = [mend._asdict() for mend in jointed.cutting.mends] if jointed else []
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)
     sizes = block_sizes(area[free], _PASSING)
+    pond = deepest_pond(scene.tables, blocks)
     told = {
         "title": problem.title,
-        "summary": ", ".join([problem.inventory, *([counted(len(bridges), "rock bridge")] if len(bridges) else [])]),
+        "summary": ", ".join(
+            [
+                problem.inventory,
+                *([counted(len(bridges), "rock bridge")] if len(bridges) else []),
+                *([] if pond is None else [f"water {said_of_pond(*pond, problem.origin)}"]),
+            ]
+        ),
+        "ponded_water": None if pond is None else {**pond[0]._asdict(), "time_s": pond[1]},
         "box_m": [low.tolist(), high.tolist()],
         "world_origin_m": list(problem.origin),
         "area_m2": float(area.sum()),

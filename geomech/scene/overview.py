@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..model import Blocks, Cracks, History, counted
-from .actions import force_history, traction_history
+from .actions import deepest_pond, force_history, said_of_pond, traction_history
 from .checks import material_of
 from .drawing import Drawing
 from .endless import rising_history
@@ -31,7 +31,7 @@ def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
         rows.append(("held", f"{count} by edges called {', '.join(map(repr, held))}"))
     rows += _cut("materials", _materials(tables))
     rows += _cut("cracks", _cracks(drawing.cracks))
-    rows += _cut("loads", _loads(tables, drawing.blocks))
+    rows += _cut("loads", _loads(tables, drawing))
     stops = f" or the first of {', '.join(tables.run.stop_at)}" if tables.run.stop_at else ""
     rows.append(("run", f"to {tables.run.end_time_s:g} s{stops}, {_steps(tables)}"))
     # A label stands before the first of its lines.
@@ -99,8 +99,8 @@ def _cracks(cracks: Cracks) -> list[str]:
     return lines
 
 
-def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
-    end, lines = tables.run.end_time_s, []
+def _loads(tables: SceneTables, drawing: Drawing) -> list[str]:
+    end, lines, blocks = tables.run.end_time_s, [], drawing.blocks
     for traction in tables.loads.tractions:
         history = traction_history(traction)
         lines.append(f"{traction.edge}: " + _course(history, end, "Pa", _sense(blocks, traction.edge, history.at(end))))
@@ -121,7 +121,10 @@ def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
     ):
         lines += [f"{text}: {count}"] if count else []
     if tables.loads.water is not None:
-        lines.append(f"water table over {counted(len(tables.loads.water.points), 'point')}")
+        text = f"water table over {counted(len(tables.loads.water.points), 'point')}"
+        pond = deepest_pond(tables, drawing.blocks)
+        text += ", following the ground" if tables.loads.water.follows_ground else ""
+        lines.append(text if pond is None else f"{text}, {said_of_pond(*pond, drawing.origin)}")
     if tables.loads.base is not None:
         lines.append(f"shaking, seen from the {tables.loads.base.frame}")
     if tables.loads.in_situ is not None:

@@ -193,6 +193,11 @@ class WaterTableTable(Table):
     levels_m: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="by how much the whole table is raised at `level_times_s`, m"
     )
+    follows_ground: bool = Field(
+        False,
+        description="the table is never above the ground: in front of a slope it follows it (unset: water stands there "
+        "as a lake that presses on the rock)",
+    )
 
     @model_validator(mode="after")
     def _line(self):
