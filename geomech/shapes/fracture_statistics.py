@@ -12,6 +12,8 @@ from .parts import Joint
 
 #: Traces are on one line when they are this near to it, relative to the region.
 _ON_ONE_LINE = 1e-7
+#: Spacings of lines are taken where at least this part of the longest chord of the region lies between them.
+_LONG_ENOUGH = 0.5
 
 
 @dataclass(frozen=True)
@@ -104,8 +106,8 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200, tolerance: float
 def line_statistics(joint: Joint, region) -> LineStatistics:
     """Of the lines that the straight traces of a parallel set lie on inside ``region``, (n, 2) or a shapely polygon.
 
-    Lines without any trace in the region are not seen. Spacings are taken where the lines pass beside the region's
-    middle.
+    Lines without any trace in the region are not seen. Spacings are taken where the region shows at least half as much
+    of a line between them as it does elsewhere.
     """
     import shapely
 
@@ -133,9 +135,13 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
     start = ends[longest].mean(axis=1)
     chords = shapely.intersection(shapely.linestrings(np.stack([start - step, start + step], axis=1)), area)
     place = np.sort(at[longest])
-    # Beyond the region's own width some lines miss it: their neighbours would seem too far apart.
-    seen = shapely.contains_xy(area, *(middle + place[:, None] * across).T)
-    between = np.diff(place[seen] if seen.sum() > 1 else place)
+    between = np.diff(place)
+    # Where a line would show little of itself some are missed, and their neighbours seem too far apart.
+    halfway = middle + (place[:-1] + 0.5 * between)[:, None] * across
+    shown = shapely.length(
+        shapely.intersection(shapely.linestrings(np.stack([halfway - size * along, halfway + size * along], axis=1)), area)
+    )
+    between = between[shown >= _LONG_ENOUGH * shown.max(initial=0.0)]
     return LineStatistics(
         len(longest), _mean(between), _deviation(between), float(length.sum() / shapely.length(chords).sum())
     )
