@@ -12,7 +12,7 @@ from geomech.scene.actions import deepest_pond, said_of_pond
 from geomech.shapes.fracture_statistics import Topology, block_sizes, passing_curve
 from geomech.shapes.rock_bridges import rock_bridges
 
-from .joint_statistics import given, joint_statistics, table
+from .joint_statistics import given, joint_statistics, network_of, table
 from .summary import write_json
 from .triangulate import Triangles
 from .vtu import LINE, TRIANGLE, Grid, GridFiles, world_origin
@@ -72,7 +72,7 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
     )
     _write_msh(folder / "block_system.msh", blocks, cracks, cells, owner, names, zone)
     if scene.tables.geometry.traces or any(problem.origin):
-        write_world_map(problem, zones, folder / "block_system.geojson")
+        write_world_map(problem, zones, folder / "block_system.geojson", scene.drawing.crs)
     told = _statistics(scene, problem, area, bridges, names, zone)
     write_json(folder / "block_system.json", told)
     return told
@@ -121,7 +121,7 @@ def _statistics(
     free = ~blocks.fixed if (~blocks.fixed).any() else np.ones(blocks.n_blocks, bool)
     spans = np.hypot(*(bridges[:, 1] - bridges[:, 0]).T) if len(bridges) else np.empty(0)
     sets = joint_statistics(scene, problem, free)
-    nodes = dict(jointed.cutting.nodes) if jointed else {"I": 0, "Y": 0, "X": 0}
+    nodes = network_of(scene).nodes
     topology = Topology.of(nodes)
     mends = [mend._asdict() for mend in jointed.cutting.mends] if jointed else []
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from geomech.scene.jointing import asked
+from geomech.shapes import Joint, Zone, cut
 from geomech.shapes.assembly import TOLERANCE
 from geomech.shapes.fracture_statistics import line_statistics, set_statistics
+from geomech.shapes.interfaces import joints_between
+from geomech.shapes.partings import Parting
 from geomech.shapes.parts import JOINT, extent_of
 from geomech.shapes.rock_outline import rock_of
 
@@ -31,24 +35,61 @@ def given(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+class Network(NamedTuple):
+    """All ``joints`` of a scene, drawn and by statistics, those that are outlines of its zones too; its ``nodes`` by
+    kind, and what became of each name's traces."""
+
+    joints: tuple[Joint, ...]
+    nodes: dict[str, int]
+    partings: tuple[Parting, ...]
+
+
+def network_of(scene: Any) -> Network:
+    """The `Network` of a loaded scene."""
+    drawing = scene.drawing
+    blocks, jointed = drawing.blocks, drawing.jointed
+    known = () if jointed is None else jointed.joints
+    tolerance = _tolerance(scene)
+    rock = rock_of(blocks)
+    more = {joint.name: joint.lines for joint in joints_between(blocks, known, rock, tolerance)}
+    if not more:
+        if jointed is None:
+            return Network((), {"I": 0, "Y": 0, "X": 0}, ())
+        return Network(known, dict(jointed.cutting.nodes), jointed.cutting.partings)
+    # What was parted before is cut again, out of all the rock.
+    joints = [replace(joint, lines=(*joint.lines, *more.pop(joint.name, ()))) for joint in known]
+    joints += [Joint(name, lines) for name, lines in more.items()]
+    whole = [
+        Zone("rock", tuple(np.array(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)))
+        for part in getattr(rock, "geoms", (rock,))
+    ]
+    cutting = cut(whole, joints, tolerance=tolerance)
+    return Network(tuple(joints), cutting.nodes, cutting.partings)
+
+
+def _tolerance(scene: Any) -> float:
+    """What the drawing takes to touch, m."""
+    return scene.tables.geometry.tolerance_m or TOLERANCE * extent_of([scene.drawing.blocks.vertices])
+
+
 def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[str, Any]]:
     """An entry for every joint set of a loaded scene: what it is like in the rock of the ``free`` blocks (a mask), and
     below "asked" what its laws say, by the same keys."""
     import shapely
 
-    blocks, cracks, drawing = problem.blocks, problem.cracks, scene.drawing
-    if drawing.jointed is None:
+    blocks, cracks, drawing, network = problem.blocks, problem.cracks, scene.drawing, network_of(scene)
+    if not network.joints:
         return []
     geometry = scene.tables.geometry
     shapes = {shape.name: shape for shape in geometry.joint_sets}
     zone = np.array(drawing.zones)
     # What the drawing takes to touch the rim ends on it.
-    tolerance = geometry.tolerance_m or TOLERANCE * extent_of([blocks.vertices])
+    tolerance = _tolerance(scene)
     rock = {(): rock_of(blocks, np.flatnonzero(free).tolist())}
     crack_set = np.array([name.rpartition(" ")[0] for name in cracks.names])
-    partings = {parting.name: parting for parting in drawing.jointed.cutting.partings}
+    partings = {parting.name: parting for parting in network.partings}
     entries = []
-    for joint in drawing.jointed.joints:
+    for joint in network.joints:
         name = joint.name.removeprefix(JOINT)
         shape = shapes.get(name)
         zones = () if shape is None else tuple(shape.zones)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,7 +36,8 @@ class Drawing:
     edges along joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock.
     ``blocks`` is None where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing,
     ``mark_places`` (path in the scene, where in the file) of each by name, ``crack_paths`` the paths of the drawn
-    cracks; ``origin`` m, world coordinates of what is (0, 0) in all these."""
+    cracks; ``origin`` m, world coordinates of what is (0, 0) in all these, ``crs`` their reference
+    system as a GeoJSON file says it."""
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
@@ -51,6 +52,7 @@ class Drawing:
     mark_places: dict[str, tuple[Path, str]] = field(default_factory=dict)
     origin: tuple[float, float] = (0.0, 0.0)
     crack_paths: dict[str, Path] = field(default_factory=dict)
+    crs: dict[str, Any] | None = None
 
     def path_of_crack(self, name: str) -> Path:
         """Where in the scene the crack ``name`` is drawn, or what made it."""
@@ -158,7 +160,8 @@ def draw(
         parts.add(read, in_model)
     else:
         _draw_here(geometry, parts)
-    if geometry.traces and not read_traces(geometry, folder, parts.add, place, faults, warnings):
+    sound, crs = read_traces(geometry, folder, parts.add, place, faults, warnings)
+    if not sound:
         return None
     if not parts.zones:
         layers = ", ".join(repr(joint.name.removeprefix(JOINT)) for joint in parts.joints[:8])
@@ -179,12 +182,17 @@ def draw(
             if name not in known:
                 at = ("geometry", "traces", k, "zones", n)
                 faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))
+    for k, entry in enumerate(geometry.joints):
+        for n, name in enumerate(entry.zones):
+            if name not in known:
+                at = ("geometry", "joints", k, "zones", n)
+                faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))
     origin = local_origin(geometry.origin, parts.arrays(), bool(geometry.traces))
     if origin.any():
         parts.move(origin)
         geometry = moved_section(geometry, "geometry", origin)
     return _assembled(
-        geometry, parts, Drawing((), (), None, None, parameters, choices, model), origin, place, faults, warnings
+        geometry, parts, Drawing((), (), None, None, parameters, choices, model, crs=crs), origin, place, faults, warnings
     )
 
 

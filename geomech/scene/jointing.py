@@ -99,7 +99,10 @@ def make_joints(
     outlines = [zone.loops[0] for zone in zones]
     lines: dict[str, list[np.ndarray]] = {}
     for joint in geometry.joints:
-        lines.setdefault(JOINT + joint.name, []).append(np.array(joint.points, dtype=float).reshape(-1, 2))
+        own = Joint(JOINT + joint.name, (np.array(joint.points, dtype=float).reshape(-1, 2),))
+        if joint.zones:
+            own = within(own, [zone for zone in zones if zone.name in joint.zones])
+        lines.setdefault(own.name, []).extend(own.lines)
     for joint in drawn:
         lines.setdefault(joint.name, []).extend(joint.lines)
     joints = ended_on([Joint(name, tuple(own)) for name, own in lines.items()], chords or Chords.none())

@@ -144,12 +144,14 @@ class _Places:
         return sorted(dict.fromkeys(faults), key=lambda fault: self.order.get(fault.place, 0))
 
 
-def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str | None = None) -> Scene:
+def load_scene(
+    path: str | FilePath, overrides: Iterable[str] = (), variant: str | None = None, *, to_run: bool = True
+) -> Scene:
     """Load, change and check a scene.
 
     ``path`` is a .toml file or a pipeline folder (then its scene.toml); ``variant`` one of the scene's [variants];
     ``overrides`` are changes "section.key=value" on top, values in TOML's way or bare words. Raises SceneError with
-    every fault: place (file, line, key), message and way out.
+    every fault: place (file, line, key), message and way out. A scene that is not ``to_run`` may leave [run] out.
     """
     path = _file(FilePath(path))
     data, text = _parsed(path)
@@ -172,6 +174,8 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
         except OverrideError as error:
             faults.append(Fault(f"--set {override}", error.message, error.way_out))
 
+    if not to_run:
+        data.setdefault("run", {"end_time_s": 1.0})
     _resolve_records(data, path.parent)
     tables, found = validate(data, places)
     faults += found

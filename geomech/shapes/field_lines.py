@@ -64,10 +64,12 @@ class FieldLine:
 
 @dataclass(frozen=True, eq=False)
 class FieldFile:
-    """``lines`` of a file in m, and what in it was left out, as (message, way out)."""
+    """``lines`` of a file in m, and what in it was left out, as (message, way out); ``crs`` is the member of a GeoJSON
+    that says its coordinate reference system, None where none is said."""
 
     lines: tuple[FieldLine, ...]
     warnings: tuple[tuple[str, str], ...] = ()
+    crs: dict | None = None
 
 
 class Named(NamedTuple):

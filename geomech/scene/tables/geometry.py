@@ -50,6 +50,7 @@ class EdgeShape(Table):
 class JointShape(Table):
     name: str = Field(description='name of the joints; the block edges they make are called "joint:NAME"')
     points: Points = Field(description="a polyline along which rock parts, [[x, y], …], m")
+    zones: Names = Field((), description="names of the zones that it cuts (unset: all)")
 
 
 DistributionLaw = Literal["constant", "normal", "uniform", "lognormal", "exponential"]
