@@ -129,6 +129,10 @@ class Coupling:
     def _from_the_start(self) -> Iterator[Cycle]:
         now = self.now
         collapse = relax(now, now.state.time) if self.problem.dda.equilibrium else ()
+        if self.problem.velocity is not None:
+            velocity = now.state.velocity.copy()
+            velocity[:, :2] = self.problem.velocity
+            now.state = replace(now.state, velocity=velocity)
         yield self._still(collapse)
         if not collapse:
             yield from self._load_steps()

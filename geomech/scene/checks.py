@@ -187,6 +187,13 @@ def _zones(c: Check) -> None:
                     f"zone {name!r} has no material",
                     f'add [zones.{name}] with material = "…": {", ".join(materials)}',
                 )
+    if c.tables.dda is not None and c.tables.dda.dynamic_factor == 0:
+        for name in (name for name, zone in given.items() if zone.velocity_m_s is not None):
+            c.refuse(
+                ("zones", name, "velocity_m_s"),
+                "a static run carries no velocity from one step to the next",
+                "leave it out, or set dda.dynamic_factor = 1",
+            )
     used = {zone.material for zone in given.values()}
     for name in materials if len(materials) > 1 else ():
         if name not in used:
