@@ -114,7 +114,9 @@ def _loads(tables: SceneTables, drawing: Drawing) -> list[str]:
     for table in tables.loads.remote:
         lines.append("far away, [xx, yy, xy]: " + _rising(table, end))
     for table in tables.loads.fluids:
-        lines.append(f"fluid in {' and '.join(table.fills)}: " + _rising(table, end))
+        where = " and ".join(table.fills)
+        where += f" ({', '.join(table.cracks)})" if table.cracks else ""
+        lines.append(f"fluid in {where}: " + _rising(table, end))
     for text, count in (
         ("motions of blocks", len(tables.loads.motions)),
         ("motions of points", len(tables.loads.point_motions)),
