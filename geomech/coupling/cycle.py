@@ -22,7 +22,7 @@ from ..dda.excavation import until_next_event
 from ..dda.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
 from .balance import Balance, balanced
-from .budget_watch import BudgetWatch
+from .budget_watch import BudgetWatch, GrowthWatch
 from .collapse import lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .endless import out_of_sight, solved_pass
@@ -94,7 +94,7 @@ class Coupling:
         self._brought: tuple[Event, ...] = ()
         self.tips = None if self.static else TipsInTime(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
-        self.energy, self.overlaps = BudgetWatch(), OverlapWatch()
+        self.energy, self.overlaps, self.unstable = BudgetWatch(), OverlapWatch(), GrowthWatch()
         self.under_way: UnderWay | None = None
         #: s, when the present load step began.
         self.began = self.now.state.time
@@ -231,7 +231,9 @@ class Coupling:
             ends = growth is None or self.follows or (parts and not static)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed
-            budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
+            budget = (now.budget.cut() if dug else now.budget).after(
+                result.energy, result.state.time, growing=static and growth_pass > 0
+            )
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
             gone_by = result.state.time - self.began
             if abs(gone_by - result.dt) > 1e-9 * result.dt:
@@ -246,6 +248,8 @@ class Coupling:
             self.energy.check(statistics["budget_residual"], result.state.time)
             overlap = None if result.overlap is None else Overlap(*result.overlap)
             self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
+            if ends or parts:
+                self.unstable.check(budget, result.state.time)
             if self.tips is not None and (len(tips) or found.left_out):
                 statistics["fastest_tip"] = self.tips.speed.fastest(whole)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics, found.left_out)
