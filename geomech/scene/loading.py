@@ -18,7 +18,7 @@ from .drawing import Drawing, draw
 from .drawn_marks import with_marks
 from .endless import check_endless
 from .equilibrium import check_loads
-from .errors import Check, Fault, SceneError
+from .errors import Check, Fault, SceneError, one_a_cause
 from .keys import describe_keys
 from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
@@ -197,7 +197,7 @@ def load_scene(
     check_plausible(sections)
     # Building asks the same questions as the checks did; whatever it would find has been found.
     quiet = Check(tables, data, drawing, place, [], [])
-    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(warnings)), quiet, written)
+    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(one_a_cause(warnings))), quiet, written)
 
 
 def _file(path: FilePath) -> FilePath:
