@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -44,8 +45,18 @@ class Network(NamedTuple):
     partings: tuple[Parting, ...]
 
 
+#: What `network_of` has found, as long as its scene lives: tables, files and pictures ask for it.
+_found: WeakKeyDictionary[Any, Network] = WeakKeyDictionary()
+
+
 def network_of(scene: Any) -> Network:
     """The `Network` of a loaded scene."""
+    if scene not in _found:
+        _found[scene] = _network(scene)
+    return _found[scene]
+
+
+def _network(scene: Any) -> Network:
     drawing = scene.drawing
     blocks, jointed = drawing.blocks, drawing.jointed
     known = () if jointed is None else jointed.joints

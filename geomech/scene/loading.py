@@ -174,8 +174,9 @@ def load_scene(
         except OverrideError as error:
             faults.append(Fault(f"--set {override}", error.message, error.way_out))
 
-    if not to_run:
-        data.setdefault("run", {"end_time_s": 1.0})
+    if not to_run and "run" not in data:
+        step = data["dda"].get("time_step_s") if isinstance(data.get("dda"), dict) else None
+        data["run"] = {"end_time_s": max(1.0, step) if isinstance(step, float | int) else 1.0}
     _resolve_records(data, path.parent)
     tables, found = validate(data, places)
     faults += found

@@ -21,7 +21,7 @@ def joints_between(blocks: Blocks, known: Sequence[Joint], rock, tolerance: floa
     import shapely
 
     rim = shapely.boundary(rock)
-    shapely.prepare(rim)
+    shapely.prepare([rock, rim])
     found = []
     for name in blocks.edge_names:
         if not name.startswith(JOINT):

@@ -85,7 +85,7 @@ def test_the_map_in_world_coordinates_says_their_reference_system(tmp_path):
 def test_a_scene_without_a_run_is_built_and_not_run(tmp_path, capsys):
     path = tmp_path / "plain.toml"
     path.write_text(
-        f'title = "plain"\n[[geometry.zones]]\nname = "rock"\nrectangle = [0, 0, 10, 8]\n{REST}\n[variants.stiff]\n'
+        f'title = "plain"\n[[geometry.zones]]\nname = "rock"\nrectangle = [0, 0, 10, 8]\n{REST}\n[dda]\ntime_step_s = 5\n[variants.stiff]\n'
         "materials.rock.youngs_modulus_pa = 4e10\n"
     )
     assert main(["build", str(path), "--out", str(tmp_path / "out"), "--variant", "stiff"]) == 0
