@@ -198,10 +198,35 @@ def _renewal(spacing: Law, extent: float, rng: np.random.Generator) -> np.ndarra
     """Points ``spacing`` apart from 0 to ``extent``, as they lie on an endless line on which 0 is anywhere."""
     mean = spacing.mean
     steps = spacing.lengths(rng, int(2 * extent / mean) + 16)
-    points = np.cumsum(steps) - steps[0] + (1 - rng.random()) * spacing.met(rng)
+    points = np.cumsum(steps) - _before(spacing, float(steps[0]), rng.random(), rng)
     while points[-1] < extent:
         points = np.concatenate([points, points[-1] + np.cumsum(spacing.lengths(rng, 64))])
     return points[points < extent]
+
+
+def _before(spacing: Law, step: float, share: float, rng: np.random.Generator) -> float:
+    """How much of the first ``step`` lies before 0, a place taken anywhere on an endless line.
+
+    The ``share`` of it is right where all steps are alike, and else for most: it is kept as often as the two laws have
+    it in common (their maximal coupling), so that a seed keeps its network where it may; a stream of its own decides.
+    """
+    if spacing.spread == 0:
+        return step * share
+    aside = rng.spawn(1)[0]
+    lengths = spacing.lengths(np.random.default_rng(0), 20_000)
+
+    def ratio(rest: float) -> float:
+        """Density of what is left after 0 on an endless line, P(X > rest) / E[X], over that of a share of any step,
+        E[1/X; X > rest]."""
+        longer = lengths[lengths > rest]
+        return len(longer) / lengths.mean() / float((1 / longer).sum()) if len(longer) else math.inf
+
+    if aside.random() < ratio(step * (1 - share)):
+        return step * share
+    while True:
+        rest = aside.random() * spacing.met(aside)
+        if aside.random() < 1 - 1 / ratio(rest):
+            return step - rest
 
 
 def _intervals(
