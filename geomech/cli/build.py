@@ -33,7 +33,8 @@ def _build(options: argparse.Namespace) -> int:
     from ..scene import load_scene
     from ..scene.drawing import MENDED
 
-    scenes = scenes_asked(load_scene(options.scene, options.overrides, None), options)
+    first = load_scene(options.scene, options.overrides, None, to_run=False)
+    scenes = scenes_asked(first, options, to_run=False)
     # What was mended stands among the lines of each scene.
     say_warnings(scenes.values(), but=MENDED)
     for name, scene in scenes.items():

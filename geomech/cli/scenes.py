@@ -23,12 +23,13 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def scenes_asked(first: Any, options: argparse.Namespace) -> dict[str | None, Any]:
-    """The scenes that are asked for, by variant; ``first``, which has none, where none is asked for."""
+def scenes_asked(first: Any, options: argparse.Namespace, *, to_run: bool = True) -> dict[str | None, Any]:
+    """The scenes that are asked for, by variant, [run] only where they are ``to_run``; ``first``, which has none, where
+    none is asked for."""
     from ..scene import load_scene
 
     names = variants_asked(first, options.variants)
-    return {name: load_scene(options.scene, options.overrides, name) for name in names} or {None: first}
+    return {name: load_scene(options.scene, options.overrides, name, to_run=to_run) for name in names} or {None: first}
 
 
 def variants_asked(scene: Any, asked: Sequence[str]) -> list[str]:

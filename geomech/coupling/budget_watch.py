@@ -1,10 +1,11 @@
-"""Tells when the energy of a run is no longer accounted for, and when cracks take none from the blocks they break."""
+"""Tells when the energy of a run is no longer accounted for, when cracks take none from the blocks they break, and when
+growth without motion has set some free."""
 
 from __future__ import annotations
 
 import logging
 
-from ..dda.energy import GAIN
+from ..dda.energy import GAIN, EnergyBudget
 
 log = logging.getLogger(__name__)
 
@@ -53,4 +54,23 @@ class BendingWatch:
             time,
             before,
             spent,
+        )
+
+
+class GrowthWatch:
+    """Says, once, that growth at one load has set free more than `GAIN` of all energy turned over: it is unstable."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def check(self, budget: EnergyBudget, time: float) -> None:
+        """``budget`` after a load step that ends at ``time``, s."""
+        if self._told or not budget.released > GAIN * budget.turnover:
+            return
+        self._told = True
+        log.warning(
+            "t = %g s: cracks grow at one load, unstably, and have set free %.3g J/m so far, which statics has no motion "
+            "to take up (growth_release in history.csv); dda.dynamic_factor = 1 follows what comes of it",
+            time,
+            budget.released,
         )

@@ -44,6 +44,7 @@ class CrackedBlocks:
         self.monitors = dict(problem.monitors)
         self.number = 0
         self.load_step = 0
+        self.load_time = 0.0  # of the last pass of rock without an end, s
         self.timed, self.each = Phases(), Phases()
         self.block_work = dda.Work()
         self.works: list[Work] = []

@@ -25,7 +25,7 @@ from ..dda.excavation import until_next_event
 from ..dda.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
 from .balance import Balance, balanced, toughness
-from .budget_watch import BendingWatch, BudgetWatch
+from .budget_watch import BendingWatch, BudgetWatch, GrowthWatch
 from .collapse import collapse_in_situ, lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .endless import out_of_sight, solved_pass
@@ -101,6 +101,7 @@ class Coupling:
         self.tips = None if self.static else TipsInTime(problem)
         self.range, self.balance, self.mechanism = dda.ElasticRange(), LoadBalance(), Mechanism()
         self.energy, self.bending, self.overlaps = BudgetWatch(), BendingWatch(), OverlapWatch()
+        self.unstable = GrowthWatch()
         self.under_way: UnderWay | None = None
         #: s, when the present load step began.
         self.began = self.now.state.time
@@ -137,6 +138,10 @@ class Coupling:
         collapse = collapse_in_situ(now)
         if not collapse and self.problem.dda.equilibrium:
             collapse = relax(now, now.state.time)
+        if self.problem.velocity is not None:
+            velocity = now.state.velocity.copy()
+            velocity[:, :2] = self.problem.velocity
+            now.state = replace(now.state, velocity=velocity)
         yield self._still(collapse)
         if not collapse:
             yield from self._load_steps()
@@ -237,7 +242,9 @@ class Coupling:
             rests = parts or (not ends and most > growing.max_passes and (growth_pass + 1) % growing.max_passes == 0)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed
-            budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
+            budget = (now.budget.cut() if dug else now.budget).after(
+                result.energy, result.state.time, growing=static and growth_pass > 0
+            )
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
             gone_by = result.state.time - self.began
             if abs(gone_by - result.dt) > 1e-9 * result.dt:
@@ -255,6 +262,8 @@ class Coupling:
                 self.bending.check(cracks.toughness, cracks.fracture + cracks.parting, result.state.time)
             overlap = None if result.overlap is None else Overlap(*result.overlap)
             self.overlaps.check(budget, overlap, now.blocks.names, result.state.time)
+            if ends or parts:
+                self.unstable.check(budget, result.state.time)
             if self.tips is not None and (len(tips) or found.left_out):
                 statistics["fastest_tip"] = self.tips.speed.fastest(whole)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics, found.left_out)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import Cracks, EndlessRock, Event, State
+from ..model import Cracks, Event, State
 from ..model.polygon import distance_to_edges, winding_number
 from .balance import Balance, balanced
 from .block_graph import ON_EDGE
@@ -33,21 +33,24 @@ def _endless_pass(now: CrackedBlocks, dt: float, load_time: float | None) -> Bal
         if load_time is not None and result.state.time != load_time:
             result = replace(result, state=replace(result.state, time=load_time))
     now.acted = result.statistics
-    load = _load(now.problem.endless, result.state.time)
-    now.loads = {block: load for block in now.bodies}
+    now.load_time = result.state.time
+    now.loads = loads_of(now, now.cracks, now.bodies)
     now.solutions = now.solve(now.bodies, now.loads, now.solutions)
     now.solved_from = now.history
     tips = tip_rows(now.problem, now.blocks, now.solutions, now.nodes_of)
     return Balance(result, now.solutions, tips, {})
 
 
-def _load(endless: EndlessRock, time: float) -> BoundaryLoad:
-    return BoundaryLoad(
+def loads_of(now: CrackedBlocks, cracks: Cracks, bodies: dict) -> dict[int, BoundaryLoad]:
+    """block → what acts on it at the time of the last pass, with ``cracks`` in it."""
+    endless, time = now.problem.endless, now.load_time
+    load = BoundaryLoad(
         np.empty((0, 2, 2)), np.empty((0, 2, 2)), np.zeros(2), np.zeros((2, 2)), np.zeros(2), 0.0,
         remote_stress=endless.stress_at(time),
-        crack_pressure=endless.pressure_at(time, "cracks"),
-        hole_pressure=endless.pressure_at(time, "holes"),
+        crack_pressure=endless.crack_pressure_at(time, cracks, now.blocks.loops(0)[1:]),
+        hole_pressure=endless.hole_pressure_at(time),
     )  # fmt: skip
+    return dict.fromkeys(bodies, load)
 
 
 def take_endless(now: CrackedBlocks, cracks: Cracks, state: State) -> tuple[Event, ...]:

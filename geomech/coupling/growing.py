@@ -10,7 +10,7 @@ from ..model import Event, State
 from .balance import Balance, toughness
 from .bodies import tip_rows
 from .cracked_blocks import CrackedBlocks
-from .endless import take_endless
+from .endless import loads_of, take_endless
 from .mean_stress import rotated_mean_stress
 from .parts_in_motion import begin_in_motion
 from .record import event
@@ -46,7 +46,8 @@ def growth_of_tips(
     def look_ahead(cracks):
         nonlocal trial
         trial, nodes_of = now.bodies_of(cracks, trial)
-        ahead = now.solve(trial, now.loads, now.solutions)
+        loads = now.loads if now.problem.endless is None else loads_of(now, cracks, trial)
+        ahead = now.solve(trial, loads, now.solutions)
         return tip_rows(now.problem, now.blocks, ahead, nodes_of)
 
     growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct, now.chords)

@@ -53,7 +53,8 @@ class BoundaryLoad:
     body_force (2,) and body_force_gradient (2, 2): b = body_force + gradient · (x − about), N/m³; ``imbalance`` is the
     resultant that inertia had to balance beyond the solver's own acceleration on the block as it is strained, relative
     to the forces' size; ``bases`` are rows of segments in which pressure is yet to be found, and the traction (2,) with
-    a unit of it; ``crack_pressure`` and ``hole_pressure`` Pa, of fluids in endless rock.
+    a unit of it; ``crack_pressure`` (one for all, or (n_segments,)) and ``hole_pressure`` Pa, of fluids in endless
+    rock.
     """
 
     segments: np.ndarray
@@ -67,7 +68,7 @@ class BoundaryLoad:
     forces: np.ndarray | None = None
     kelvin: bool = False
     bases: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-    crack_pressure: float = 0.0
+    crack_pressure: np.ndarray | float = 0.0
     hole_pressure: float = 0.0
 
 

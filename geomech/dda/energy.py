@@ -278,6 +278,7 @@ class EnergyBudget:
     start      stored as the first step began
     stored     stored now
     split      stored energy that has changed because blocks were cut or dug out (`cut`)
+    released   of the time scheme's losses, what was less than none while cracks grew at one load: set free by growth
     residual   stored + losses − work − overlap − split − start: what updating the geometry between steps has added (>
                0) or taken away, and round-off
     """
@@ -292,9 +293,11 @@ class EnergyBudget:
     is_cut: bool = False
     warned: float = GAIN
     drawn: float = 0.0
+    released: float = 0.0
 
-    def after(self, step: StepEnergy, time: float = float("nan")) -> EnergyBudget:
-        """The budget with one more step; logs a warning, naming ``time``, when energy has come from nowhere."""
+    def after(self, step: StepEnergy, time: float = float("nan"), *, growing: bool = False) -> EnergyBudget:
+        """The budget with one more step; logs a warning, naming ``time``, when energy has come from nowhere. In a step
+        in which cracks are ``growing`` without motion, at one load, it comes from them."""
         first = self.last is None
         totals = self.totals + step
         start = step.before if first else self.start
@@ -304,8 +307,9 @@ class EnergyBudget:
         work = abs(float(totals[_SUMS["gravity_work"]])) + abs(float(totals[_SUMS["load_work"]]))
         turnover = max(self.turnover, step.stored, step.before, work)
         warned = self.warned
+        released = self.released + (max(0.0, -step.scheme) if growing else 0.0)
         # A scheme that loses less than nothing gives.
-        gain = residual - min(0.0, float(totals[_SUMS["scheme"]]))
+        gain = residual - min(0.0, float(totals[_SUMS["scheme"]]) + released)
         if gain > warned * turnover:
             log.warning(
                 "t = %g s: the blocks have gained %.3g J/m without work, %.2g of all energy turned over: shorten the "
@@ -314,13 +318,15 @@ class EnergyBudget:
             )  # fmt: skip
             warned = 2.0 * gain / turnover
         drawn = step.overlap if first else self.drawn
-        return EnergyBudget(self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn)
+        return EnergyBudget(
+            self.steps + 1, step, start, totals, split, residual, turnover, False, warned, drawn, released
+        )
 
     def cut(self) -> EnergyBudget:
         """The same as the next step finds blocks cut or dug out: what that changes is no residual."""
         return EnergyBudget(
             self.steps, self.last, self.start, self.totals, self.split, self.residual, self.turnover,
-            self.last is not None, self.warned, self.drawn,
+            self.last is not None, self.warned, self.drawn, self.released,
         )  # fmt: skip
 
     def __getattr__(self, name: str) -> float:
@@ -354,6 +360,7 @@ class EnergyBudget:
         sums = self.totals.tolist()
         out = {column: sums[_SUMS[name]] for column, name in _COLUMNS.items()}
         out["energy_residual"] = self.residual
+        out["growth_release"] = self.released
         return out
 
 

@@ -160,7 +160,7 @@ class LoadMap:
             dry = np.isin(self.blocks.edge_name, [known.index(name) for name in water.dry])
             out = self.blocks.fixed if self._removed is None else self.blocks.fixed | self._removed
             edges = np.flatnonzero(~dry & ~out[self.blocks.vertex_block])
-            self._wet = water, wet_pieces(self.blocks, edges, self._drained)
+            self._wet = water, wet_pieces(self.blocks, edges, self._drained, water.ground)
         return self._wet[1]
 
 

@@ -7,23 +7,30 @@ import numpy as np
 from ..model import Blocks, WaterTable
 from .force_rows import EDGE_FORCE
 
-#: Faces of drained blocks lie against others within this part of the drawing's size.
+#: Faces of drained blocks, and the ground, lie against others within this part of the drawing's size.
 _AGAINST = 1e-6
 
 
-def wet_pieces(blocks: Blocks, edges: np.ndarray, drained: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def wet_pieces(
+    blocks: Blocks, edges: np.ndarray, drained: np.ndarray | None, ground: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(edges (n,), spans (n, 2) from 0 to 1 along them) of ``edges`` without what lies against ``drained`` (n_blocks,)
-    blocks, in reference positions."""
+    blocks or on the ``ground`` (m, 2), in reference positions."""
     whole = np.tile([0.0, 1.0], (len(edges), 1))
-    if drained is None or not drained.any():
+    against = []
+    if drained is not None and drained.any():
+        gone = np.flatnonzero(drained[blocks.vertex_block])
+        against.append(np.stack([blocks.vertices[gone], blocks.vertices[blocks.next_vertex[gone]]], axis=1))
+    if ground is not None:
+        against.append(np.stack([ground[:-1], ground[1:]], axis=1))
+    if not against:
         return edges, whole
     start = blocks.vertices[edges]
     along = blocks.vertices[blocks.next_vertex[edges]] - start
     square = np.sum(along**2, axis=1)
     near = _AGAINST * np.ptp(blocks.vertices, axis=0).max()
     dry: dict[int, list[tuple[float, float]]] = {}
-    for gone in np.flatnonzero(drained[blocks.vertex_block]).tolist():
-        ends = blocks.vertices[[gone, blocks.next_vertex[gone]]]
+    for ends in np.concatenate(against):
         arm = ends[:, None] - start
         off = np.abs(along[:, 0] * arm[..., 1] - along[:, 1] * arm[..., 0]) / np.sqrt(square)
         share = np.clip(np.sum(arm * along, axis=2) / square, 0.0, 1.0)
@@ -32,13 +39,14 @@ def wet_pieces(blocks: Blocks, edges: np.ndarray, drained: np.ndarray | None) ->
             dry.setdefault(k, []).append((low[k], high[k]))
     kept, spans = [], []
     for k in range(len(edges)):
-        at = 0.0
+        # Where one dry piece ends beside the next, or beside the edge's end, nothing wet is left between.
+        at, gap = 0.0, near / np.sqrt(square[k]) if k in dry else 0.0
         for low, high in sorted(dry.get(k, [])):
-            if low > at:
+            if low > at + gap:
                 kept.append(edges[k])
                 spans.append((at, low))
             at = max(at, high)
-        if at < 1.0:
+        if at < 1.0 - gap:
             kept.append(edges[k])
             spans.append((at, 1.0))
     return np.array(kept, dtype=int), np.array(spans).reshape(-1, 2)
@@ -58,8 +66,7 @@ def pressed_edges(
     p = γw · depth below the line, linear along every piece of an edge that lies wet and between two of the line's
     points. Around a block under a level table the pieces add up to γw times its wet area (Archimedes) to round-off.
     """
-    line_x, line_y = np.asarray(water.points, dtype=float).T
-    line_y = line_y + (0.0 if water.level is None else float(water.level.at(time)[0]))
+    line_x, line_y = water.line_at(time)
     edges, spans = pieces
     start = vertices[edges]
     along = vertices[next_vertex[edges]] - start

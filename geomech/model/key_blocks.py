@@ -36,8 +36,8 @@ KEY_BLOCK = np.dtype(
         ("kind", np.int64),  # HELD, SAFE, FRICTION, SLIDES, FALLS or FIXED
         ("direction", np.float64),  # rad, the way it would go; nan where there is none
         ("factor", np.float64),  # strength over what drives it along its one face; nan where it does not slide
-        ("displacement", np.float64),  # m, of the mean of its vertices from where they were drawn
-        ("speed", np.float64),  # m/s, of its centroid
+        ("displacement", np.float64),  # m, of the mean of its vertices from where they were drawn, less the fixed rock's
+        ("speed", np.float64),  # m/s, of its centroid, against that of the fixed rock
         ("rank", np.int64),  # 0 the block that has moved farthest; fixed ones last
     ]
 )
@@ -121,8 +121,13 @@ def _spares(owner: np.ndarray, angle: np.ndarray) -> Iterator[tuple[int, float, 
 
 def _rank(out: np.ndarray, blocks: Blocks, state: State, fixed: np.ndarray) -> None:
     moved = blocks.mean_vertices(state.vertices) - blocks.mean_vertices(blocks.vertices)
+    speed = state.velocity[:, :2]
+    base = np.asarray(blocks.fixed, dtype=bool)
+    if base.any():
+        # Where the base is shaken, fixed rock moves as one, and takes along what stands on it.
+        moved, speed = moved - moved[base].mean(axis=0), speed - speed[base].mean(axis=0)
     out["displacement"] = np.hypot(moved[:, 0], moved[:, 1])
-    out["speed"] = np.hypot(state.velocity[:, 0], state.velocity[:, 1])
+    out["speed"] = np.hypot(speed[:, 0], speed[:, 1])
     order = np.lexsort((-out["speed"], -out["displacement"], fixed))
     out["rank"][order] = np.arange(len(out))
 

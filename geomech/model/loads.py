@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from .bolt import Bolt
+from .ground import below_ground, lowest_over
 from .history import History, refuse_no_history
 from .imposed_motion import BaseMotion, BlockMotion, PointMotion
 from .numbers import refuse_point
@@ -86,6 +88,10 @@ class WaterTable:
     joint, so that contact forces are effective ones and a submerged block is lifted by the weight of the water it
     displaces. ``dry`` names edges that no water reaches (lined or drained).
 
+    Where the line stands above the rock, water is ponded there and presses on it. With ``ground`` (n, 2) m, the rock's
+    surface from left to right, the table is never above it: it follows the ground in front of a slope, and nothing
+    presses on the ground itself.
+
     Blocks carry their own (saturated) density; their stress is the total one.
     """
 
@@ -93,6 +99,7 @@ class WaterTable:
     unit_weight: float = 9810.0
     level: History | None = None
     dry: tuple[str, ...] = ()
+    ground: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points, dtype=float)
@@ -107,6 +114,16 @@ class WaterTable:
             raise ValueError(f"the unit weight of water must be positive, got {self.unit_weight!r} N/m³")
         if self.level is not None:
             _refuse_columns("the level of a water table", self.level, 1)
+
+    def line_at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """(x ascending, y) of the table's points at ``time``, m."""
+        x, y = np.asarray(self.points, dtype=float).T
+        line = x, y + (0.0 if self.level is None else float(self.level.at(time)[0]))
+        return line if self.ground is None else below_ground(line, self._lowest)
+
+    @cached_property
+    def _lowest(self) -> tuple[np.ndarray, np.ndarray]:
+        return lowest_over(np.asarray(self.ground, dtype=float))
 
 
 @dataclass(frozen=True, eq=False)

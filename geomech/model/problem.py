@@ -253,7 +253,7 @@ class Problem:
     compression), or what it takes to move their block, or is `WEIGHT`; ``in_situ`` is the stress that the blocks have,
     at rest, before the run; ``gauge`` is a pair of points (reference coordinates) and the blocks that carry them, whose
     approach over their distance is the axial strain. ``endless``: the only block, which is fixed, is a piece of rock
-    without an end.
+    without an end. ``velocity`` (n_blocks, 2), m/s, is that of the blocks as the first step begins, None: at rest.
     """
 
     title: str
@@ -274,6 +274,7 @@ class Problem:
     monitors: dict[str, tuple[int, tuple[float, float]]] = field(default_factory=dict)
     origin: tuple[float, float] = (0.0, 0.0)  # world coordinates of (0, 0), m
     endless: EndlessRock | None = None
+    velocity: np.ndarray | None = None
 
     @property
     def ends_at(self) -> tuple[str, ...]:

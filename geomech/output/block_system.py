@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from geomech.model import Blocks, Cracks, counted
+from geomech.scene.actions import deepest_pond, said_of_pond
 from geomech.shapes.fracture_statistics import Topology, block_sizes, passing_curve
 from geomech.shapes.rock_bridges import rock_bridges
 
-from .joint_statistics import given, joint_statistics, table
+from .joint_statistics import given, joint_statistics, network_of, table
 from .summary import write_json
 from .triangulate import Triangles
 from .vtu import LINE, TRIANGLE, Grid, GridFiles, world_origin
@@ -71,7 +72,7 @@ def write_block_system(scene: Any, folder: Path | str) -> dict[str, Any]:
     )
     _write_msh(folder / "block_system.msh", blocks, cracks, cells, owner, names, zone)
     if scene.tables.geometry.traces or any(problem.origin):
-        write_world_map(problem, zones, folder / "block_system.geojson")
+        write_world_map(problem, zones, folder / "block_system.geojson", scene.drawing.crs)
     told = _statistics(scene, problem, area, bridges, names, zone)
     write_json(folder / "block_system.json", told)
     return told
@@ -120,14 +121,22 @@ def _statistics(
     free = ~blocks.fixed if (~blocks.fixed).any() else np.ones(blocks.n_blocks, bool)
     spans = np.hypot(*(bridges[:, 1] - bridges[:, 0]).T) if len(bridges) else np.empty(0)
     sets = joint_statistics(scene, problem, free)
-    nodes = dict(jointed.cutting.nodes) if jointed else {"I": 0, "Y": 0, "X": 0}
+    nodes = network_of(scene).nodes
     topology = Topology.of(nodes)
     mends = [mend._asdict() for mend in jointed.cutting.mends] if jointed else []
     low, high = blocks.vertices.min(axis=0), blocks.vertices.max(axis=0)
     sizes = block_sizes(area[free], _PASSING)
+    pond = deepest_pond(scene.tables, blocks)
     told = {
         "title": problem.title,
-        "summary": ", ".join([problem.inventory, *([counted(len(bridges), "rock bridge")] if len(bridges) else [])]),
+        "summary": ", ".join(
+            [
+                problem.inventory,
+                *([counted(len(bridges), "rock bridge")] if len(bridges) else []),
+                *([] if pond is None else [f"water {said_of_pond(*pond, problem.origin)}"]),
+            ]
+        ),
+        "ponded_water": None if pond is None else {**pond[0]._asdict(), "time_s": pond[1]},
         "box_m": [low.tolist(), high.tolist()],
         "world_origin_m": list(problem.origin),
         "area_m2": float(area.sum()),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from geomech.model import OPEN, SLIP, Cycle, Problem
-from geomech.model.key_blocks import CLASSES, FIXED, key_blocks
+from geomech.model.key_blocks import CLASSES, FALLS, FIXED, SLIDES, key_blocks
 
 #: Blocks are at rest, but for small vibrations, when less than this part of the forces on any of them is left to move
 #: it …
@@ -18,6 +18,9 @@ AT_REST = 1e-2
 STILL = 1e-2
 #: So many blocks are named.
 NAMED = 5
+#: A block stands that has moved by less than this part of its size √area, and would not in the time it takes to fall so
+#: far.
+STANDS = 1e-3
 
 
 def condition(cycle: Cycle) -> str:
@@ -68,6 +71,7 @@ def energy_summary(cycle: Cycle) -> dict[str, float]:
         "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",
         "friction_loss",
         "damping_loss", "bond_loss", "scheme_loss", "carried_loss", "overlap_energy", "energy_residual",
+        "growth_release",
         "uneven_work", "set_free_energy", "crack_elastic", "crack_friction", "crack_bond_loss", "fracture_energy",
         "runaway_loss", "parting_energy", "toughness_energy", "crack_residual", "budget_residual",
     )  # fmt: skip
@@ -83,7 +87,8 @@ def key_block_summary(cycle: Cycle, problem: Problem) -> list[dict[str, Any]]:
     rows = key_blocks(
         cycle.blocks, problem.materials, problem.joints, cycle.state, problem.loads.gravity.at(cycle.state.time)
     )
-    out = []
+    out, area = [], cycle.blocks.areas(cycle.state.vertices)
+    pull = float(np.hypot(*problem.loads.gravity.at(cycle.state.time)))
     for block in np.argsort(rows["rank"], kind="stable")[:NAMED].tolist():
         row = rows[block]
         if row["kind"] == FIXED:
@@ -94,6 +99,14 @@ def key_block_summary(cycle: Cycle, problem: Problem) -> list[dict[str, Any]]:
             "speed_m_s": float(row["speed"]),
             "class": CLASSES[int(row["kind"])],
         }
+        size = float(np.sqrt(area[block]))
+        if (
+            row["kind"] in (SLIDES, FALLS)
+            and row["displacement"] < STANDS * size
+            and row["speed"] < STANDS * math.sqrt(pull * size)
+        ):
+            # Neighbours wedge it, or bolts and bonds hold it: block theory knows of its own weight and friction alone.
+            entry["class"] = f"stands (by its own weight and friction a {entry['class']})"
         if not math.isnan(row["direction"]):
             entry["direction_deg"] = math.degrees(row["direction"])
         if not math.isnan(row["factor"]):

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from geomech.scene.jointing import asked
+from geomech.shapes import Joint, Zone, cut
+from geomech.shapes.assembly import TOLERANCE
 from geomech.shapes.fracture_statistics import line_statistics, set_statistics
-from geomech.shapes.parts import JOINT
+from geomech.shapes.interfaces import joints_between
+from geomech.shapes.partings import Parting
+from geomech.shapes.parts import JOINT, extent_of
+from geomech.shapes.rock_outline import rock_of
 
 #: Columns of the table: heading, key, key of what stands behind a ±.
 _COLUMNS = (
@@ -29,29 +36,76 @@ def given(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
+class Network(NamedTuple):
+    """All ``joints`` of a scene, drawn and by statistics, those that are outlines of its zones too; its ``nodes`` by
+    kind, and what became of each name's traces."""
+
+    joints: tuple[Joint, ...]
+    nodes: dict[str, int]
+    partings: tuple[Parting, ...]
+
+
+#: What `network_of` has found, as long as its scene lives: tables, files and pictures ask for it.
+_found: WeakKeyDictionary[Any, Network] = WeakKeyDictionary()
+
+
+def network_of(scene: Any) -> Network:
+    """The `Network` of a loaded scene."""
+    if scene not in _found:
+        _found[scene] = _network(scene)
+    return _found[scene]
+
+
+def _network(scene: Any) -> Network:
+    drawing = scene.drawing
+    blocks, jointed = drawing.blocks, drawing.jointed
+    known = () if jointed is None else jointed.joints
+    tolerance = _tolerance(scene)
+    rock = rock_of(blocks)
+    more = {joint.name: joint.lines for joint in joints_between(blocks, known, rock, tolerance)}
+    if not more:
+        if jointed is None:
+            return Network((), {"I": 0, "Y": 0, "X": 0}, ())
+        return Network(known, dict(jointed.cutting.nodes), jointed.cutting.partings)
+    # What was parted before is cut again, out of all the rock.
+    joints = [replace(joint, lines=(*joint.lines, *more.pop(joint.name, ()))) for joint in known]
+    joints += [Joint(name, lines) for name, lines in more.items()]
+    whole = [
+        Zone("rock", tuple(np.array(ring.coords)[:-1] for ring in (part.exterior, *part.interiors)))
+        for part in getattr(rock, "geoms", (rock,))
+    ]
+    cutting = cut(whole, joints, tolerance=tolerance)
+    return Network(tuple(joints), cutting.nodes, cutting.partings)
+
+
+def _tolerance(scene: Any) -> float:
+    """What the drawing takes to touch, m."""
+    return scene.tables.geometry.tolerance_m or TOLERANCE * extent_of([scene.drawing.blocks.vertices])
+
+
 def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[str, Any]]:
     """An entry for every joint set of a loaded scene: what it is like in the rock of the ``free`` blocks (a mask), and
     below "asked" what its laws say, by the same keys."""
     import shapely
 
-    blocks, cracks, drawing = problem.blocks, problem.cracks, scene.drawing
-    if drawing.jointed is None:
+    blocks, cracks, drawing, network = problem.blocks, problem.cracks, scene.drawing, network_of(scene)
+    if not network.joints:
         return []
     geometry = scene.tables.geometry
     shapes = {shape.name: shape for shape in geometry.joint_sets}
-    polygons = np.array(
-        [shapely.Polygon(loops[0], loops[1:]) for loops in map(blocks.loops, np.flatnonzero(free).tolist())]
-    )
-    zone = np.array(drawing.zones)[free]
-    rock = {(): shapely.union_all(polygons)}
+    zone = np.array(drawing.zones)
+    # What the drawing takes to touch the rim ends on it.
+    tolerance = _tolerance(scene)
+    rock = {(): rock_of(blocks, np.flatnonzero(free).tolist())}
     crack_set = np.array([name.rpartition(" ")[0] for name in cracks.names])
+    partings = {parting.name: parting for parting in network.partings}
     entries = []
-    for joint in drawing.jointed.joints:
+    for joint in network.joints:
         name = joint.name.removeprefix(JOINT)
         shape = shapes.get(name)
         zones = () if shape is None else tuple(shape.zones)
         if zones not in rock:
-            rock[zones] = shapely.union_all(polygons[np.isin(zone, zones)])
+            rock[zones] = rock_of(blocks, np.flatnonzero(free & np.isin(zone, zones)).tolist())
         region = rock[zones]
         if shape is not None and shape.region is not None:
             region = shapely.intersection(region, shapely.Polygon(np.reshape(shape.region, (-1, 2)) - drawing.origin))
@@ -59,7 +113,9 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
         entry = {
             "name": name,
             "kind": "drawn" if shape is None else shape.kind,
-            **_got(joint, region, shape),
+            **_got(joint, region, shape, tolerance),
+            "cutting_traces": partings[joint.name].cutting,
+            "cut_length_m": partings[joint.name].length,
             "cracks": int(own.sum()),
             "crack_length_m": float(cracks.lengths[own[cracks.crack]].sum()) if cracks.n_segments else 0.0,
         }
@@ -75,14 +131,15 @@ def joint_statistics(scene: Any, problem: Any, free: np.ndarray) -> list[dict[st
     return entries
 
 
-def _got(joint: Any, region: Any, shape: Any) -> dict[str, Any]:
-    found = set_statistics(joint, region)
+def _got(joint: Any, region: Any, shape: Any, tolerance: float) -> dict[str, Any]:
+    found = set_statistics(joint, region, tolerance=tolerance)
     out = {
         "traces": found.traces,
         "p10_per_m": found.p10,
         "p20_per_m2": found.p20,
         "p21_per_m": found.p21,
         "mean_length_m": found.mean_length,
+        "mean_length_in_window_m": found.window_length,
         "length_deviation_m": found.seen_length_deviation,
         "spacing_m": found.mean_spacing,
         "spacing_deviation_m": found.spacing_deviation,
@@ -102,11 +159,13 @@ def _got(joint: Any, region: Any, shape: Any) -> dict[str, Any]:
 
 
 def table(entries: Sequence[dict[str, Any]]) -> list[str]:
-    """``entries`` side by side with what was asked, a row each."""
+    """``entries`` side by side with what was asked, a row each: how many traces there are, how many of them part
+    blocks, and along what length."""
     if not entries:
         return []
     wide = max(8, *(len(entry["name"]) for entry in entries))
-    rows = [f"{'joints':{wide}}       " + "".join(f" {heading:>14}" for heading, *_ in _COLUMNS) + f"{'traces':>8}"]
+    rows = [f"{'joints':{wide}}       " + "".join(f" {heading:>14}" for heading, *_ in _COLUMNS)]
+    rows[0] += f"{'traces':>8}{'cutting':>9}{'cut m':>9}"
     for entry in entries:
         wanted = entry.get("asked")
         if wanted is not None:
@@ -114,7 +173,7 @@ def table(entries: Sequence[dict[str, Any]]) -> list[str]:
         rows.append(
             f"{'' if wanted is not None else entry['name']:{wide}}  got  "
             + _row(entry, wanted)
-            + f"{entry['traces']:8d}"
+            + f"{entry['traces']:8d}{entry['cutting_traces']:9d}{entry['cut_length_m']:9.4g}"
         )
         if entry.get("ends_on"):
             rows[-1] += f"  (ends on {', '.join(entry['ends_on'])})"

@@ -12,9 +12,12 @@ from geomech.model import Problem
 from .summary import write_json
 
 
-def write_world_map(problem: Problem, zones: tuple[str, ...], path: Path | str) -> None:
+def write_world_map(
+    problem: Problem, zones: tuple[str, ...], path: Path | str, crs: dict[str, Any] | None = None
+) -> None:
     """Write the blocks of ``problem`` (polygons with "set" = "zone:NAME", block, material, fixed, area_m2) and its
-    cracks (lines with "set" = "crack:NAME") as the GeoJSON file ``path``; ``zones`` names each block's zone.
+    cracks (lines with "set" = "crack:NAME") as the GeoJSON file ``path``; ``zones`` names each block's zone, ``crs`` is the
+    reference system of the files that were read.
 
     Read as traces of a scene it gives the same blocks.
     """
@@ -38,4 +41,5 @@ def write_world_map(problem: Problem, zones: tuple[str, ...], path: Path | str) 
     for k, name in enumerate(cracks.names):
         for segment in cracks.segments[cracks.crack == k]:
             features.append(feature("LineString", (cracks.nodes[segment] + origin).tolist(), {"set": f"crack:{name}"}))
-    write_json(Path(path), {"type": "FeatureCollection", "features": features})
+    system = {} if crs is None else {"crs": crs}
+    write_json(Path(path), {"type": "FeatureCollection", **system, "features": features})

@@ -31,6 +31,13 @@ COALESCENCE_ANGLE_DEG = {
     "Haeri 2014, DDM": {0: -63.72, 30: -65.89, 60: -69.68, 90: -0.33},
 }
 
+#: KB 2023, Table 3: the experiment's lines as printed, y = slope · x + intercept, m from the specimen's lower left
+#: corner.
+COALESCENCE_LINE = {0: (-2.2476, 0.1397), 30: (0.4046, 0.0545), 60: (-4.5152, 0.1693), 90: (0.0178, 0.0294)}
+
+#: The specimen's centre in those coordinates, m.
+CENTRE = (0.030, 0.060)
+
 #: Slope of the line from crack 1's lower tip to crack 2's nearer tip in the same reading; pure geometry.
 TIP_TO_TIP_ANGLE_DEG = {0: -61.3, 30: -67.4, 60: -79.1, 90: 0.0}
 
@@ -62,6 +69,15 @@ OPEN_SLOT_K_II = {
     0: (-0.058550, -0.060707, -0.060707, -0.058550),
     90: (-0.060251, -0.060131, 0.060131, 0.060251),
 }
+
+
+def line_beside_centre(slope: float, intercept: float, exchanged: bool = False) -> tuple[float, float]:
+    """(degrees from the horizontal, m by which it passes the specimen's centre) of y = slope · x + intercept, or, with
+    the axes ``exchanged``, of x = slope · y + intercept."""
+    (x, y), angle = CENTRE, float(np.degrees(np.arctan(slope)))
+    if exchanged:
+        (x, y), angle = (y, x), (90.0 - angle if slope > 0 else -90.0 - angle)
+    return angle, float(abs(slope * x + intercept - y) / np.hypot(1.0, slope))
 
 
 def crack_ends(phi_deg: float) -> tuple[np.ndarray, np.ndarray]:

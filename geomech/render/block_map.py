@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 
 from geomech.model import Problem
+from geomech.model.ground import lowest_over, ponds
+from geomech.scene.actions import deepest_pond
 from geomech.shapes.parts import JOINT
 from geomech.shapes.rock_bridges import rock_bridges
+from geomech.shapes.rock_outline import ground_of
 
 #: Joint sets in order: apart from one another for all kinds of eyes (after Okabe & Ito 2008), and from the rock.
 SETS = ("#0072b2", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c564b", "#7f7f7f", "#b5bd00")
@@ -66,8 +69,8 @@ def draw_block_map(scene: Any, told: dict[str, Any], path: Path | str) -> Path:
             axes.add_collection(LineCollection(edges[own], colors=colour[name], linewidths=thin, capstyle="round"))
         label = name.removeprefix(JOINT)
         if name in statistics:
-            entry = statistics[name]
-            label += f"  {entry['mean_angle_deg']:.0f}°, P21 {entry['p21_per_m']:.2g} m/m²"
+            angle, density = statistics[name]["mean_angle_deg"], statistics[name]["p21_per_m"]
+            label += "  none in the rock" if angle is None else f"  {angle:.0f}°, P21 {density:.2g} m/m²"
         keys.append(Line2D([], [], color=colour[name], lw=2.2, label=f"joints {label}"))
 
     if cracks.n_segments:
@@ -154,11 +157,7 @@ def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size
     if bolts:
         keys.append(Line2D([], [], color="#1b1d21", lw=1.6, label=f"bolts ({len(bolts)})"))
     if loads.water is not None:
-        points = np.asarray(loads.water.points)
-        x = [blocks.vertices[:, 0].min(), *points[:, 0], blocks.vertices[:, 0].max()]
-        y = [points[0, 1], *points[:, 1], points[-1, 1]]
-        axes.plot(x, y, color=WATER, lw=1.6, ls=(0, (6, 2)), zorder=6)
-        keys.append(Line2D([], [], color=WATER, lw=1.6, ls=(0, (6, 2)), label="water table"))
+        keys += _water(axes, scene, problem)
     for k, point in enumerate(problem.monitors.values()):
         axes.plot(*point[1], marker="o", ms=6, mfc="white", mec=INK, mew=1.3, zorder=7)
         if k == 0:
@@ -166,6 +165,35 @@ def _conditions(axes: Any, scene: Any, problem: Problem, edges: np.ndarray, size
     gravity = np.asarray(loads.gravity.at(end), dtype=float)
     if gravity.any():
         keys.append(Line2D([], [], lw=0, marker=r"$g$", ms=8, color=INK, label=f"{np.hypot(*gravity):.3g} m/s²"))
+    return keys
+
+
+def _water(axes: Any, scene: Any, problem: Problem) -> list[Any]:
+    """The water table at the start, at the end where it has risen or fallen by then, and the deepest ponded water."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    water, blocks, keys = problem.loads.water, problem.blocks, []
+    low, high = blocks.vertices[:, 0].min(), blocks.vertices[:, 0].max()
+    times = [0.0] if water.level is None else [0.0, problem.run.end_time]
+    for k, time in enumerate(times):
+        x, y = water.line_at(time)
+        inside = np.concatenate([[low], x[(x > low) & (x < high)], [high]])
+        dashes = (0, (6, 2)) if k == 0 else (0, (2, 2))
+        axes.plot(inside, np.interp(inside, x, y), color=WATER, lw=1.6, ls=dashes, zorder=6)
+        label = "water table" if k == 0 else f"water table at {time:g} s"
+        keys.append(Line2D([], [], color=WATER, lw=1.6, ls=dashes, label=label))
+    deepest = deepest_pond(scene.tables, blocks)
+    if deepest is not None:
+        pond, time = deepest
+        line, ground = water.line_at(time), lowest_over(ground_of(blocks))
+        for own in ponds(line, ground):
+            every = np.concatenate([line[0], ground[0]])
+            x = np.unique(np.concatenate([[own.start, own.end], every[(every > own.start) & (every < own.end)]]))
+            axes.fill_between(
+                x, np.interp(x, *ground), np.interp(x, *line), color=WATER, alpha=0.3, lw=0, zorder=1.5
+            )
+        keys.append(Patch(facecolor=WATER, alpha=0.3, label=f"ponded water, {pond.depth:.3g} m deep at {time:g} s"))
     return keys
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from geomech.output.joint_statistics import network_of
 from geomech.shapes.parts import JOINT
 
 from .block_map import INK, SETS, joint_colours
@@ -23,7 +24,7 @@ def draw_network_statistics(scene: Any, told: dict[str, Any], path: Path | str) 
 
     figure = Figure(figsize=(11.4, 9.0), dpi=130)
     colour = joint_colours(scene)
-    lines = {joint.name: list(joint.lines) for joint in scene.drawing.jointed.joints}
+    lines = {joint.name: list(joint.lines) for joint in network_of(scene).joints}
     _block_sizes(figure.add_axes((0.07, 0.565, 0.4, 0.33)), told)
     _rose(figure.add_axes((0.56, 0.53, 0.36, 0.37), projection="polar"), lines, colour)
     _lengths(figure.add_axes((0.07, 0.09, 0.4, 0.33)), told, lines, colour)

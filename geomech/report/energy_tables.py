@@ -19,6 +19,7 @@ BLOCKS = {
     "bond_loss": "broken bonds",
     "scheme_loss": "time scheme",
     "carried_loss": "velocity carried over",
+    "growth_release": "of the time scheme: set free by growth at one load",
     "overlap_energy": "overlaps",
     "energy_residual": "unexplained",
 }

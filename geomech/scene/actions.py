@@ -12,6 +12,7 @@ from ..model import (
     GROUND,
     BaseMotion,
     BlockMotion,
+    Blocks,
     Bolt,
     CrossesNoJoint,
     Excavation,
@@ -23,6 +24,8 @@ from ..model import (
     baseline_corrected,
     grouted_bolt,
 )
+from ..model.ground import Pond, lowest_over, ponds
+from ..shapes.rock_outline import ground_of
 from .checks import carrier
 from .errors import Check
 from .tables import SceneTables
@@ -83,7 +86,7 @@ def actions_of(tables: SceneTables, check: Check) -> dict[str, Any]:
         for e in loads.excavations
     )
     return {
-        "water": _water(tables),
+        "water": _water(tables, check.drawing.blocks),
         "base": None if loads.base is None else BaseMotion(_shaking(loads.base), loads.base.frame),
         "block_motions": motions,
         "point_motions": tuple(points),
@@ -131,12 +134,32 @@ def _shaking(table: BaseTable) -> History:
     return baseline_corrected(history, {"constant": 0, "linear": 1}[table.baseline]) if table.baseline else history
 
 
-def _water(tables: SceneTables) -> WaterTable | None:
+def _water(tables: SceneTables, blocks: Blocks) -> WaterTable | None:
     w = tables.loads.water
     if w is None:
         return None
     level = None if w.levels_m is None else History.table(w.level_times_s, w.levels_m)
-    return WaterTable(np.array(w.points), w.unit_weight_n_per_m3, level, w.dry_edges)
+    ground = ground_of(blocks) if w.follows_ground else None
+    return WaterTable(np.array(w.points), w.unit_weight_n_per_m3, level, w.dry_edges, ground)
+
+
+def deepest_pond(tables: SceneTables, blocks: Blocks) -> tuple[Pond, float] | None:
+    """Where the water table of a scene stands highest above the ground during the run, and when, s; None where it never
+    does."""
+    water = _water(tables, blocks)
+    if water is None or water.ground is not None:
+        return None
+    end, ground = tables.run.end_time_s, lowest_over(ground_of(blocks))
+    times = {0.0, end, *(t for t in (tables.loads.water.level_times_s or ()) if 0.0 <= t <= end)}
+    found = [(pond, time) for time in sorted(times) for pond in ponds(water.line_at(time), ground)]
+    return max(found, key=lambda pair: pair[0].depth) if found else None
+
+
+def said_of_pond(pond: Pond, time: float, origin: tuple[float, float]) -> str:
+    return (
+        f"ponded up to {pond.depth:.3g} m deep from x = {pond.start + origin[0]:.6g} to {pond.end + origin[0]:.6g} m "
+        f"({time:g} s)"
+    )
 
 
 def bolts_of(check: Check, number: int, table: BoltTable) -> tuple[Bolt, ...]:

@@ -32,7 +32,7 @@ from .drawing import Drawing
 from .edges import contact_names, joint_names
 from .endless import endless_of
 from .errors import Check
-from .held_blocks import fixed_blocks, held_unknowns
+from .held_blocks import first_velocities, fixed_blocks, held_unknowns
 from .joints import joint_law
 from .tables import SceneTables
 from .tables.rock import MaterialTable
@@ -82,6 +82,7 @@ def build_problem(tables: SceneTables, drawing: Drawing, check: Check) -> Proble
         loads=_loads(tables, check),
         in_situ=in_situ_of(tables),
         endless=endless_of(tables, drawing),
+        velocity=first_velocities(tables, drawing),
         dda=_dda(tables),
         ddm=DdmSettings(**tables.ddm.model_dump()),
         growth=_growth(tables, cracks),

@@ -187,6 +187,13 @@ def _zones(c: Check) -> None:
                     f"zone {name!r} has no material",
                     f'add [zones.{name}] with material = "…": {", ".join(materials)}',
                 )
+    if c.tables.dda is not None and c.tables.dda.dynamic_factor == 0:
+        for name in (name for name, zone in given.items() if zone.velocity_m_s is not None):
+            c.refuse(
+                ("zones", name, "velocity_m_s"),
+                "a static run carries no velocity from one step to the next",
+                "leave it out, or set dda.dynamic_factor = 1",
+            )
     used = {zone.material for zone in given.values()}
     for name in materials if len(materials) > 1 else ():
         if name not in used:
@@ -359,16 +366,20 @@ def _toughness(c: Check) -> None:
         return
     needy: dict[str, str] = {}
     fixed = fixed_blocks(t, c.drawing)
-    for k, b in zip(cracks.crack, cracks.block):
+    # Of a crack that several segments make, one warning.
+    for k, b in dict.fromkeys(zip(cracks.crack.tolist(), cracks.block.tolist())):
         zone = c.drawing.zones[b]
         name = material_of(t, zone)
         if name in t.materials and t.materials[name].k_ic_pa_sqrt_m is None:
             needy.setdefault(name, cracks.names[k])
         if fixed[b] and not (zone in t.zones and t.zones[zone].body != "block"):
+            by_key = zone in t.zones and t.zones[zone].fixed
             c.warn(
-                ("zones", zone, "fixed"),
+                ("zones", zone, "fixed") if by_key else ("geometry",),
                 f"crack {cracks.names[k]!r} lies in the fixed {_block_or_zone(t, zone)}, which is not strained",
-                "let it move, or leave the crack out",
+                "let it move, or leave the crack out"
+                + ("" if by_key else ': edges called "fixed" hold the block')
+                + ("; joints that end in rock are none with geometry.dead_ends = \"trim\"" if t.geometry.joint_sets else ""),
             )
     joints = set() if t.geometry is None else {joint.name for joint in (*t.geometry.joints, *t.geometry.joint_sets)}
     for name, crack in needy.items() if t.growth.enabled else ():

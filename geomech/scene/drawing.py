@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..model import Blocks, Cracks
 from ..shapes import EdgeLine, Flaw, Joint, Mark, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
+from ..shapes.curves import Chords, ended_on
 from ..shapes.parts import JOINT
 from .errors import Fault
 from .field_files import read_traces
@@ -35,7 +36,8 @@ class Drawing:
     edges along joints are called, whether or not a block has such an edge, ``jointed`` how they cut the rock.
     ``blocks`` is None where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing,
     ``mark_places`` (path in the scene, where in the file) of each by name, ``crack_paths`` the paths of the drawn
-    cracks; ``origin`` m, world coordinates of what is (0, 0) in all these."""
+    cracks; ``origin`` m, world coordinates of what is (0, 0) in all these, ``crs`` their reference
+    system as a GeoJSON file says it."""
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
@@ -50,6 +52,7 @@ class Drawing:
     mark_places: dict[str, tuple[Path, str]] = field(default_factory=dict)
     origin: tuple[float, float] = (0.0, 0.0)
     crack_paths: dict[str, Path] = field(default_factory=dict)
+    crs: dict[str, Any] | None = None
 
     def path_of_crack(self, name: str) -> Path:
         """Where in the scene the crack ``name`` is drawn, or what made it."""
@@ -90,6 +93,7 @@ class _Parts:
     marks: list[Mark] = field(default_factory=list)
     sources: dict[tuple[str, int | str], tuple[Path, str]] = field(default_factory=dict)
     only_in: dict[int, Sequence[str]] = field(default_factory=dict)  # names of zones that a joint cuts
+    chords: Chords = field(default_factory=Chords.none)  # that stand for curves of models and files
 
     def add(self, read, source: Callable[[str, int], tuple[Path, str]], zones: Sequence[str] = ()) -> None:
         """What a file holds: zones, traces, joints (that cut the named ``zones`` alone), marks, and edges where it has
@@ -104,6 +108,7 @@ class _Parts:
             for k, item in enumerate(own):
                 self.sources[part, len(mine)] = source(part, k)
                 mine.append(item)
+        self.chords = Chords.joined([self.chords, read.chords])
         for part, mine, own in (("joints", self.joints, read.joints), ("marks", self.marks, read.marks)):
             for k, item in enumerate(own):
                 self.sources.setdefault((part, item.name), source(part, k))
@@ -123,6 +128,7 @@ class _Parts:
 
         self.zones = [replace(zone, loops=tuple(loop - origin for loop in zone.loops)) for zone in self.zones]
         self.traces, self.joints, self.marks = lines(self.traces), lines(self.joints), lines(self.marks)
+        self.chords = self.chords.moved(origin)
         x, y = origin.tolist()
         self.edges = [
             replace(e, start=(e.start[0] - x, e.start[1] - y), end=(e.end[0] - x, e.end[1] - y)) for e in self.edges
@@ -154,7 +160,8 @@ def draw(
         parts.add(read, in_model)
     else:
         _draw_here(geometry, parts)
-    if geometry.traces and not read_traces(geometry, folder, parts.add, place, faults, warnings):
+    sound, crs = read_traces(geometry, folder, parts.add, place, faults, warnings)
+    if not sound:
         return None
     if not parts.zones:
         layers = ", ".join(repr(joint.name.removeprefix(JOINT)) for joint in parts.joints[:8])
@@ -167,6 +174,7 @@ def draw(
             )
         )
         return None
+    parts.traces = ended_on(parts.traces, parts.chords)
     _refuse_two_of_a_name(parts, place, faults)
     known = list(dict.fromkeys(zone.name for zone in parts.zones))
     for k, entry in enumerate(geometry.traces):
@@ -174,12 +182,17 @@ def draw(
             if name not in known:
                 at = ("geometry", "traces", k, "zones", n)
                 faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))
+    for k, entry in enumerate(geometry.joints):
+        for n, name in enumerate(entry.zones):
+            if name not in known:
+                at = ("geometry", "joints", k, "zones", n)
+                faults.append(Fault(place(at), f"there is no zone {name!r}", nearest(name, known)))
     origin = local_origin(geometry.origin, parts.arrays(), bool(geometry.traces))
     if origin.any():
         parts.move(origin)
         geometry = moved_section(geometry, "geometry", origin)
     return _assembled(
-        geometry, parts, Drawing((), (), None, None, parameters, choices, model), origin, place, faults, warnings
+        geometry, parts, Drawing((), (), None, None, parameters, choices, model, crs=crs), origin, place, faults, warnings
     )
 
 
@@ -261,7 +274,7 @@ def _assembled(
         for k, only in parts.only_in.items():
             parts.joints[k] = within(parts.joints[k], [zone for zone in parts.zones if zone.name in only])
         _tell_outside(geometry, parts, place, warnings)
-        cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints)
+        cut = jointed(geometry, parts.zones, blocks, parts.traces, parts.joints, parts.chords)
     except ShapeError as error:
         counted_from = f"; coordinates count from ({origin[0]:.10g}, {origin[1]:.10g})" if origin.any() else ""
         # Joints are counted by name: the scene's own, then those of files.

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatchcase
+
 import numpy as np
 
 from ..conventions import outward_normal_of, traction
 from ..model import EndlessRock, Fluid, History
+from ..model.endless import connected_cracks
 from ..model.polygon import distance_to_edges
 from .drawing import Drawing
 from .errors import Check
 from .tables import SceneTables
-from .tables.loads import Rising
+from .tables.loads import FluidTable, Rising
 from .validation import nearest
 
 #: Edges lie on the free surface to this part of the drawing's size; a stress loads it not by this part of its own.
@@ -33,8 +36,14 @@ def endless_of(tables: SceneTables, drawing: Drawing) -> EndlessRock | None:
     return EndlessRock(
         _surface(drawing, tables.zones[name].surface),
         tuple(rising_history(table) for table in loads.remote),
-        tuple(Fluid(rising_history(table), "cracks" in table.fills, "holes" in table.fills) for table in loads.fluids),
+        tuple(_fluid(table, drawing) for table in loads.fluids),
     )
+
+
+def _fluid(table: FluidTable, drawing: Drawing) -> Fluid:
+    connected = bool(table.cracks) if table.connected is None else table.connected
+    names = tuple(name for pattern in table.cracks for name in drawing.cracks.names if fnmatchcase(name, pattern))
+    return Fluid(rising_history(table), "cracks" in table.fills, "holes" in table.fills, names, connected)
 
 
 def rising_history(table: Rising) -> History:
@@ -91,6 +100,30 @@ def check_endless(c: Check) -> None:
     if _surface_is_straight(c, name):
         _surface_is_free(c, name)
         _ends(c, name)
+    _fluids(c)
+
+
+def _fluids(c: Check) -> None:
+    """Cracks that a fluid is pumped into are there; one that stands in cracks which nothing connects is told."""
+    cracks = c.drawing.cracks
+    for k, table in enumerate(c.tables.loads.fluids):
+        for n, pattern in enumerate(table.cracks):
+            if not any(fnmatchcase(name, pattern) for name in cracks.names):
+                c.refuse(
+                    ("loads", "fluids", k, "cracks", n), f"there is no crack {pattern!r}",
+                    nearest(pattern, list(cracks.names)),
+                )  # fmt: skip
+        if "cracks" not in table.fills or table.cracks or not cracks.n_segments:
+            continue
+        group = connected_cracks(cracks)
+        parts = [cracks.names[int(cracks.crack[np.argmax(group == part)])] for part in np.unique(group)]
+        if len(parts) > 1:
+            shown = ", ".join(map(repr, parts[:4])) + (", …" if len(parts) > 4 else "")
+            c.warn(
+                ("loads", "fluids", k),
+                f"it fills {len(parts)} cracks, or groups of them, that nothing connects ({shown})",
+                'name those it is pumped into: cracks = ["NAME"]',
+            )
 
 
 def _alone(c: Check, name: str) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +22,34 @@ class Fault(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.place}\n    {self.message}" + (f"\n    → {self.way_out}" if self.way_out else "")
+
+
+#: Names in quotes and numbers: what two warnings of one cause differ by.
+_OWN = re.compile(r"'[^']*'|[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+#: So many of the others are named.
+_NAMED = 3
+
+
+def one_a_cause(warnings: Sequence[Fault]) -> list[Fault]:
+    """``warnings`` of one place and way out that differ in names and numbers alone made one, the first, with the count
+    of the others and some of their names."""
+    kinds: dict[tuple[str, str, str], list[Fault]] = {}
+    for warning in dict.fromkeys(warnings):
+        kinds.setdefault((warning.place, _OWN.sub("#", warning.message), warning.way_out), []).append(warning)
+    out = []
+    for first, *others in kinds.values():
+        if others:
+            names = [found for other in others if (found := _first_name(other.message)) != _first_name(first.message)]
+            shown = ", ".join(dict.fromkeys(filter(None, names[:_NAMED])))
+            more = f": {shown}{', …' if len(names) > _NAMED else ''}" if shown else ""
+            first = first._replace(message=f"{first.message} (and {len(others)} more like it{more})")
+        out.append(first)
+    return out
+
+
+def _first_name(message: str) -> str:
+    found = re.search(r"'[^']*'", message)
+    return found[0] if found else ""
 
 
 class SceneError(ValueError):

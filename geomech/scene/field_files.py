@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path as FilePath
+from typing import Any
 
 from ..shapes.field_lines import UNFINISHED, FieldDrawing, FieldFileError, Named, drawing_of_lines, named_lines
 from ..shapes.traces import read_field_file
@@ -21,12 +22,14 @@ def read_traces(
     place: Callable[[Path], str],
     faults: list[Fault],
     warnings: list[Fault],
-) -> bool:
+) -> tuple[bool, dict[str, Any] | None]:
     """Give what all files hold to ``add`` (a `FieldDrawing`, a function from (part, index) to its path in the scene and
-    its place in the file, and the names of zones that its joints cut); False after saying why one cannot be read."""
+    its place in the file, and the names of zones that its joints cut); False after saying why one cannot be read. Also
+    the coordinate reference system of the first file that says one, as GeoJSON does."""
     every: list[Named] = []
     by_file: dict[int, list[Named]] = {}
     path_of: dict[str, Path] = {}
+    systems: dict[str, Any] = {}
     sound = True
     for k, entry in enumerate(geometry.traces):
         source: Path = ("geometry", "traces", k, "file")
@@ -39,6 +42,17 @@ def read_traces(
             sound = False
             continue
         warnings += [Fault(place(source), message, way_out) for message, way_out in file.warnings]
+        if file.crs is not None:
+            systems[entry.file] = file.crs
+            first = next(iter(systems))
+            if file.crs != systems[first]:
+                warnings.append(
+                    Fault(
+                        place(source),
+                        f"{entry.file} has another coordinate reference system than {first}",
+                        "export both in one: coordinates are taken as they are",
+                    )
+                )
         named, idle, left = named_lines(file, entry.layers, entry.name, entry.kind)
         present = list(dict.fromkeys(line.layer for line in file.lines))
         for pattern, said in entry.layers.items():
@@ -67,8 +81,9 @@ def read_traces(
         every += named
         by_file[k] = [item for item in named if item.role == "joint"]
         path_of.update((item.line.place, source) for item in named)
+    crs = next(iter(systems.values()), None)
     if not sound:
-        return False
+        return False, crs
     try:
         # Joints by file, for each may cut zones of its own; outlines of all files together, for they may close one
         # another.
@@ -79,7 +94,7 @@ def read_traces(
             (path for text, path in path_of.items() if error.message.startswith(f"{text}:")), ("geometry", "traces")
         )
         faults.append(Fault(place(at), error.message, error.way_out))
-        return False
+        return False, crs
 
     for part, zones in ((drawn, ()), *((own, geometry.traces[k].zones) for k, own in joints.items())):
         for message, way_out in part.warnings:
@@ -88,7 +103,7 @@ def read_traces(
             )
             warnings.append(Fault(place(at), message, way_out))
         add(part, partial(_source, part, path_of), zones)
-    return True
+    return True, crs
 
 
 def _source(drawn: FieldDrawing, path_of: dict[str, Path], part: str, index: int) -> tuple[Path, str]:

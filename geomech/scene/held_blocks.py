@@ -34,6 +34,15 @@ def fixed_blocks(tables: SceneTables, drawing: Drawing) -> np.ndarray:
     return fixed
 
 
+def first_velocities(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+    """(n_blocks, 2) m/s as the run begins; None where all are at rest."""
+    zones = tables.zones or {}
+    given = [zones[zone].velocity_m_s if zone in zones else None for zone in drawing.zones]
+    found = np.array([(0.0, 0.0) if velocity is None else velocity for velocity in given], dtype=float).reshape(-1, 2)
+    found[fixed_blocks(tables, drawing)] = 0.0
+    return found if found.any() else None
+
+
 def held_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
     """(n_blocks, 6) which unknowns of guided blocks stay zero; None where no block is guided."""
     held = np.zeros((len(drawing.zones), 6), bool)

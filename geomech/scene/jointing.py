@@ -12,6 +12,7 @@ import numpy as np
 from ..model import Blocks, Cracks
 from ..shapes import Cutting, Joint, Mend, Trace, Zone, cut
 from ..shapes.assembly import TOLERANCE
+from ..shapes.curves import Chords, ended_on
 from ..shapes.joint_sets import (
     FisherAngle,
     Law,
@@ -63,14 +64,20 @@ class Jointed:
 
 
 def jointed(
-    geometry: Geometry, zones: list[Zone], blocks: Blocks, traces: list[Trace], drawn: Sequence[Joint] = ()
+    geometry: Geometry,
+    zones: list[Zone],
+    blocks: Blocks,
+    traces: list[Trace],
+    drawn: Sequence[Joint] = (),
+    chords: Chords | None = None,
 ) -> Jointed:
-    """The rock of ``zones``, drawn soundly as ``blocks``, cut along the scene's joints and those ``drawn`` elsewhere.
+    """The rock of ``zones``, drawn soundly as ``blocks``, cut along the scene's joints and those ``drawn`` elsewhere;
+    those that end on a curve end on its ``chords``.
 
     Raises ShapeError where joints or cracks are wrong.
     """
     named = [Zone(zone.name, tuple(blocks.loops(k)), _names(blocks, k)) for k, zone in enumerate(zones)]
-    joints = make_joints(geometry, named, drawn)
+    joints = make_joints(geometry, named, drawn, chords)
     cutting = cut(
         named,
         joints,
@@ -84,15 +91,21 @@ def jointed(
     return Jointed(tuple(joints), cutting, _cracks(geometry, named, cutting, traces))
 
 
-def make_joints(geometry: Geometry, zones: Sequence[Zone], drawn: Sequence[Joint] = ()) -> list[Joint]:
-    """Joints drawn in the scene and elsewhere, one a name, and the scene's sets over the rock of ``zones``."""
+def make_joints(
+    geometry: Geometry, zones: Sequence[Zone], drawn: Sequence[Joint] = (), chords: Chords | None = None
+) -> list[Joint]:
+    """Joints drawn in the scene and elsewhere, one a name, and the scene's sets over the rock of ``zones``; drawn ones
+    end on the ``chords`` of a curve that they end on."""
     outlines = [zone.loops[0] for zone in zones]
     lines: dict[str, list[np.ndarray]] = {}
     for joint in geometry.joints:
-        lines.setdefault(JOINT + joint.name, []).append(np.array(joint.points, dtype=float).reshape(-1, 2))
+        own = Joint(JOINT + joint.name, (np.array(joint.points, dtype=float).reshape(-1, 2),))
+        if joint.zones:
+            own = within(own, [zone for zone in zones if zone.name in joint.zones])
+        lines.setdefault(own.name, []).extend(own.lines)
     for joint in drawn:
         lines.setdefault(joint.name, []).extend(joint.lines)
-    joints = [Joint(name, tuple(own)) for name, own in lines.items()]
+    joints = ended_on([Joint(name, tuple(own)) for name, own in lines.items()], chords or Chords.none())
     low, high = np.min([o.min(axis=0) for o in outlines], axis=0), np.max([o.max(axis=0) for o in outlines], axis=0)
     box = np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
     flaws = _too_fine(geometry, box)

@@ -18,7 +18,7 @@ from .drawing import Drawing, draw
 from .drawn_marks import with_marks
 from .endless import check_endless
 from .equilibrium import check_loads
-from .errors import Check, Fault, SceneError
+from .errors import Check, Fault, SceneError, one_a_cause
 from .keys import describe_keys
 from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
@@ -144,12 +144,14 @@ class _Places:
         return sorted(dict.fromkeys(faults), key=lambda fault: self.order.get(fault.place, 0))
 
 
-def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str | None = None) -> Scene:
+def load_scene(
+    path: str | FilePath, overrides: Iterable[str] = (), variant: str | None = None, *, to_run: bool = True
+) -> Scene:
     """Load, change and check a scene.
 
     ``path`` is a .toml file or a pipeline folder (then its scene.toml); ``variant`` one of the scene's [variants];
     ``overrides`` are changes "section.key=value" on top, values in TOML's way or bare words. Raises SceneError with
-    every fault: place (file, line, key), message and way out.
+    every fault: place (file, line, key), message and way out. A scene that is not ``to_run`` may leave [run] out.
     """
     path = _file(FilePath(path))
     data, text = _parsed(path)
@@ -172,6 +174,9 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
         except OverrideError as error:
             faults.append(Fault(f"--set {override}", error.message, error.way_out))
 
+    if not to_run and "run" not in data:
+        step = data["dda"].get("time_step_s") if isinstance(data.get("dda"), dict) else None
+        data["run"] = {"end_time_s": max(1.0, step) if isinstance(step, float | int) else 1.0}
     _resolve_records(data, path.parent)
     tables, found = validate(data, places)
     faults += found
@@ -193,7 +198,7 @@ def load_scene(path: str | FilePath, overrides: Iterable[str] = (), variant: str
     check_plausible(sections)
     # Building asks the same questions as the checks did; whatever it would find has been found.
     quiet = Check(tables, data, drawing, place, [], [])
-    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(warnings)), quiet, written)
+    return Scene(path, variant, tables, drawing, names, tuple(places.sorted(one_a_cause(warnings))), quiet, written)
 
 
 def _file(path: FilePath) -> FilePath:

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..model import Blocks, Cracks, History, counted
-from .actions import force_history, traction_history
+from .actions import deepest_pond, force_history, said_of_pond, traction_history
 from .checks import material_of
 from .drawing import Drawing
 from .endless import rising_history
@@ -31,7 +31,7 @@ def overview(tables: SceneTables, drawing: Drawing) -> list[str]:
         rows.append(("held", f"{count} by edges called {', '.join(map(repr, held))}"))
     rows += _cut("materials", _materials(tables))
     rows += _cut("cracks", _cracks(drawing.cracks))
-    rows += _cut("loads", _loads(tables, drawing.blocks))
+    rows += _cut("loads", _loads(tables, drawing))
     stops = f" or the first of {', '.join(tables.run.stop_at)}" if tables.run.stop_at else ""
     rows.append(("run", f"to {tables.run.end_time_s:g} s{stops}, {_steps(tables)}"))
     # A label stands before the first of its lines.
@@ -69,6 +69,8 @@ def _zones(tables: SceneTables, drawing: Drawing) -> list[str]:
         text += f", {blocks} blocks" if blocks > 1 else ""
         if entry is not None and (entry.fixed or entry.guided):
             text += ", fixed" if entry.fixed else f", guided along {entry.guided}"
+        if entry is not None and entry.velocity_m_s is not None:
+            text += f", at ({entry.velocity_m_s[0]:g}, {entry.velocity_m_s[1]:g}) m/s to begin with"
         if entry is not None and entry.body != "block":
             text += f", a piece of the {'infinite ' if entry.body == 'plane' else ''}{entry.body}"
         lines.append(text)
@@ -99,8 +101,8 @@ def _cracks(cracks: Cracks) -> list[str]:
     return lines
 
 
-def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
-    end, lines = tables.run.end_time_s, []
+def _loads(tables: SceneTables, drawing: Drawing) -> list[str]:
+    end, lines, blocks = tables.run.end_time_s, [], drawing.blocks
     for traction in tables.loads.tractions:
         history = traction_history(traction)
         lines.append(f"{traction.edge}: " + _course(history, end, "Pa", _sense(blocks, traction.edge, history.at(end))))
@@ -112,7 +114,9 @@ def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
     for table in tables.loads.remote:
         lines.append("far away, [xx, yy, xy]: " + _rising(table, end))
     for table in tables.loads.fluids:
-        lines.append(f"fluid in {' and '.join(table.fills)}: " + _rising(table, end))
+        where = " and ".join(table.fills)
+        where += f" ({', '.join(table.cracks)})" if table.cracks else ""
+        lines.append(f"fluid in {where}: " + _rising(table, end))
     for text, count in (
         ("motions of blocks", len(tables.loads.motions)),
         ("motions of points", len(tables.loads.point_motions)),
@@ -121,7 +125,10 @@ def _loads(tables: SceneTables, blocks: Blocks) -> list[str]:
     ):
         lines += [f"{text}: {count}"] if count else []
     if tables.loads.water is not None:
-        lines.append(f"water table over {counted(len(tables.loads.water.points), 'point')}")
+        text = f"water table over {counted(len(tables.loads.water.points), 'point')}"
+        pond = deepest_pond(tables, drawing.blocks)
+        text += ", following the ground" if tables.loads.water.follows_ground else ""
+        lines.append(text if pond is None else f"{text}, {said_of_pond(*pond, drawing.origin)}")
     if tables.loads.base is not None:
         lines.append(f"shaking, seen from the {tables.loads.base.frame}")
     if tables.loads.in_situ is not None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..conventions import outward_normal_of
+from ..model import counted
 from ..model.corners import LARGEST_SHARE, corner_lengths
 from ..model.polygon import distance_to_edges
+from ..shapes.rock_outline import ground_of
 from .actions import traction_history
 from .checks import material_of
 from .errors import Check
-from .held_blocks import fixed_blocks
+from .held_blocks import fixed_blocks, held_unknowns
 from .tables import SceneTables
 from .tables.loads import TractionTable
 
@@ -31,6 +33,9 @@ LIES_ON, MOST_OF_IT = 1e-6, 0.5
 #: A block that moves is a sliver beside one so many times as large by area: in motion, pairs of such blocks shorten steps
 #: (`dda.approach`) to less than a third of what those of the large one take.
 SLIVER = 1e-2
+#: A slope is where the ground at one end of the section stands above that at the other by this part of its height, and
+#: its back is free where that much of what rises is.
+SLOPES = 0.25
 #: Rock breaks at strains of 0.1 to 1 %, and elements and blocks here are linear elastic.
 LARGEST_STRAIN = 0.05
 
@@ -48,6 +53,7 @@ def check_plausible(c: Check) -> None:
     _increment(c)
     _slivers(c)
     _rounding(c)
+    _free_back(c)
 
 
 def _materials(c: Check) -> None:
@@ -115,6 +121,38 @@ def _rounding(c: Check) -> None:
         f"of {blocks.names[int(blocks.vertex_block[worst])]!r} at x = {x:.4g}, y = {y:.4g} m over {longest[worst]:.2g} m "
         f"instead of {rounding[worst]:.2g} m",
         f"a corner is rounded over at most {LARGEST_SHARE:g} of its shorter edge",
+    )
+
+
+def _free_back(c: Check) -> None:
+    """A slope whose back is no rock: blocks leave it there as well as at the face."""
+    blocks, t = c.drawing.blocks, c.tables
+    fixed = fixed_blocks(t, c.drawing)
+    if not any(t.loads.gravity_m_s2) or blocks.n_blocks < 3 or not fixed.any() or fixed.all():
+        return
+    ground, low = ground_of(blocks), float(blocks.vertices[:, 1].min())
+    rise = float(ground[0, 1] - ground[-1, 1])
+    if abs(rise) < SLOPES * (ground[:, 1].max() - low):
+        return
+    side = 0 if rise > 0 else -1
+    x = float(ground[side, 0])
+    starts, ends = blocks.vertices, blocks.vertices[blocks.next_vertex]
+    loaded = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
+    held = held_unknowns(t, c.drawing)
+    free = ~fixed if held is None else ~fixed & ~held.any(axis=1)
+    near = 1e-6 * float(np.ptp(blocks.vertices, axis=0).max())
+    on = free[blocks.vertex_block] & (np.abs(starts[:, 0] - x) < near) & (np.abs(ends[:, 0] - x) < near)
+    on &= ~np.isin(blocks.edge_name, [k for k, name in enumerate(blocks.edge_names) if name in loaded])
+    height = float(np.abs(ends[on, 1] - starts[on, 1]).sum())
+    if height < SLOPES * abs(rise):
+        return
+    count = len(np.unique(blocks.vertex_block[on]))
+    x += c.drawing.origin[0]
+    c.warn(
+        ("geometry",),
+        f"nothing holds the back of the slope: {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
+        f"at x = {x:.6g} m over {height:.3g} m, and leave the rock there",
+        'draw fixed rock behind it ([zones.NAME] fixed = true), or call those edges "guided:y" or "fixed"',
     )
 
 

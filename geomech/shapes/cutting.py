@@ -18,6 +18,7 @@ from ..model import Blocks, Cracks
 from .arrangement import Arrangement, arrange, following_in, gathered
 from .assembly import TOLERANCE, block_names
 from .noding import FREE, Drawn, Graph, Mend, noded
+from .partings import Parting, partings, trace_lengths, trimmed_away
 from .parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
 
 #: Two edges at a node go straight on when they turn by less than 5° (its cosine): so much a hand-drawn trace may bend.
@@ -31,6 +32,7 @@ class Cutting:
     zone      (n_blocks,)  the zone each block was cut from
     mends                  what was moved, joined or left out
     nodes                  {"I": n, "Y": n, "X": n}: ends in rock, junctions of three (T or Y), crossings of four joints
+    partings               of the joints of every name, in their order
     """
 
     blocks: Blocks
@@ -38,6 +40,7 @@ class Cutting:
     zone: np.ndarray
     mends: tuple[Mend, ...]
     nodes: dict[str, int]
+    partings: tuple[Parting, ...] = ()
 
 
 def cut(
@@ -72,9 +75,12 @@ def cut(
     mends: list[Mend] = []
     grid = 10.0**-decimals
     graph = noded(drawn, tolerance, decimals, mends)
+    reach = None
     while True:
         arrangement = arrange(graph.nodes, graph.edges)
         zone = _zones_of(arrangement, graph.source >= drawn.n_outlines, zones, origin)
+        if reach is None:
+            reach = trace_lengths(graph, drawn, ~_outside(arrangement, zone))
         keep, stay = _kept(
             arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, lasting, mends
         )
@@ -87,6 +93,9 @@ def cut(
     if not keep.all():
         arrangement, graph = arrangement.only(keep), graph.only(keep)
     inside = np.flatnonzero(zone >= 0)
+    if dead_ends == "trim":
+        mends += trimmed_away(drawn, reach, trace_lengths(graph, drawn, np.ones(len(graph.edges), bool)))
+    cutting = trace_lengths(graph, drawn, ~arrangement.dead)
     cracks = _cracks(arrangement, graph, drawn, inside)
     blocks = _blocks(arrangement, drawn, graph.source, inside, [zones[z].name for z in zone[inside]], grid)
     if origin.any():
@@ -96,7 +105,9 @@ def cut(
     kind = _junctions(graph, drawn)
     mends = _with_junctions(mends, graph.nodes + origin, kind, tolerance)
     nodes = {name: int(np.isin(kind, kinds).sum()) for name, kinds in (("I", "I"), ("Y", ("T", "Y")), ("X", "X"))}
-    return Cutting(blocks, cracks, zone[inside], tuple(mends), nodes)
+    return Cutting(
+        blocks, cracks, zone[inside], tuple(mends), nodes, partings(drawn, [j.name for j in joints], reach, cutting)
+    )
 
 
 def _origin(loops: Sequence[np.ndarray]) -> np.ndarray:

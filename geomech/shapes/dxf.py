@@ -21,6 +21,8 @@ _INSUNITS = {
 }  # fmt: skip
 #: A closed curve is at least a square, an arc of a third of a turn two chords.
 _LEAST_TURN = math.pi / 2
+#: Points of an entity, whether it closes, and where the piece after each point stands for a curve (one for all).
+_Sampled = tuple[Any, bool, "bool | list[bool]"]
 #: References to references, deeper than this, go in a circle.
 _DEEPEST = 32
 
@@ -60,19 +62,22 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
     chord = CHORD * size if chord_tolerance is None else chord_tolerance / factor
     lines, heights = [], []
     for layer, entity in entities:
-        points, closed = reader.points(entity, chord)
+        points, closed, bent = reader.points(entity, chord)
         heights.append(float(np.abs(points[:, 2]).max()))
         if len(points) > 1:
-            points = points[np.append(True, (np.diff(points[:, :2], axis=0) != 0).any(axis=1))]
+            apart = (np.diff(points[:, :2], axis=0) != 0).any(axis=1)
+            # Of points on one another the first stays, and the piece after the last.
+            points, bent = points[np.append(True, apart)], bent[np.append(apart, True)]
         if closed and len(points) > 1 and np.hypot(*(points[0] - points[-1])[:2]) <= 1e-12 * size:
-            points = points[:-1]
+            points, bent = points[:-1], bent[:-1]
         if len(points) < 2 and entity.dxftype() != "POINT":
             reader.left[entity.dxftype() + " without length"] += 1
             continue
         place = f"{path.name}: layer {layer!r}, {entity.dxftype()}"
         place += f" #{entity.dxf.handle}" if entity.dxf.handle else " of a block"
         shape = "closed" if closed and len(points) > 2 else "line"
-        lines.append(FieldLine(layer, factor * points[:, :2], place, shape))
+        away = np.where(bent, factor * chord, 0.0) if bent.any() else None
+        lines.append(FieldLine(layer, factor * points[:, :2], place, shape, away=away))
     if heights and max(heights) > 1e-9 * size:
         warnings.append(
             (
@@ -144,16 +149,17 @@ class _Reader:
     def _skipped(self, entity: Any, reason: str) -> None:
         self.left[f"{entity.dxftype()} in a block ({reason})"] += 1
 
-    def points(self, entity: Any, chord: float) -> tuple[np.ndarray, bool]:
-        """(n, 3) points of an entity, in the file's unit, and whether it closes."""
-        points, closed = _POINTS[entity.dxftype()](entity, chord)
+    def points(self, entity: Any, chord: float) -> tuple[np.ndarray, bool, np.ndarray]:
+        """(n, 3) points of an entity, in the file's unit; whether it closes; (n,) True where the piece after a point
+        stands for a curve."""
+        points, closed, bent = _POINTS[entity.dxftype()](entity, chord)
         points = np.array([tuple(point)[:3] for point in points], dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
             raise FieldFileError(
                 f"{self.path.name}: {entity.dxftype()} #{entity.dxf.handle} has a coordinate that is no finite number",
                 "delete or redraw it",
             )
-        return points, closed
+        return points, closed, np.broadcast_to(np.asarray(bent, dtype=bool), len(points))
 
     def told(self) -> list[tuple[str, str]]:
         warnings = []
@@ -174,22 +180,22 @@ def _is_line(polyline: Any) -> bool:
     return polyline.is_2d_polyline or polyline.is_3d_polyline
 
 
-def _line(entity: Any, chord: float) -> tuple[Any, bool]:
-    return [entity.dxf.start, entity.dxf.end], False
+def _line(entity: Any, chord: float) -> _Sampled:
+    return [entity.dxf.start, entity.dxf.end], False, False
 
 
-def _arc(entity: Any, chord: float) -> tuple[Any, bool]:
+def _arc(entity: Any, chord: float) -> _Sampled:
     radius, extrusion = abs(entity.dxf.radius), entity.ocs()
     first = math.radians(entity.dxf.start_angle)
     turn = math.radians((entity.dxf.end_angle - entity.dxf.start_angle) % 360.0) or 2 * math.pi
     centre = entity.dxf.center
-    return extrusion.points_to_wcs(_turned(centre.x, centre.y, centre.z, radius, first, turn, chord)), False
+    return extrusion.points_to_wcs(_turned(centre.x, centre.y, centre.z, radius, first, turn, chord)), False, True
 
 
-def _circle(entity: Any, chord: float) -> tuple[Any, bool]:
+def _circle(entity: Any, chord: float) -> _Sampled:
     centre = entity.dxf.center
     points = _turned(centre.x, centre.y, centre.z, abs(entity.dxf.radius), 0.0, 2 * math.pi, chord)
-    return entity.ocs().points_to_wcs(points[:-1]), True
+    return entity.ocs().points_to_wcs(points[:-1]), True, True
 
 
 def _turned(
@@ -205,30 +211,35 @@ def _pieces(radius: float, turn: float, chord: float) -> int:
     return max(1, math.ceil(abs(turn) / min(each, _LEAST_TURN) - 1e-9))
 
 
-def _lwpolyline(entity: Any, chord: float) -> tuple[Any, bool]:
+def _lwpolyline(entity: Any, chord: float) -> _Sampled:
     rows = list(entity.get_points("xyb"))
-    points = _bulged(rows, entity.closed, chord)
+    points, bent = _bulged(rows, entity.closed, chord)
     height = entity.dxf.elevation
-    return entity.ocs().points_to_wcs([(x, y, height) for x, y in points]), entity.closed
+    return entity.ocs().points_to_wcs([(x, y, height) for x, y in points]), entity.closed, bent
 
 
-def _polyline(entity: Any, chord: float) -> tuple[Any, bool]:
+def _polyline(entity: Any, chord: float) -> _Sampled:
     closed = entity.is_closed
     if entity.is_3d_polyline:
-        return list(entity.points()), closed
+        return list(entity.points()), closed, False
     # Control points of a fitted curve are no part of it.
     vertices = [v for v in entity.vertices if not v.dxf.flags & 16]
     rows = [(v.dxf.location.x, v.dxf.location.y, v.dxf.bulge) for v in vertices]
     height = vertices[0].dxf.location.z if vertices else 0.0
-    return entity.ocs().points_to_wcs([(x, y, height) for x, y in _bulged(rows, closed, chord)]), closed
+    points, bent = _bulged(rows, closed, chord)
+    return entity.ocs().points_to_wcs([(x, y, height) for x, y in points]), closed, bent
 
 
-def _bulged(rows: list[tuple[float, float, float]], closed: bool, chord: float) -> list[tuple[float, float]]:
-    """Vertices with the points of arcs between them; a bulge is the tangent of a quarter of its arc's angle, positive
-    to the left of the way from end to end as the arc turns."""
+def _bulged(
+    rows: list[tuple[float, float, float]], closed: bool, chord: float
+) -> tuple[list[tuple[float, float]], list[bool]]:
+    """Vertices with the points of arcs between them, and where an arc follows; a bulge is the tangent of a quarter of
+    its arc's angle, positive to the left of the way from end to end as the arc turns."""
     points: list[tuple[float, float]] = []
+    bent: list[bool] = []
     for k, (x, y, bulge) in enumerate(rows):
         points.append((x, y))
+        bent.append(False)
         if not bulge or (k + 1 == len(rows) and not closed):
             continue
         x1, y1, _ = rows[(k + 1) % len(rows)]
@@ -244,21 +255,22 @@ def _bulged(rows: list[tuple[float, float, float]], closed: bool, chord: float) 
         n = _pieces(abs(radius), turn, chord)
         for angle in first + turn * np.arange(1, n) / n:
             points.append((cx + abs(radius) * math.cos(angle), cy + abs(radius) * math.sin(angle)))
-    return points
+        bent[-1:] = [True] * n
+    return points, bent
 
 
-def _ellipse(entity: Any, chord: float) -> tuple[Any, bool]:
+def _ellipse(entity: Any, chord: float) -> _Sampled:
     points = list(entity.flattening(chord, segments=8))
-    return points, len(points) > 2 and points[0].isclose(points[-1])
+    return points, len(points) > 2 and points[0].isclose(points[-1]), True
 
 
-def _spline(entity: Any, chord: float) -> tuple[Any, bool]:
+def _spline(entity: Any, chord: float) -> _Sampled:
     points = list(entity.flattening(chord, segments=4))
-    return points, len(points) > 2 and points[0].isclose(points[-1])
+    return points, len(points) > 2 and points[0].isclose(points[-1]), True
 
 
-def _point(entity: Any, chord: float) -> tuple[Any, bool]:
-    return [entity.dxf.location], False
+def _point(entity: Any, chord: float) -> _Sampled:
+    return [entity.dxf.location], False, False
 
 
 _POINTS = {

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .curves import Chords, ended_on
 from .parts import EdgeLine, Joint, Mark, Trace, Zone, extent_of
 
 #: Metres in each unit that a file may be drawn in.
@@ -43,21 +44,32 @@ class FieldFileError(ValueError):
 class FieldLine:
     """One line of a file: ``points`` (n, 2), one alone for a point; ``layer`` the layer or set it is in, ``label`` a
     name of its own (of a monitor) or ""; ``place`` says where it stands in the file. ``shape`` is "line", "closed" (its
-    first point not repeated), "area" (a closed line that is meant as an area) or "hole" (of the area before it)."""
+    first point not repeated), "area" (a closed line that is meant as an area) or "hole" (of the area before it). Of a
+    curve, ``away`` says how far it may leave the piece after each point, (n,) m."""
 
     layer: str
     points: np.ndarray
     place: str
     shape: str = "line"
     label: str = ""
+    away: np.ndarray | None = None
+
+    def chords(self) -> Chords:
+        """The pieces that stand for curves."""
+        if self.away is None:
+            return Chords.none()
+        points = self.points if self.shape == "line" else np.concatenate([self.points, self.points[:1]])
+        return Chords.of([points], [self.away[: len(points) - 1]])
 
 
 @dataclass(frozen=True, eq=False)
 class FieldFile:
-    """``lines`` of a file in m, and what in it was left out, as (message, way out)."""
+    """``lines`` of a file in m, and what in it was left out, as (message, way out); ``crs`` is the member of a GeoJSON
+    that says its coordinate reference system, None where none is said."""
 
     lines: tuple[FieldLine, ...]
     warnings: tuple[tuple[str, str], ...] = ()
+    crs: dict | None = None
 
 
 class Named(NamedTuple):
@@ -72,7 +84,7 @@ class Named(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class FieldDrawing:
     """What lines make. ``places`` says, for ("zones" | "cracks" | "joints" | "edges" | "marks", index), where in its
-    file each stands."""
+    file each stands; ``chords`` stand for the curves of outlines, joints and cracks."""
 
     zones: tuple[Zone, ...] = ()
     traces: tuple[Trace, ...] = ()
@@ -81,6 +93,7 @@ class FieldDrawing:
     marks: tuple[Mark, ...] = ()
     warnings: tuple[tuple[str, str], ...] = ()
     places: Mapping[tuple[str, int], str] = field(default_factory=dict)
+    chords: Chords = field(default_factory=Chords.none)
 
 
 def role_of(name: str) -> tuple[str, str] | None:
@@ -141,7 +154,7 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
     """Zones, cracks, joints, named edges and marks that ``lines`` make.
 
     Closed lines of zones, and open ones where they close one another, are outlines; one inside another is cut out of
-    it, and so are holes. Every line of a set of cracks is a crack, "NAME 1", "NAME 2", … where there are several.
+    it, and so are holes. Ends of joints and cracks on a curve are on its chords. Every line of a set of cracks is a crack, "NAME 1", "NAME 2", … where there are several.
     Raises FieldFileError for outlines that do not close.
     """
     warnings: list[tuple[str, str]] = []
@@ -194,14 +207,16 @@ def drawing_of_lines(lines: Sequence[Named]) -> FieldDrawing:
             places["cracks", len(traces)] = line.place
             traces.append(Trace(name if len(own) == 1 else f"{name} {k}", (line.points,)))
     zones = _zones(outlines, places)
+    chords = Chords.joined([item.line.chords() for item in lines if item.role in ("zone", "hole", "joint", "crack")])
     return FieldDrawing(
         zones=tuple(zones),
-        traces=tuple(traces),
-        joints=tuple(Joint(name, tuple(own)) for name, own in joints.items()),
+        traces=tuple(ended_on(traces, chords)),
+        joints=tuple(ended_on([Joint(name, tuple(own)) for name, own in joints.items()], chords)),
         edges=tuple(edges),
         marks=tuple(Mark(name, tuple(own)) for name, own in marks.items()),
         warnings=tuple(warnings),
         places=places,
+        chords=chords,
     )
 
 

@@ -12,6 +12,8 @@ from .parts import Joint
 
 #: Traces are on one line when they are this near to it, relative to the region.
 _ON_ONE_LINE = 1e-7
+#: Spacings of lines are taken where at least this part of the longest chord of the region lies between them.
+_LONG_ENOUGH = 0.5
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,7 @@ class SetStatistics:
                        traces, their middles
     p21                m/m²: length of trace for each area
     mean_length        m: p21 / p20, the mean of whole traces of which the window cuts some off (Mauldon 1998)
+    window_length      m: the mean of what the region shows of each trace that reaches into it
     seen_length, seen_length_deviation   m: of the traces that lie inside with both ends
     mean_spacing, spacing_deviation      m: between neighbours along the scan-lines
     mean_angle, angle_deviation          rad: of the traces, the mean weighed by their length
@@ -35,6 +38,7 @@ class SetStatistics:
     p20: float
     p21: float
     mean_length: float
+    window_length: float
     seen_length: float
     seen_length_deviation: float
     mean_spacing: float
@@ -54,9 +58,9 @@ class LineStatistics:
     persistence: float
 
 
-def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics:
+def set_statistics(joint: Joint, region, scan_lines: int = 200, tolerance: float = 0.0) -> SetStatistics:
     """Statistics of ``joint`` inside ``region``, (n, 2) or a shapely polygon; ``p10`` and spacings on equidistant
-    ``scan_lines`` at right angles to its mean direction."""
+    ``scan_lines`` at right angles to its mean direction. Ends within ``tolerance`` m of the region's rim are on it."""
     import shapely
 
     area = shapely.Polygon(region) if isinstance(region, np.ndarray) else region
@@ -66,13 +70,13 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics
     kept = length > 0
     if not kept.any():
         nan = float("nan")
-        return SetStatistics(joint.name, 0, 0.0, 0.0, 0.0, *(nan,) * 7)
+        return SetStatistics(joint.name, 0, 0.0, 0.0, 0.0, *(nan,) * 8)
     ends = np.array([line[[0, -1]] for line in joint.lines])[kept]
     inside, length = inside[kept], length[kept]
     mean, off = mean_direction(ends, length)
     at = shapely.points(ends)
     # An end on the rim is where the region stops, not the trace.
-    reach = _ON_ONE_LINE * float(np.hypot(*np.subtract(area.bounds[2:], area.bounds[:2])))
+    reach = max(tolerance, _ON_ONE_LINE * float(np.hypot(*np.subtract(area.bounds[2:], area.bounds[:2]))))
     rim = area.boundary
     shapely.prepare(rim)
     free = shapely.covers(area, at) & ~shapely.dwithin(rim, at, reach)
@@ -89,6 +93,7 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics
         p20=per_area,
         p21=float(length.sum()) / area.area,
         mean_length=float(length.sum()) / area.area / per_area if free.any() else float("nan"),
+        window_length=_mean(length),
         seen_length=_mean(seen),
         seen_length_deviation=_deviation(seen),
         mean_spacing=_mean(between),
@@ -101,8 +106,8 @@ def set_statistics(joint: Joint, region, scan_lines: int = 200) -> SetStatistics
 def line_statistics(joint: Joint, region) -> LineStatistics:
     """Of the lines that the straight traces of a parallel set lie on inside ``region``, (n, 2) or a shapely polygon.
 
-    Lines without any trace in the region are not seen. Spacings are taken where the lines pass beside the region's
-    middle.
+    Lines without any trace in the region are not seen. Spacings are taken where the region shows at least half as much
+    of a line between them as it does elsewhere.
     """
     import shapely
 
@@ -130,9 +135,13 @@ def line_statistics(joint: Joint, region) -> LineStatistics:
     start = ends[longest].mean(axis=1)
     chords = shapely.intersection(shapely.linestrings(np.stack([start - step, start + step], axis=1)), area)
     place = np.sort(at[longest])
-    # Beyond the region's own width some lines miss it: their neighbours would seem too far apart.
-    seen = shapely.contains_xy(area, *(middle + place[:, None] * across).T)
-    between = np.diff(place[seen] if seen.sum() > 1 else place)
+    between = np.diff(place)
+    # Where a line would show little of itself some are missed, and their neighbours seem too far apart.
+    halfway = middle + (place[:-1] + 0.5 * between)[:, None] * across
+    shown = shapely.length(
+        shapely.intersection(shapely.linestrings(np.stack([halfway - size * along, halfway + size * along], axis=1)), area)
+    )
+    between = between[shown >= _LONG_ENOUGH * shown.max(initial=0.0)]
     return LineStatistics(
         len(longest), _mean(between), _deviation(between), float(length.sum() / shapely.length(chords).sum())
     )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .curves import Chords
 from .gmsh_drawing import GmshModelError
 from .parts import Zone
 
@@ -15,6 +16,11 @@ class Curves:
 
     def __init__(self, gmsh, chord: float) -> None:
         self.gmsh, self.chord, self.known = gmsh, chord, {}
+        self.bent: dict[int, float] = {}  # how far each curve that is not straight may leave its chords, m
+
+    def chords(self) -> Chords:
+        """The chords of all curves so far that are not straight."""
+        return Chords.of([self.known[tag][0] for tag in self.bent], list(self.bent.values()))
 
     def polyline(self, tag: int) -> tuple[np.ndarray, int, int]:
         """(n, 2) points along the curve ``tag``, reversed for a negative one, and the tags of its end points."""
@@ -39,8 +45,11 @@ class Curves:
             t = np.linspace(low, high, 2 * pieces + 1)
             fine = model.getValue(1, tag, t.tolist()).reshape(-1, 3)[:, :2]
             points = fine[::2]
-            if np.hypot(*(fine[1::2] - 0.5 * (points[1:] + points[:-1])).T).max() <= self.chord:
+            away = float(np.hypot(*(fine[1::2] - 0.5 * (points[1:] + points[:-1])).T).max())
+            if away <= self.chord:
                 break
+        if away > 1e-6 * self.chord:
+            self.bent[tag] = max(self.chord, away)
         return points
 
     def chained(self, tags: list[int]) -> list[np.ndarray]:

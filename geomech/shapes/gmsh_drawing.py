@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from .curves import Chords
 from .parts import Joint, Mark, Trace, Zone
 
 #: Physical curves whose name starts so are cracks; every other name belongs to edges of blocks.
@@ -35,7 +36,7 @@ class GmshDrawing:
     """What a model holds: ``zones`` (with named edges), ``traces`` of cracks, its ``parameters`` by short name as used,
     ``warnings`` as (message, way out): whatever is drawn and left out; ``joints``; and where they stand in the model:
     ``places`` says, for ("zones" | "cracks" | "joints" | "marks", index), which entities they are; ``marks`` are bolts,
-    water tables and measuring points."""
+    water tables and measuring points; ``chords`` stand for its curves."""
 
     zones: tuple[Zone, ...]
     traces: tuple[Trace, ...]
@@ -44,6 +45,7 @@ class GmshDrawing:
     joints: tuple[Joint, ...] = ()
     places: Mapping[tuple[str, int], str] = field(default_factory=dict)
     marks: tuple[Mark, ...] = ()
+    chords: Chords = field(default_factory=Chords.none)
 
 
 def scaled(found: GmshDrawing, factor: float) -> GmshDrawing:
@@ -58,4 +60,5 @@ def scaled(found: GmshDrawing, factor: float) -> GmshDrawing:
         traces=tuple(map(lines, found.traces)),
         joints=tuple(map(lines, found.joints)),
         marks=tuple(map(lines, found.marks)),
+        chords=found.chords.scaled(factor),
     )

@@ -10,20 +10,27 @@ from .gmsh_curves import Curves
 from .gmsh_drawing import CRACK
 from .parts import JOINT, Zone
 
+#: A curve is inside the rock where more of it is than this part of the rock's size: chords leave curves by less.
+_INSIDE = 1e-3
+
 
 def lost_curves(gmsh, path: Path, curves: Curves, zones: list[Zone], known: set[int]) -> list[tuple[str, str]]:
     """A warning a zone for curves drawn inside it that are neither its boundary nor cracks: most likely cracks that
     were not named, of which the run would know nothing."""
     outlines = {abs(tag) for _, tag in gmsh.model.getBoundary(gmsh.model.getEntities(2), combined=False)}
+    import shapely
+
+    # Without a rim as wide as chords leave curves: what runs along an outline is not inside.
+    rock = shapely.buffer([shapely.Polygon(zone.loops[0], zone.loops[1:]) for zone in zones], -2 * curves.chord)
+    size = max(max(np.ptp(zone.loops[0], axis=0)) for zone in zones)
     inside: dict[str, list[int]] = {}
     for _, tag in gmsh.model.getEntities(1):
         if tag in known or tag in outlines:
             continue
-        points = curves.polyline(tag)[0]
-        middles = 0.5 * (points[1:] + points[:-1])
-        zone = next((zone for zone in zones if any(_holds(zone, middle) for middle in middles)), None)
-        if zone is not None:
-            inside.setdefault(zone.name, []).append(tag)
+        # The zone that holds most of it, wherever the middle of the curve lies.
+        shares = shapely.length(shapely.intersection(rock, shapely.linestrings(curves.polyline(tag)[0])))
+        if shares.max() > _INSIDE * size:
+            inside.setdefault(zones[int(np.argmax(shares))].name, []).append(tag)
     warnings = []
     for name, tags in inside.items():
         listed = ", ".join(map(str, tags))
@@ -35,18 +42,6 @@ def lost_curves(gmsh, path: Path, curves: Curves, zones: list[Zone], known: set[
         )
         warnings.append((message, way_out))
     return warnings
-
-
-def _holds(zone: Zone, point: np.ndarray) -> bool:
-    """Whether ``point`` is inside the outline and outside the holes: a ray from it crosses the loops an odd number of
-    times."""
-    crossings = 0
-    for loop in zone.loops:
-        a, b = loop, np.roll(loop, -1, axis=0)
-        spans = (a[:, 1] > point[1]) != (b[:, 1] > point[1])
-        a, b = a[spans], b[spans]
-        crossings += int((a[:, 0] + (point[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]) > point[0]).sum())
-    return crossings % 2 == 1
 
 
 def out_of_plane(gmsh, path: Path, size: float) -> list[tuple[str, str]]:

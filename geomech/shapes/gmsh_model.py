@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .curves import ended_on
 from .field_lines import METRES
 from .gmsh_curves import Curves
 from .gmsh_drawing import CRACK, GmshDrawing, GmshModelError, Parameter, scaled
@@ -37,7 +38,8 @@ def read_gmsh_model(
     "bolt:NAME", "water" and "water:NAME" are lines that cut nothing, and physical points called "monitor:NAME" or
     "probe:NAME" measuring points; all other physical curves name the block edges on them. A .brep or .step without
     physical surfaces gives a zone a surface, and what its shapes are called there names surfaces and curves. Curved
-    edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side). ``unit`` (a key of
+    edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side), and ends of joints and
+    cracks that are as near to a curve are on its chords. ``unit`` (a key of
     `geomech.shapes.field_lines.METRES`) is what the model is drawn in, default m; for a .step, what the file says.
 
     Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
@@ -132,7 +134,17 @@ def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | 
             )
     warnings += lost_curves(gmsh, path, curves, zones, used | traced | told)
     warnings += out_of_plane(gmsh, path, max(box[3] - box[0], box[4] - box[1]))
-    return GmshDrawing(tuple(zones), tuple(traces), parameters, tuple(warnings), tuple(joints), places, tuple(marks))
+    chords = curves.chords()
+    return GmshDrawing(
+        tuple(zones),
+        tuple(ended_on(traces, chords)),
+        parameters,
+        tuple(warnings),
+        tuple(ended_on(joints, chords)),
+        places,
+        tuple(marks),
+        chords,
+    )
 
 
 def _named_groups(gmsh, path: Path, warnings: list[tuple[str, str]]) -> dict[int, list[tuple[str, int, list[int]]]]:

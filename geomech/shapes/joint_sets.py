@@ -16,6 +16,9 @@ from .parts import Joint
 
 LAWS = ("constant", "normal", "uniform", "lognormal", "exponential")
 
+#: No normal or uniform length is longer than its mean by more than this many standard deviations.
+_FARTHEST = 6.0
+
 
 @dataclass(frozen=True)
 class Law:
@@ -83,6 +86,21 @@ class Law:
             f"a length of mean {self.mean:g} and deviation {self.deviation:g} ({self.law}) is hardly ever positive"
         )
 
+    def met(self, rng: np.random.Generator) -> float:
+        """The length that lies at a place taken anywhere on a line of such lengths end to end: long ones lie there the
+        more often, in proportion to themselves (Cox 1962, Renewal theory, 5.4)."""
+        if self.spread == 0:
+            return float(self.mean)
+        if self.law == "exponential":
+            return float(rng.gamma(2.0, self.mean))
+        if self.law == "lognormal":
+            square = math.log1p((self.deviation / self.mean) ** 2)
+            return float(rng.lognormal(math.log(self.mean) + 0.5 * square, math.sqrt(square)))
+        while True:
+            length = float(self.lengths(rng, 1)[0])
+            if rng.random() * (self.mean + _FARTHEST * self.deviation) < length:
+                return length
+
 
 def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
     """Angle (rad, counter-clockwise) of the trace of a plane in a vertical section whose x axis points to azimuth
@@ -100,7 +118,10 @@ def apparent_dip(dip: float, dip_direction: float, section: float) -> float:
 class FisherAngle:
     """Angles of the traces of planes whose poles are spread in space by Fisher's law of constant ``concentration``
     about those of the mean ``dip`` and ``dip_direction``; in a section with its x axis to azimuth ``section``. In rad;
-    stands in place of a `Law` of the angle."""
+    stands in place of a `Law` of the angle.
+
+    The section cuts a plane as often as the sine of the angle between its pole and the section's normal (Terzaghi
+    1965): planes beside the section are seldom seen in it."""
 
     dip: float
     dip_direction: float
@@ -113,23 +134,32 @@ class FisherAngle:
 
     def sample(self, rng: np.random.Generator, n: int) -> np.ndarray:
         """(n,) angles within 90° of the mean."""
-        return self.mean + self._off(rng.random(n), rng.uniform(0, 2 * math.pi, n))
+        found, wanted = np.empty(0), n
+        while len(found) < n:
+            off, chance = self._off(rng.random(wanted), rng.uniform(0, 2 * math.pi, wanted))
+            found = np.append(found, off[rng.random(wanted) < chance])
+            # As many again as the part that was cut lets expect.
+            wanted = min(1_000_000, math.ceil(1.2 * (n - len(found)) / max(chance.mean(), 1e-3)) + 16)
+        return self.mean + found[:n]
 
     @property
     def spread(self) -> float:
         """The standard deviation of the angles."""
-        return float(self._off(*fisher_rule()).std())
+        off, chance = self._off(*fisher_rule())
+        return math.sqrt(float(np.average((off - np.average(off, weights=chance)) ** 2, weights=chance)))
 
     @property
     def mean_cosine(self) -> float:
         """E[cos(angle − mean)]."""
-        return float(np.cos(self._off(*fisher_rule())).mean())
+        off, chance = self._off(*fisher_rule())
+        return float(np.average(np.cos(off), weights=chance))
 
-    def _off(self, share: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    def _off(self, share: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Angles off the mean, and how often such a plane is cut."""
         mean = mean_pole(self.dip, self.dip_direction, self.section)
         pole = poles_about(mean, self.concentration, share, turn)
         angle = np.arctan2(pole[:, 1], pole[:, 0]) + 0.5 * math.pi - self.mean
-        return 0.5 * np.angle(np.exp(2j * angle))
+        return 0.5 * np.angle(np.exp(2j * angle)), np.hypot(pole[:, 0], pole[:, 1])
 
 
 def fisher_rule() -> tuple[np.ndarray, np.ndarray]:
@@ -165,13 +195,38 @@ def parallel_set(
 
 
 def _renewal(spacing: Law, extent: float, rng: np.random.Generator) -> np.ndarray:
-    """Points ``spacing`` apart from 0 to ``extent``, the first a random part of a spacing in."""
+    """Points ``spacing`` apart from 0 to ``extent``, as they lie on an endless line on which 0 is anywhere."""
     mean = spacing.mean
     steps = spacing.lengths(rng, int(2 * extent / mean) + 16)
-    points = np.cumsum(steps) - steps[0] * rng.random()
+    points = np.cumsum(steps) - _before(spacing, float(steps[0]), rng.random(), rng)
     while points[-1] < extent:
         points = np.concatenate([points, points[-1] + np.cumsum(spacing.lengths(rng, 64))])
     return points[points < extent]
+
+
+def _before(spacing: Law, step: float, share: float, rng: np.random.Generator) -> float:
+    """How much of the first ``step`` lies before 0, a place taken anywhere on an endless line.
+
+    The ``share`` of it is right where all steps are alike, and else for most: it is kept as often as the two laws have
+    it in common (their maximal coupling), so that a seed keeps its network where it may; a stream of its own decides.
+    """
+    if spacing.spread == 0:
+        return step * share
+    aside = rng.spawn(1)[0]
+    lengths = spacing.lengths(np.random.default_rng(0), 20_000)
+
+    def ratio(rest: float) -> float:
+        """Density of what is left after 0 on an endless line, P(X > rest) / E[X], over that of a share of any step,
+        E[1/X; X > rest]."""
+        longer = lengths[lengths > rest]
+        return len(longer) / lengths.mean() / float((1 / longer).sum()) if len(longer) else math.inf
+
+    if aside.random() < ratio(step * (1 - share)):
+        return step * share
+    while True:
+        rest = aside.random() * spacing.met(aside)
+        if aside.random() < 1 - 1 / ratio(rest):
+            return step - rest
 
 
 def _intervals(
@@ -181,14 +236,20 @@ def _intervals(
         return [(0.0, extent)]
     period = length.mean + gap.mean
     n = int(2 * extent / period) + 8
-    start = -period * rng.random()
     out: list[tuple[float, float]] = []
+    # A place taken anywhere on an endless line is in a trace as often as the persistence says, and anywhere in it.
+    at = period * rng.random()
+    if at < length.mean:
+        first = (1 - at / length.mean) * length.met(rng)
+        out.append((0.0, min(first, extent)))
+        start = first + gap.lengths(rng, 1)[0]
+    else:
+        start = (1 - (at - length.mean) / gap.mean) * gap.met(rng)
     while start < extent:
         for own, between in zip(length.lengths(rng, n), gap.lengths(rng, n)):
             if start >= extent:
                 break
-            if start + own > 0:
-                out.append((max(start, 0.0), min(start + own, extent)))
+            out.append((start, min(start + own, extent)))
             start += own + between
     return out
 

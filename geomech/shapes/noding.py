@@ -30,6 +30,7 @@ class Mend(NamedTuple):
                         through a crossing
     "duplicate"         traces on one another: the first of them stays
     "dead end"          a trace that goes on beyond its last crossing by less than the shortest crack: taken away
+    "trimmed away"      a trace of which nothing is left where dead ends are trimmed
     "sliver"            a block too small: joined to a neighbour across its least important long joint
     "small block kept"  one that only a drawn joint, or an outline, parts from its neighbours: it stays
     """

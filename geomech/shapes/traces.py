@@ -181,7 +181,7 @@ def _read_geojson(path: Path, set_property: str) -> FieldFile:
         (f"{path.name}: {number} × {kind or 'no geometry'}, left out", "traces are lines, zones polygons")
         for kind, number in left.items()
     ]
-    return FieldFile(tuple(lines), tuple(warnings))
+    return FieldFile(tuple(lines), tuple(warnings), data.get("crs"))
 
 
 def _of_geometry(

@@ -30,7 +30,7 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
         "Wing cracks from a single flaw",
         "Specimen of Wong et al. (2002), 50 × 170 mm, an open flaw of half-length 10 mm at 30° from the horizontal, "
         "between frictionless platens; computed by DDA and DDM coupled, as in Khanizadeh Bahabadi et al. (2023), "
-        "Figure 11.",
+        "Figures 10 (the specimen), 11, 12 and 14 (its cracks, alone and beside other methods').",
     )
     page.facts(key_results(run))
     add_pictures(page, run)
@@ -39,7 +39,7 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
         grown = {name: {name: wings.last.cracks} for name, wings in runs.items() if len(wings.load)}
         if grown:
             page.figures(
-                [(crack_paths(grown, drawings / "paths.svg", 6), "Paths (Figure 11), mm.")], whole=len(grown) > 3
+                [(crack_paths(grown, drawings / "paths.svg", 6), "Paths (Figures 11, 12 and 14), mm.")], whole=len(grown) > 3
             )
         for part in parts(wings):
             part.add_to(page)

@@ -199,14 +199,48 @@ def _lines(runs: dict[int, Watch]) -> Part:
         known = phi in published.PHI_DEG
         row += [f"{published.TIP_TO_TIP_ANGLE_DEG[phi]:.1f}" if known else None]
         row += [f"{table[phi]:.2f}" if known else None for table in sources.values()]
-        # Between lines: at most a right angle.
-        off = (angle - published.COALESCENCE_ANGLE_DEG["experiment"][phi] + 90) % 180 - 90 if known else np.nan
-        rows.append([*row, f"{off:+.2f}" if np.isfinite(off) else None])
+        off = _between(angle, published.COALESCENCE_ANGLE_DEG["experiment"][phi]) if known else np.nan
+        text = f"{off:+.2f}" if np.isfinite(off) else None
+        if phi == 30 and text:
+            text += f" ({_between(angle, _read_exchanged()[0]):+.2f} as read below)"
+        rows.append([*row, text])
     return Part(
         "Line of coalescence (Table 3)",
         ["φ", "computed", "tip to tip", *sources, "off the experiment"],
         rows,
-        ["Slopes in degrees from the horizontal, φ = 90 from the vertical, as it was published."],
+        ["Slopes in degrees from the horizontal, φ = 90 from the vertical, as it was published. Figures 9 and 13 draw "
+         "the same lines."],
+        after=[_about_30(runs)] if 30 in runs else [],
+    )  # fmt: skip
+
+
+def _between(angle: float, other: float) -> float:
+    """Degrees from one line to another: at most a right angle."""
+    return (angle - other + 90) % 180 - 90
+
+
+def _read_exchanged() -> tuple[float, float]:
+    """The experiment's line at φ = 30 with the axes exchanged, as at φ = 90, and its slope's sign turned: slope, degrees,
+    and m beside the specimen's centre."""
+    slope, intercept = published.COALESCENCE_LINE[30]
+    return published.line_beside_centre(-slope, intercept, exchanged=True)
+
+
+def _about_30(runs: dict[int, Watch]) -> str:
+    """What the experiment's row at φ = 30 is."""
+    slope, intercept = published.COALESCENCE_LINE[30]
+    angle, missed = published.line_beside_centre(slope, intercept)
+    read, passed = _read_exchanged()
+    others = "; ".join(
+        f"{who} {table[30]:.2f}" for who, table in published.COALESCENCE_ANGLE_DEG.items() if who != "experiment"
+    )
+    found = coalescence_line_deg(runs[30])
+    computed = f", computed here {found:.2f}" if np.isfinite(found) else ""
+    return (
+        f"The experiment at φ = 30 is printed as y = {slope:g}x + {intercept:g}, {angle:.2f}°: it passes the specimen's "
+        f"centre {1e3 * missed:.1f} mm away, and crosses the bridge between the cracks instead of following it. Read as the row φ = 90 is, with the axes exchanged, and with the sign that was lost, x = "
+        f"−{slope:g}y + {intercept:g}, it passes the centre at {1e3 * passed:.1f} mm and slopes {read:.2f}°, beside the "
+        f"other two ({others}{computed})."
     )
 
 

@@ -52,7 +52,7 @@ def write_page(runs: Mapping[str, Watch], folder: Path, out: Path, overrides: Se
 
 def _fill(page: Page, runs, by_phi, folder: Path, out: Path, overrides, drawings: Path) -> None:
     folders = [Run(out / name) for name in own(runs) or runs if (out / name / "history.csv").is_file()]
-    add_ends(page, folders, "Paths (Figure 8)")
+    add_ends(page, folders, "Paths (Figures 8, 9 and 13)")
     if by_phi:
         page.figures(
             [(_paths(own(runs) or runs, drawings / "paths.svg"), "Paths alone, mm: slots black, what grew in colour.")],

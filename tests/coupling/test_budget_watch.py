@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import logging
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import geomech
 from geomech.coupling import cycles
 from geomech.coupling.budget_watch import UNPAID, BendingWatch, BudgetWatch
-from geomech.dda.energy import GAIN
-from geomech.output.condition import energy_summary
+from geomech.dda.energy import GAIN, EnergyBudget, StepEnergy
 from geomech.model import Blocks, Cracks, DdaSettings, GrowthSettings, History, JointLaw, Loads, Material, Problem, RunSettings
+from geomech.output.condition import energy_summary
+
+PIPELINES = Path(__file__).parents[2] / "pipelines"
 
 
 def test_a_share_beyond_the_bound_is_told_once(caplog):
@@ -84,3 +88,24 @@ def test_a_beam_that_turns_far_in_a_static_step_is_told_of(caplog):
     assert over and len(lines) == 1
     # Six digits of it are told.
     assert float(re.match(r"t = (\S+) s", lines[0])[1]) == pytest.approx(over[0], rel=1e-5)
+
+
+def test_what_unstable_growth_sets_free_is_booked_and_told_once(caplog):
+    """A flaw at the foot of a column runs through it at one load: every pass sets more free than the one before, and
+    there is no time step to shorten."""
+    with caplog.at_level(logging.WARNING):
+        *_, last = geomech.cycles(PIPELINES / "flexural_toppling")
+    lines = [record.getMessage() for record in caplog.records]
+    assert not any("without work" in line for line in lines)
+    (line,) = [line for line in lines if "grow at one load" in line]
+    assert last.statistics["growth_release"] >= float(re.search(r"set free (\S+) J/m", line)[1]) * 0.99 > 1.0
+    assert abs(last.statistics["budget_residual"]) < 1e-6
+
+
+def test_a_scheme_that_gives_without_growth_is_told_of(caplog):
+    step = dict.fromkeys(StepEnergy._fields, 0.0) | {"load_work": 1.0, "scheme": -0.5}
+    with caplog.at_level(logging.WARNING):
+        grown = EnergyBudget().after(StepEnergy(**step), 1.0, growing=True)
+        assert grown.released == 0.5 and not caplog.records
+        EnergyBudget().after(StepEnergy(**step), 1.0)
+    assert "without work" in caplog.records[0].getMessage()

@@ -102,3 +102,43 @@ def test_blocks_are_ranked_by_how_far_they_have_moved():
     gone = replace(state, removed=np.array([False, False, False, True]))
     rows = key_blocks(blocks, [ROCK], [JointLaw("j")], gone, DOWN)
     assert rows["kind"].tolist() == [FIXED, FALLS, FALLS, FIXED] and rows["rank"][1] == 0
+
+
+def test_blocks_on_a_shaken_base_move_against_it():
+    """Everything has gone half a metre with the base, one block a centimetre farther."""
+    blocks = Blocks.from_polygons(
+        [polygon([0, -1], [9, -1], [9, 0], [0, 0]), polygon([1, 0], [2, 0], [2, 1], [1, 1]),
+         polygon([4, 0], [5, 0], [5, 1], [4, 1])],
+        fixed=[True, False, False],
+    )  # fmt: skip
+    rest = State.at_rest(blocks)
+    moved = rest.vertices + np.array([0.5, 0.0])
+    moved[blocks.vertex_block == 2] += [0.01, 0.0]
+    velocity = rest.velocity.copy()
+    velocity[:, 0] = [1.0, 1.0, 1.2]
+    rows = key_blocks(blocks, [ROCK], [], replace(rest, vertices=moved, velocity=velocity), DOWN)
+    assert rows["displacement"] == pytest.approx([0.0, 0.0, 0.01], abs=1e-12)
+    assert rows["speed"] == pytest.approx([0.0, 0.0, 0.2], abs=1e-12) and rows["rank"][2] == 0
+
+
+def test_a_key_block_that_stands_is_told_to(tmp_path):
+    """A block on a smooth incline, held by a bolt: by its own weight it slides, and it does not."""
+    from types import SimpleNamespace
+
+    from geomech.output.condition import key_block_summary
+
+    c, s = np.cos(0.6), np.sin(0.6)
+    turn = np.array([[c, s], [-s, c]])
+    blocks = Blocks.from_polygons(
+        [polygon([-1, -1], [6, -1], [6, 0], [-1, 0]) @ turn, polygon([1, 0], [2, 0], [2, 1], [1, 1]) @ turn],
+        fixed=[True, False], names=("base", "block"),
+    )  # fmt: skip
+    law = JointLaw("joint", 0.2)
+    system = dda.BlockSystem(blocks, [ROCK], [law], settings=DdaSettings(max_displacement_ratio=0.1))
+    state = system.step(State.at_rest(blocks), Loads(gravity=History.constant([0.0, 0.0])), 1e-3).state
+    problem = SimpleNamespace(materials=[ROCK], joints=[law], loads=Loads(gravity=History.constant(DOWN)))
+    for shift, told in ((3e-4, "stands (by its own weight and friction a key block, slides)"), (0.3, "key block, slides")):
+        moved = state.vertices + shift * np.array([c, s]) * (blocks.vertex_block == 1)[:, None]
+        cycle = SimpleNamespace(blocks=blocks, state=replace(state, vertices=moved))
+        (entry,) = key_block_summary(cycle, problem)
+        assert entry["class"] == told and entry["factor_of_safety"] < 0.4

@@ -114,3 +114,16 @@ def test_bridges_run_from_end_to_end_and_to_what_is_ahead():
     length = sorted(np.hypot(*(bridges[:, 1] - bridges[:, 0]).T))
     assert length == pytest.approx(sorted([1.0, np.hypot(2, 0.1), 2.0, 1.0]), rel=1e-12)
     assert rock_bridges(square, Cracks.from_polylines([])).shape == (0, 2, 2)
+
+
+@pytest.mark.parametrize("points", ["[[0, 9], [10, 9]]", "[[0, -0.5], [10, -0.5]]"], ids=["outside", "in fixed rock"])
+def test_one_drawn_joint_that_cuts_nothing_that_moves_is_drawn_all_the_same(tmp_path, capsys, points):
+    """Its angle in the rock is none, which the picture's legend has to say."""
+    path = tmp_path / "ledge.toml"
+    head, _, tail = SCENE.partition("[[geometry.joint_sets]]")
+    path.write_text(head.replace("[[0, 2], [10, 2]]", points) + tail[tail.index("[materials.rock]") :])
+    assert main(["build", str(path), "--out", str(tmp_path / "build")]) == 0
+    (bed,) = json.loads((tmp_path / "build" / "block_system.json").read_text())["sets"]
+    assert bed["mean_angle_deg"] is None and bed["p21_per_m"] == 0
+    assert (tmp_path / "build" / "blocks.png").stat().st_size > 10_000
+    assert "bed       got" in capsys.readouterr().out

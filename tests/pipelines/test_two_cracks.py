@@ -14,6 +14,7 @@ import pyvista
 
 from geomech import cycles
 from geomech.cli import DONE, main
+from geomech.model import Cracks
 from geomech.output import Run
 from geomech.reference import two_cracks as published
 from geomech.render.walls import Walls
@@ -22,7 +23,7 @@ from geomech.scene import load_scene
 FOLDER = Path(__file__).parents[2] / "pipelines" / "two_cracks"
 sys.path.insert(0, str(FOLDER))
 from compare_settings import FAMILIES, LADDERS, apart, family
-from compare_two_cracks import COALESCENCE_LIMIT_MPA, Watch, coalescence_angle_deg
+from compare_two_cracks import COALESCENCE_LIMIT_MPA, Watch, _about_30, _between, coalescence_angle_deg
 from first_step import KELVIN, QUADRATIC, first_step
 
 
@@ -249,3 +250,21 @@ def test_all_four_as_published(tmp_path):
     assert abs(abs(coalescence_angle_deg(runs["phi_90"].watch.cracks)) - 90) < 1.0
     found = coalescence_angle_deg(runs["phi_0"].watch.cracks)
     assert found == pytest.approx(published.COALESCENCE_ANGLE_DEG["experiment"][0], abs=5.0)
+
+
+def test_the_experiments_line_of_phi_30_read_as_that_of_phi_90_is():
+    """Table 3's equations give the slopes printed beside them; that of φ = 30 lies among the others with its axes
+    exchanged and its sign turned, and then passes the specimen's centre."""
+    for phi, line in published.COALESCENCE_LINE.items():
+        printed = published.COALESCENCE_ANGLE_DEG["experiment"][phi]
+        assert published.line_beside_centre(*line)[0] == pytest.approx(printed, abs=0.01)
+    slope, intercept = published.COALESCENCE_LINE[30]
+    assert published.line_beside_centre(slope, intercept)[1] > 6e-3
+    angle, missed = published.line_beside_centre(-slope, intercept, exchanged=True)
+    assert angle == pytest.approx(-67.97, abs=0.01) and missed < 0.25e-3
+    assert abs(_between(angle, published.COALESCENCE_ANGLE_DEG["Haeri 2014, DDM"][30])) < 2.5
+    # The line of φ = 90, as printed, from the vertical through the centre.
+    assert published.line_beside_centre(*published.COALESCENCE_LINE[90], exchanged=True)[1] < 0.5e-3
+    run = SimpleNamespace(phi=30, cracks=Cracks.from_polylines(list(published.crack_ends(30))))
+    words = _about_30({30: run})
+    assert "6.2 mm away" in words and "at 0.2 mm and slopes -67.97°" in words and "-65.89" in words

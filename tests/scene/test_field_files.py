@@ -164,7 +164,7 @@ def test_places_are_all_moved():
     vectors = {
         "gravity_m_s2", "newmark", "direction", "factors", "value_pa", "rate_pa_per_s", "values_pa", "value_n_per_m",
         "rate_n_per_m_s", "values_n_per_m", "incoming_m_per_s", "displacement_m", "velocity_m_per_s", "displacements_m",
-        "acceleration_m_s2", "jerk_m_s3", "accelerations_m_s2", "origin",
+        "acceleration_m_s2", "jerk_m_s3", "accelerations_m_s2", "origin", "velocity_m_s",
     }  # fmt: skip
     left = []
 

@@ -285,3 +285,12 @@ def test_a_faulty_model_leaves_nothing_for_the_next(tmp_path):
         with pytest.raises(GmshModelError, match="line 2: Division by zero"):
             read_gmsh_model(bad)
         assert read_gmsh_model(good).zones[0].name == "rock"
+
+
+def test_a_curve_across_the_rock_is_told_wherever_its_middle_lies(tmp_path):
+    """One through the rock to far outside it, and one whose middle is in a hole."""
+    far = "Point(5)={0.2,0.5,0};Point(6)={9,0.6,0};Line(5)={5,6};"
+    (warning,) = read_gmsh_model(written(tmp_path, SQUARE + far)).warnings
+    assert "curve 5 lies inside zone 'rock'" in warning[0]
+    beyond = "Point(5)={-0.2,1.5,0};Point(6)={9,0.6,0};Line(5)={5,6};"
+    assert not read_gmsh_model(written(tmp_path, SQUARE + beyond)).warnings

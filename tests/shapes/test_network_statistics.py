@@ -231,3 +231,67 @@ def test_the_block_size_curve_ends_with_all_the_rock():
     assert curve[-1].tolist() == [3.0, 100.0] and (np.diff(curve, axis=0) >= 0).all()
     assert curve[3, 1] == pytest.approx(400 / 17) and block_sizes(areas, (0.5,))[0.5] == 3.0
     assert len(passing_curve(np.arange(1.0, 5000.0))) == 200
+
+
+@pytest.mark.parametrize(
+    ("spacing", "deviation"), [("lognormal", 12.0), ("exponential", 0.0), ("normal", 2.0), ("uniform", 3.0)]
+)
+def test_a_parallel_set_is_as_dense_at_its_edge_as_elsewhere(spacing, deviation):
+    """Mean number of lines in strips of 30 m of a column, the first one at its foot: strip over mean spacing, whatever
+    the law; four standard errors of 800 networks."""
+    law = Law(6.0, deviation, spacing)
+    region = np.array([[0, 0], [4, 0], [4, 90], [0, 90]], dtype=float)
+    count = np.zeros((800, 3))
+    for seed in range(len(count)):
+        joint = parallel_set("joint:a", region, Law(0.0), law, None, None, np.random.default_rng(seed))
+        count[seed] = np.histogram([line[0, 1] for line in joint.lines], bins=[0, 30, 60, 90])[0]
+    error = 4 * count.std(axis=0) / math.sqrt(len(count))
+    assert (np.abs(count.mean(axis=0) - 5.0) < error).all()
+
+
+@pytest.mark.parametrize(("law", "deviation"), [("lognormal", 8.0), ("exponential", 0.0), ("normal", 1.5)])
+def test_traces_and_gaps_are_as_persistent_at_the_edge_as_elsewhere(law, deviation):
+    """The joint part of the first 2 m of each line, where the set begins, against length / (length + gap)."""
+    from geomech.shapes.joint_sets import _intervals
+
+    length, gap, rng = Law(4.0, deviation, law), Law(2.0, 0.5 * deviation, law), np.random.default_rng(3)
+    share = []
+    for _ in range(4000):
+        pieces = _intervals(length, gap, 40.0, rng)
+        share.append(sum(max(0.0, min(b, 2.0) - max(a, 0.0)) for a, b in pieces) / 2.0)
+    assert np.mean(share) == pytest.approx(4 / 6, abs=4 * np.std(share) / math.sqrt(len(share)))
+
+
+def test_spacings_beside_holes_are_those_of_the_lines():
+    """A set 4 m apart past two holes, one of which takes the middle of three lines: 5.09 m, were those lines not
+    counted."""
+    region = shapely.Polygon([(0, 0), (60, 0), (60, 40), (0, 40)], [
+        [(25, 14), (36, 14), (36, 26), (25, 26)], [(5, 5), (10, 5), (10, 8), (5, 8)]])  # fmt: skip
+    for seed in range(20):
+        box = np.array([[0, 0], [60, 0], [60, 40], [0, 40]], dtype=float)
+        joint = parallel_set("joint:a", box, Law(0.3 * seed), Law(4.0), None, None, np.random.default_rng(seed))
+        found = line_statistics(joint, region)
+        assert found.mean_spacing == pytest.approx(4.0, rel=1e-9)
+        assert found.spacing_deviation == pytest.approx(0.0, abs=1e-9)
+
+
+def test_planes_beside_the_section_are_seldom_cut():
+    """Fisher poles about one 20° off the section's normal: angles of traces as a great many discs of the same poles
+    show them, which are cut by geometry alone."""
+    dip, direction, section, kappa = math.radians(90), math.radians(70), 0.0, 8.0
+    rng = np.random.default_rng(5)
+    law = FisherAngle(dip, direction, section, kappa)
+    cut_discs = discs(
+        "joint:a", REGION, dip=dip, dip_direction=direction, fisher=kappa, diameter=Law(4.0), per_volume_area=1.5,
+        section=section, rng=rng,
+    )  # fmt: skip
+    ends = np.array([line[[0, -1]] for line in cut_discs.lines])
+    off = np.arctan2(*(ends[:, 1] - ends[:, 0]).T[::-1]) - law.mean
+    off = 0.5 * np.angle(np.exp(2j * off))
+    sampled = law.sample(rng, 20_000) - law.mean
+    assert len(off) > 3000
+    for quantity in (np.abs, np.cos):
+        error = 4 * quantity(off).std() / math.sqrt(len(off))
+        assert quantity(sampled).mean() == pytest.approx(quantity(off).mean(), abs=error)
+    assert law.spread == pytest.approx(sampled.std(), rel=0.02)
+    assert law.mean_cosine == pytest.approx(np.cos(sampled).mean(), abs=0.01)

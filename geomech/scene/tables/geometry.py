@@ -50,6 +50,7 @@ class EdgeShape(Table):
 class JointShape(Table):
     name: str = Field(description='name of the joints; the block edges they make are called "joint:NAME"')
     points: Points = Field(description="a polyline along which rock parts, [[x, y], …], m")
+    zones: Names = Field((), description="names of the zones that it cuts (unset: all)")
 
 
 DistributionLaw = Literal["constant", "normal", "uniform", "lognormal", "exponential"]
@@ -178,7 +179,9 @@ class Geometry(Table):
         90.0, description="azimuth to which the section's x axis points, clockwise from north, degrees"
     )
     dead_ends: Literal["cracks", "trim"] = Field(
-        "cracks", description='joints that stop in rock: "cracks" before a rock bridge, or "trim" them off'
+        "cracks",
+        description='joints that stop in rock: "cracks" before a rock bridge, or "trim" them off (a trace of which '
+        "nothing is left is told)",
     )
     shortest_crack_m: NotNegative = Field(0.0, description="dead ends shorter than this are trimmed, m")
     smallest_block_m2: NotNegative = Field(
@@ -191,7 +194,8 @@ class Geometry(Table):
     )
     chord_tolerance_m: Positive | None = Field(
         None,
-        description="curves of a model or DXF become chords this near to them, m (unset: 1e-4 of the largest side)",
+        description="curves of a model or DXF become chords this near to them, and ends of joints and cracks as near to "
+        "a curve join it, m (unset: 1e-4 of the largest side)",
     )
 
     @model_validator(mode="after")

@@ -193,6 +193,11 @@ class WaterTableTable(Table):
     levels_m: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="by how much the whole table is raised at `level_times_s`, m"
     )
+    follows_ground: bool = Field(
+        False,
+        description="the table is never above the ground: in front of a slope it follows it (unset: water stands there "
+        "as a lake that presses on the rock)",
+    )
 
     @model_validator(mode="after")
     def _line(self):
@@ -339,11 +344,27 @@ class FluidTable(Rising):
     fills: Annotated[tuple[Literal["cracks", "holes"], ...], Strict(False), Field(min_length=1)] = Field(
         ("cracks",), description='"cracks", those that grow with them, "holes", or both'
     )
+    cracks: Names = Field(
+        (), description='names of the cracks that it is pumped into, "*" matches anything (unset: it stands in all)'
+    )
+    connected: bool | None = Field(
+        None,
+        description="true: it also stands in what is connected with those `cracks`, and opens into holes that it fills, "
+        "now or later (unset: where `cracks` are named)",
+    )
     value_pa: Finite | None = Field(None, description="constant pressure, Pa")
     rate_pa_per_s: Finite | None = Field(None, description="pressure that grows from zero, Pa/s")
     values_pa: Annotated[tuple[Finite, ...], Strict(False)] | None = Field(
         None, description="pressures at `times_s`, Pa"
     )
+
+    @model_validator(mode="after")
+    def _in_cracks(self):
+        if self.cracks and "cracks" not in self.fills:
+            raise ValueError('`cracks` names cracks that it fills: `fills` has to hold "cracks"')
+        if self.connected and "cracks" in self.fills and not self.cracks:
+            raise ValueError("it stands in all cracks already: name those it is pumped into in `cracks`")
+        return self
 
 
 class LoadsTable(Table):

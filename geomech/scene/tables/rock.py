@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from .entries import Names, NotNegative, Positive, Table
+from .entries import Names, NotNegative, Pair, Positive, Table
 
 
 class MaterialTable(Table):
@@ -42,6 +42,9 @@ class ZoneTable(Table):
         None,
         description='"x" or "y": its blocks move along that axis only and neither turn nor shear, as a press\'s platen',
     )
+    velocity_m_s: Pair | None = Field(
+        None, description="velocity of its blocks at the start of a dynamic run, [x, y], m/s (unset: at rest)"
+    )
     body: Literal["block", "plane", "half-plane"] = Field(
         "block",
         description='"plane" or "half-plane": rock without an end, of which the zone is the piece that is seen; its holes are '
@@ -55,6 +58,11 @@ class ZoneTable(Table):
             raise ValueError('a "half-plane" needs `surface`, the name of the edges on its free surface')
         if self.body != "half-plane" and self.surface is not None:
             raise ValueError('`surface` belongs to body = "half-plane"')
+        if self.velocity_m_s is not None and (self.fixed or self.body != "block"):
+            raise ValueError("rock that is `fixed`, or without an end, has no `velocity_m_s`")
+        across = 1 if self.guided == "x" else 0
+        if self.guided is not None and self.velocity_m_s is not None and self.velocity_m_s[across] != 0:
+            raise ValueError(f"a zone guided along {self.guided} cannot begin with a velocity across it")
         if self.body != "block" and (self.fixed or self.guided is not None):
             raise ValueError(f'rock without an end (body = "{self.body}") is neither `fixed` nor `guided`')
         return self

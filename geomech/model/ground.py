@@ -1,0 +1,92 @@
+"""The ground over a section, and a water table beside it: where the table would stand above the ground, and how deep."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+#: A step of the ground is given this part of its width to fall in: a table is a function of x.
+_STEP = 1e-9
+
+
+class Pond(NamedTuple):
+    """Water above the ground from ``start`` to ``end``, m along x, at most ``depth`` m deep."""
+
+    start: float
+    end: float
+    depth: float
+
+
+def lowest_over(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(x ascending, y) of the lowest ground at every x, m: ``ground`` (n, 2) is a line from left to right, with
+    overhangs and vertical faces. At a step the lower side counts."""
+    x = np.unique(ground[:, 0])
+    step = _STEP * (x[-1] - x[0])
+    x = x[np.append(True, np.diff(x) > step)]
+    a, b = ground[:-1], ground[1:]
+    level = np.abs(b[:, 0] - a[:, 0]) > step
+    a, b = a[level], b[level]
+    low, high = np.minimum(a[:, 0], b[:, 0]), np.maximum(a[:, 0], b[:, 0])
+    over = (low <= x[:-1, None] + step) & (high >= x[1:, None] - step)
+
+    def height(at: np.ndarray) -> np.ndarray:
+        return a[:, 1] + (at[:, None] - a[:, 0]) / (b[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
+
+    lowest = np.argmin(np.where(over, height(0.5 * (x[:-1] + x[1:])), np.inf), axis=1)
+    row = np.arange(len(lowest))
+    left, right = height(x[:-1])[row, lowest], height(x[1:])[row, lowest]
+    xs, ys = [x[0]], [left[0]]
+    for k in range(1, len(x)):
+        before, after = right[k - 1], left[k] if k < len(left) else right[k - 1]
+        at = x[k]
+        if before > after:
+            xs.append(at - step)
+            ys.append(before)
+        xs.append(at)
+        ys.append(min(before, after))
+        if after > before:
+            xs.append(at + step)
+            ys.append(after)
+    return np.array(xs), np.array(ys)
+
+
+def _together(line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]):
+    """(x, height of the ``line``, height of the ``ground``) at all their points and where they cross."""
+    x = np.unique(np.concatenate([line[0], ground[0]]))
+    above = np.interp(x, *line) - np.interp(x, *ground)
+    cross = np.flatnonzero(above[:-1] * above[1:] < 0)
+    share = above[cross] / (above[cross] - above[cross + 1])
+    x = np.sort(np.concatenate([x, x[cross] + share * (x[cross + 1] - x[cross])]))
+    return x, np.interp(x, *line), np.interp(x, *ground)
+
+
+def below_ground(
+    line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The lower one of the ``line`` and the ``ground``, both (x ascending, y), as such a line."""
+    x, own, cap = _together(line, ground)
+    y = np.minimum(own, cap)
+    # Where neither bends, nor one takes over from the other, no point is needed.
+    needed = np.ones(len(x), bool)
+    if len(x) > 2:
+        first, second = np.diff(x)[:-1], np.diff(x)[1:]
+        off = (y[1:-1] - y[:-2]) * second - (y[2:] - y[1:-1]) * first
+        needed[1:-1] = np.abs(off) > 1e-12 * np.ptp(y) * (first + second)
+    return x[needed], y[needed]
+
+
+def ponds(line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]) -> list[Pond]:
+    """Where the ``line`` stands above the ``ground``, both (x ascending, y), by more than round-off."""
+    x, own, cap = _together(line, ground)
+    inside = (x >= ground[0][0]) & (x <= ground[0][-1])
+    x, deep = x[inside], (own - cap)[inside]
+    near = 1e-6 * (ground[0][-1] - ground[0][0])
+    wet = np.maximum(deep[:-1], deep[1:]) > 0
+    found = []
+    for k in np.flatnonzero(wet & ~np.append(False, wet[:-1])):
+        last = k + int(np.argmin(np.append(wet[k:], False)))
+        depth = float(deep[k : last + 1].max())
+        if depth > near:
+            found.append(Pond(float(x[k]), float(x[last]), depth))
+    return found

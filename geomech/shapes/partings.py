@@ -1,0 +1,46 @@
+"""What became of each trace that cuts rock: how much of it parts blocks, and which were trimmed away whole."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .noding import Drawn, Graph, Mend
+
+
+class Parting(NamedTuple):
+    """What became of the joints of one ``name``: how many ``traces`` reach into the rock, how many of these are
+    ``cutting``, all along or in part, and the ``length`` along which they part blocks, m."""
+
+    name: str
+    traces: int
+    cutting: int
+    length: float
+
+
+def trace_lengths(graph: Graph, drawn: Drawn, among: np.ndarray) -> np.ndarray:
+    """(n_sources,) m of each outline edge and each trace in the edges ``among`` all (a mask)."""
+    span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
+    return np.bincount(graph.source[among], weights=span[among], minlength=len(drawn.names))
+
+
+def trimmed_away(drawn: Drawn, reach: np.ndarray, left: np.ndarray) -> list[Mend]:
+    """The traces of which ``reach`` m lay in the rock and nothing is ``left``."""
+    gone = np.flatnonzero((reach > 0) & (left == 0))
+    gone = gone[gone >= drawn.n_outlines]
+    # Pieces stand in the order of their traces; a trace is told at its middle one.
+    middle = (np.searchsorted(drawn.source, gone) + np.searchsorted(drawn.source, gone, "right")) // 2
+    at = 0.5 * (drawn.start[middle] + drawn.end[middle])
+    return [Mend("trimmed away", x, y, size) for (x, y), size in zip(at.tolist(), reach[gone].tolist(), strict=True)]
+
+
+def partings(drawn: Drawn, names: Sequence[str], reach: np.ndarray, cutting: np.ndarray) -> tuple[Parting, ...]:
+    """Of the joints ``names``, of whose traces ``reach`` m lie in the rock and ``cutting`` m part blocks."""
+    rank = drawn.rank
+    return tuple(
+        Parting(name, *(int((own & (rank == place)).sum()) for own in (reach > 0, cutting > 0)),
+                float(cutting[rank == place].sum()))
+        for place, name in enumerate(names)
+    )  # fmt: skip

@@ -1,0 +1,93 @@
+"""Trace maps of real outcrops, held against what fractopo publishes of them (Ovaskainen 2023, Journal of Open Source
+Software 8, 5300): nodes, intensities and mean lengths.
+
+The maps stand beside this file with their source. fractopo counts a trace as half of each of its ends, I or Y nodes,
+that lie in the area, and prints two decimals.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from geomech.output.joint_statistics import joint_statistics
+from geomech.scene import load_scene
+from geomech.shapes import Joint, Zone, cut
+from geomech.shapes.rock_outline import rock_of
+
+MAPS = Path(__file__).parent / "maps"
+
+SCENE = """title = "map"
+[geometry]
+tolerance_m = 1e-3
+[[geometry.zones]]
+name = "rock"
+polygon = {area}
+[[geometry.traces]]
+file = "traces.csv"
+[materials.rock]
+youngs_modulus_pa = 1e10
+poissons_ratio = 0.25
+density_kg_m3 = 2600
+k_ic_pa_sqrt_m = 1e6
+[joints.default]
+friction_angle_deg = 30
+[dda]
+time_step_s = 1e-3
+[run]
+end_time_s = 0.1
+"""
+
+
+def points_of(steps: list[int], unit: float) -> np.ndarray:
+    return unit * np.cumsum(np.reshape(steps, (-1, 2)), axis=0)
+
+
+def loaded(name: str, folder: Path):
+    """What is published of the map, and its scene."""
+    told = json.loads((MAPS / f"{name}.json").read_text(encoding="utf-8"))
+    area = points_of(told["area"], told["unit_m"])[:-1]
+    rows = ["trace,x,y"]
+    for k, steps in enumerate(told["traces"]):
+        rows += [f"{k},{x:.4f},{y:.4f}" for x, y in points_of(steps, told["unit_m"]).tolist()]
+    (folder / "traces.csv").write_text("\n".join([*rows, ""]))
+    path = folder / "scene.toml"
+    path.write_text(SCENE.format(area=np.round(area, 4).tolist()))
+    return told["published"], load_scene(path)
+
+
+@pytest.mark.parametrize("name", ["kb7", "getaberget", "kb11"])
+def test_statistics_are_those_that_fractopo_publishes(tmp_path, name):
+    published, scene = loaded(name, tmp_path)
+    blocks = scene.drawing.blocks
+    (entry,) = joint_statistics(scene, scene.problem(), np.ones(blocks.n_blocks, bool))
+    assert blocks.areas().sum() == pytest.approx(published["area_m2"], rel=1e-5)
+    nodes = scene.drawing.jointed.cutting.nodes
+    # Of KB11 two traces of the file leave the area and come back, and count twice there.
+    assert abs(entry["traces"] - published["traces"]) <= 2
+    for kind in ("i", "y", "x"):
+        assert nodes[kind.upper()] == pytest.approx(published[f"{kind}_nodes"], rel=0.01), kind
+    for key in ("p20_per_m2", "p21_per_m", "mean_length_in_window_m"):
+        assert entry[key] == pytest.approx(published[key], abs=0.0051), key
+    # Its printed nodes and area say more digits of P20, and of the mean length that no window biases.
+    lines = 0.5 * (published["i_nodes"] + published["y_nodes"])
+    assert entry["p20_per_m2"] == pytest.approx(lines / published["area_m2"], rel=0.005)
+    assert entry["mean_length_m"] == pytest.approx(entry["p21_per_m"] * published["area_m2"] / lines, rel=0.005)
+
+
+def test_the_rock_of_many_blocks_has_no_seams():
+    """A ring cut by lines of any direction: corners lie on their neighbours' sides but for round-off, and a plain union
+    keeps slits there."""
+    rng = np.random.default_rng(5)
+    angle = np.linspace(0, 2 * np.pi, 60)[:-1]
+    outer = np.stack([np.cos(angle), np.sin(angle)], axis=1) * rng.uniform(0.8, 1.2, 59)[:, None]
+    lines = [np.stack([p - 5 * way, p + 5 * way]) for p, way in zip(rng.uniform(-1, 1, (40, 2)), rng.normal(size=(40, 2)))]
+    ring = shapely.Polygon(outer, [0.3 * outer])
+    blocks = cut([Zone("rock", (outer, 0.3 * outer))], [Joint("joint:a", tuple(lines))]).blocks
+    polygons = [shapely.Polygon(own[0], own[1:]) for own in map(blocks.loops, range(blocks.n_blocks))]
+    rock = rock_of(blocks)
+    assert blocks.n_blocks > 200 and len(shapely.union_all(polygons).interiors) > 1
+    assert rock.geom_type == "Polygon" and len(rock.interiors) == 1
+    assert rock.area == pytest.approx(ring.area, rel=1e-12)
