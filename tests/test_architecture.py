@@ -20,13 +20,15 @@ MAY_IMPORT = {
     "model": BASE,
     # How kernels are kept between runs: the solvers' own.
     "compiled": set(),
+    # Objects as files: what checkpoints are made of.
+    "plain_data": set(),
     "dda": BASE | {"compiled"},
     "ddm": BASE | {"compiled"},
     "coupling": BASE | {"compiled", "dda", "ddm"},
     "shapes": BASE - {"reference"},
     "scene": BASE - {"reference"} | {"shapes"},
     # Output and pictures take records; they know nothing of how they were solved.
-    "output": BASE | {"shapes", "scene"},
+    "output": BASE | {"plain_data", "shapes", "scene"},
     "render": BASE | {"shapes", "scene", "output"},
 }
 #: The edge, where everything is put together; nothing above imports it.
