@@ -32,6 +32,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code. ``arguments`` defaults to the process's own."""
     options = _parser().parse_args(arguments)
     verb: Callable[[argparse.Namespace], int] = options.verb
+    if getattr(options, "trust_models", False):
+        # Wherever models are read in this process, and in those that it starts.
+        os.environ["GEOMECH_TRUST_MODELS"] = "1"
     try:
         return verb(options)
     except KeyboardInterrupt:

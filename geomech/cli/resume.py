@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from .run import prepare_for_a_run
+from .scenes import trust_argument
 from .telling import say
 from .verb import DONE, BadInput, Verbs, add_verb
 
@@ -28,6 +29,7 @@ def declare(verbs: Verbs) -> None:
         "(may be repeated)",
     )  # fmt: skip
     resume.add_argument("--quiet", action="store_true", help="say nothing but errors")
+    trust_argument(resume)
 
 
 def _resume(options: argparse.Namespace) -> int:

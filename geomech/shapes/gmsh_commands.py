@@ -41,8 +41,6 @@ _DOES = {
 }
 #: Words that read the file that is named behind them.
 _READS = ("Include", "Merge", "MergeWithBoundingBox", "ShapeFromFile", "ListFromFile")
-#: Words whose text goes to a file with ">".
-_TELLS = ("Printf", "Error", "Warning")
 
 #: Longer strings, and longer lines of files with loops, are cut by Gmsh's scanner, and what follows is read as code.
 _LONGEST_STRING, _LONGEST_LINE = 1000, 8000
@@ -68,10 +66,10 @@ def trusted() -> bool:
 def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
     """Refuse a model that would do more than draw: raise GmshModelError with file, line and command.
 
-    Files below ``folder`` (default: the model's own) may be read by it; they are looked at as well. Returns all files
-    that Gmsh will read, the model first.
+    Files below the model's folder, or below ``folder``, may be read by it; they are looked at as well. Returns all
+    files that Gmsh will read, the model first.
     """
-    home = (folder or path.parent).resolve()
+    homes = [path.parent.resolve(), *([folder.resolve()] if folder else [])]
     seen: list[Path] = []
     waiting = [path]
     while waiting:
@@ -81,11 +79,11 @@ def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
             if found.resolve() in seen:
                 continue
             seen.append(found.resolve())
-            waiting += _files_of(found, home, is_script=found is not file)
+            waiting += _files_of(found, homes, is_script=found is not file)
     return seen
 
 
-def _files_of(path: Path, home: Path, is_script: bool) -> list[Path]:
+def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
     """The files that ``path`` reads, after a look at what else it does."""
     if not is_script and path.suffix not in (*SCRIPTS, *MESHES, *SHAPES):
         raise GmshModelError(
@@ -102,10 +100,10 @@ def _files_of(path: Path, home: Path, is_script: bool) -> list[Path]:
                 "save it as .msh again, or call it .geo if it is a script",
             )
         return []
-    return _script(path, data, home)
+    return _script(path, data, homes)
 
 
-def _script(path: Path, data: bytes, home: Path) -> list[Path]:
+def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:
     if b"\0" in data:
         line = data[: data.index(b"\0")].count(b"\n") + 1
         raise GmshModelError(f"{path}:{line}: a zero byte in a script", "save it as text")
@@ -119,7 +117,7 @@ def _script(path: Path, data: bytes, home: Path) -> list[Path]:
         for number, line in enumerate(re.split(rb"[\r\n]", data), 1):
             if len(line) > _LONGEST_LINE:
                 raise GmshModelError(f"{path}:{number}: a line of {len(line)} characters", "break it into shorter ones")
-    found = _judged(path, tokens, home)
+    found = _judged(path, tokens, homes)
     if jumps:
         for token in tokens:
             if token.kind in ("line", "block", "text") and (hidden := re.search(rb"[\r\n]", token.text)):
@@ -128,7 +126,7 @@ def _script(path: Path, data: bytes, home: Path) -> list[Path]:
                     for k, line in enumerate(re.split(rb"[\r\n]", token.text[hidden.end() :]), 1)
                     for piece in _tokens(line)
                 ]
-                found += _judged(path, inner, home, comment=True)
+                found += _judged(path, inner, homes, comment=True)
     return found
 
 
@@ -141,20 +139,23 @@ def _tokens(data: bytes) -> Iterator[_Token]:
         line += text.count(b"\n")
 
 
-def _judged(path: Path, tokens: Sequence[_Token], home: Path, comment: bool = False) -> list[Path]:
+def _judged(path: Path, tokens: Sequence[_Token], homes: Sequence[Path], comment: bool = False) -> list[Path]:
     """The files that ``tokens`` read. Raises GmshModelError for what they do besides."""
     code = [token for token in tokens if token.kind not in ("line", "block")]
     found = []
     for k, token in enumerate(code):
         word = token.text.decode("latin-1") if token.kind == "word" else ""
-        if word in _DOES:
+        following = [t.text for t in code[k + 1 : k + 2]]
+        # Print.X = … is an option.
+        if word in _DOES and (word, following) != ("Print", [b"."]):
             _refuse(path, token.line, word, _DOES[word], comment)
-        if word == "General" and [t.text for t in code[k + 1 : k + 2]] == [b"."] and b"File" in code[k + 2].text:
-            _refuse(path, token.line, f"General.{code[k + 2].text.decode('latin-1')}", "names a file to write", comment)
-        if word in _TELLS and _is_sent_to_a_file(code[k + 1 :]):
-            _refuse(path, token.line, f"{word} > …", "writes a file", comment)
+        option = b"".join(t.text for t in code[k : k + 3]).decode("latin-1")
+        if option.startswith("General.") and "File" in option:
+            _refuse(path, token.line, option, "names a file to write", comment)
+        if word == "Printf" and _is_sent_to_a_file(code[k + 1 :]):
+            _refuse(path, token.line, "Printf > …", "writes a file", comment)
         if word in _READS:
-            found += _read(path, token, code[k + 1 : k + 4], home, comment)
+            found += _read(path, token, code[k + 1 : k + 4], homes, comment)
     return found
 
 
@@ -165,13 +166,11 @@ def _is_sent_to_a_file(rest: Sequence[_Token]) -> bool:
         depth += {b"(": 1, b")": -1}.get(token.text, 0) if token.kind == "mark" else 0
         if depth == 0:
             return [t.text for t in rest[k + 1 : k + 2]] in ([b">"], [b">>"])
-        if token.kind == "mark" and token.text == b";":
-            return True  # no Printf that Gmsh knows
-    return True
+    return False
 
 
-def _read(path: Path, token: _Token, rest: Sequence[_Token], home: Path, comment: bool) -> list[Path]:
-    """The file that a word which reads one reads: it must be named, and be below ``home``."""
+def _read(path: Path, token: _Token, rest: Sequence[_Token], homes: Sequence[Path], comment: bool) -> list[Path]:
+    """The file that a word which reads one reads: it must be named, and be below one of ``homes``."""
     word = token.text.decode()
     rest = rest[1:] if rest and rest[0].text in (b"(", b"[") else rest
     if len(rest) < 2 or rest[0].kind != "text" or rest[1].text not in (b";", b")", b"]"):
@@ -181,14 +180,14 @@ def _read(path: Path, token: _Token, rest: Sequence[_Token], home: Path, comment
     name = rest[0].text[1:-1].decode("utf-8", "surrogateescape")
     # Gmsh does not know a drive or "~"; a path that is not absolute counts from the file that names it.
     file = path.parent / name
-    if not file.resolve().is_relative_to(home):
-        _refuse(path, token.line, f'{word} "{name}"', f"reads a file outside {home}", comment)
+    if not any(file.resolve().is_relative_to(home) for home in homes):
+        _refuse(path, token.line, f'{word} "{name}"', f"reads a file outside {homes[-1]}", comment)
     # What is not there Gmsh itself complains of; a list of numbers is no script.
     return [file] if file.is_file() and word not in ("ListFromFile",) else []
 
 
 def _refuse(path: Path, line: int, what: str, does: str, comment: bool) -> None:
-    where = " (in a comment or text of several lines, to whose middle its loops or macros may jump)" if comment else ""
+    where = " (in a comment or text of several lines, into which its loops or macros may jump)" if comment else ""
     raise GmshModelError(
         f"{path}:{line}: {what} {does}{where}; a model may draw, and read files below the scene's folder",
         f"remove it; or, if you trust this file and all that it reads, say --trust-models (or {TRUST}=1)",

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from .field_lines import METRES
+from .gmsh_commands import refuse_commands, trusted
 from .gmsh_curves import Curves
 from .gmsh_drawing import CRACK, GmshDrawing, GmshModelError, Parameter, scaled
 from .gmsh_left_out import lost_curves, out_of_plane
@@ -27,6 +28,7 @@ def read_gmsh_model(
     parameters: Mapping[str, float | str] | None = None,
     chord_tolerance: float | None = None,
     unit: str | None = None,
+    folder: Path | None = None,
 ) -> GmshDrawing:
     """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep,
     .step.
@@ -40,6 +42,9 @@ def read_gmsh_model(
     edges become chords within ``chord_tolerance`` m (default 1e-4 of the model's largest side). ``unit`` (a key of
     `geomech.shapes.field_lines.METRES`) is what the model is drawn in, default m; for a .step, what the file says.
 
+    A model may draw; one that would run programs or write files is refused before Gmsh sees it, unless
+    GEOMECH_TRUST_MODELS is set (`gmsh_commands`). It may read files below ``folder`` (default: its own).
+
     Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
     named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
     """
@@ -51,6 +56,8 @@ def read_gmsh_model(
             f"there is no file {path}",
             f"did you mean {close[0]}?" if close else "paths are relative to the scene file",
         )
+    if not trusted():
+        refuse_commands(path, folder)
     metres = METRES[unit or "m"]
     if path.suffix.lower() in STEP:
         # Every length of a STEP file arrives in millimetres, whatever its unit.
