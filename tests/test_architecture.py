@@ -20,12 +20,12 @@ MAY_IMPORT = {
     "model": BASE,
     # How kernels are kept between runs: the solvers' own.
     "compiled": set(),
-    # Objects as files: what checkpoints are made of.
+    # Objects as files: what checkpoints are made of, and what a reader in another process hands back.
     "plain_data": set(),
     "dda": BASE | {"compiled"},
     "ddm": BASE | {"compiled"},
     "coupling": BASE | {"compiled", "dda", "ddm"},
-    "shapes": BASE - {"reference"},
+    "shapes": BASE - {"reference"} | {"plain_data"},
     "scene": BASE - {"reference"} | {"shapes"},
     # Output and pictures take records; they know nothing of how they were solved.
     "output": BASE | {"plain_data", "shapes", "scene"},

@@ -58,7 +58,7 @@ class Scene:
     @property
     def name(self) -> str:
         """What run folders are called: the pipeline folder's name, or the file's."""
-        return self.path.parent.name if self.path.name == SCENE_FILE else self.path.stem
+        return self.path.absolute().parent.name if self.path.name == SCENE_FILE else self.path.stem
 
     @property
     def output(self) -> OutputTable:
