@@ -70,6 +70,8 @@ def _parser() -> argparse.ArgumentParser:
 def _is_bad_input(error: Exception) -> bool:
     if isinstance(error, BadInput):
         return True
-    # The scene package is only asked when it has been imported: no other part raises its error.
-    scene = sys.modules.get("geomech.scene")
-    return scene is not None and isinstance(error, getattr(scene, "SceneError", ()))
+    # Packages are only asked when they have been imported: no other part raises their errors.
+    for module, name in (("geomech.scene", "SceneError"), ("geomech.output.run_lock", "FolderRefused")):
+        if isinstance(error, getattr(sys.modules.get(module), name, ())):
+            return True
+    return False

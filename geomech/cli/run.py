@@ -19,18 +19,28 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
     scene_arguments(run)
     run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default outputs/NAME[/VARIANT])")
+    run.add_argument(
+        "--overwrite", action="store_true", help="replace what an earlier run has left in the run folder (else refused)"
+    )
     run.add_argument("--quiet", action="store_true", help="say nothing but errors")
 
 
 def _run(options: argparse.Namespace) -> int:
     check_folder("--out", options.out)
     prepare_for_a_run()
+    from ..pipeline import overwriting
+
+    with overwriting(options.overwrite):
+        return _run_all(options)
+
+
+def _run_all(options: argparse.Namespace) -> int:
     place: Path = options.scene
     if place.is_dir() and (place / "run.py").is_file():
         return _run_script(place, options)
 
     from ..output import standard_observers
-    from ..pipeline import run
+    from ..pipeline import refuse_results, run
     from ..scene import load_scene
 
     # Every variant is read before the first one runs: an error in the last should not cost an hour.
@@ -38,10 +48,12 @@ def _run(options: argparse.Namespace) -> int:
     if not options.quiet:
         say_warnings(scenes.values())
     base = options.out or default_folder(place)
+    # One variant with --out goes into exactly that folder.
+    alone = options.out and len(scenes) == 1
+    folders = {name: base if name is None or alone else base / name for name in scenes}
+    refuse_results(folders.values())
     for name, scene in scenes.items():
-        # One variant with --out goes into exactly that folder.
-        folder = base if name is None or (options.out and len(scenes) == 1) else base / name
-        run(scene, out=folder, observers=standard_observers(scene, quiet=options.quiet))
+        run(scene, out=folders[name], observers=standard_observers(scene, quiet=options.quiet))
     return DONE
 
 

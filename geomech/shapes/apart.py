@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from geomech import plain_data
 
 from .field_lines import FieldFile, FieldFileError
 from .gmsh_drawing import GmshDrawing, GmshModelError
-from .gmsh_session import GmshUnavailable
+from .gmsh_session import GmshUnavailable, load_gmsh
 
 #: Processor time that reading one file may take, s: a hundred times that of a section with thousands of curves.
 SECONDS = 60
@@ -94,6 +95,9 @@ def serve(job: Mapping[str, Any]) -> None:
     # What libraries print must not get into the answer.
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
+    if job["kind"] == "model":
+        with suppress(GmshUnavailable):  # told when it is used; loaded here, where memory is no limit
+            load_gmsh()
     seconds, memory = job["limits"]
     for limit, value in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0)):
         hard = resource.getrlimit(limit)[1]

@@ -100,8 +100,9 @@ def test_a_file_that_takes_too_long_or_too_much_is_refused(files, tmp_path, monk
     monkeypatch.setattr(apart, "SECONDS", 1)
     with pytest.raises(GmshModelError, match=r"model\.geo cannot be read within 1 s of processor time"):
         read_gmsh_model(path)
-    monkeypatch.setattr(apart, "BYTES", 1 << 27)
-    with pytest.raises(GmshModelError, match="cannot be read"):
+    limited = "import resource; resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30)); bytearray(1 << 31)"
+    monkeypatch.setattr(apart, "_CHILD", limited)
+    with pytest.raises(GmshModelError, match=r"part\.brep cannot be read within 4 GiB of memory"):
         read_gmsh_model(tmp_path / "part.brep")
 
 
