@@ -19,7 +19,8 @@ MAY_IMPORT = {
     "reference": BASE,
     "model": BASE,
     # How kernels are kept between runs: the solvers' own.
-    "compiled": set(),
+    "compiled": {"kernel_folder"},
+    "kernel_folder": set(),
     # Objects as files: what checkpoints are made of, and what a reader in another process hands back.
     "plain_data": set(),
     "dda": BASE | {"compiled"},

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .run import prepare_for_a_run
 from .scenes import trust_argument
-from .telling import say
+from .telling import say, tell_compiling
 from .verb import DONE, BadInput, Verbs, add_verb
 
 
@@ -34,6 +34,8 @@ def declare(verbs: Verbs) -> None:
 
 def _resume(options: argparse.Namespace) -> int:
     prepare_for_a_run()
+    if not options.quiet:
+        tell_compiling()
     from ..resumption import Finished, NotResumable, resume
 
     try:

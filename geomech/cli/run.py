@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .scenes import default_folder, scene_arguments, scenes_asked, variants_asked
-from .telling import say_warnings
+from .telling import say_warnings, tell_compiling
 from .verb import DONE, BadInput, Verbs, add_verb, check_folder
 
 
@@ -28,6 +28,8 @@ def declare(verbs: Verbs) -> None:
 def _run(options: argparse.Namespace) -> int:
     check_folder("--out", options.out)
     prepare_for_a_run()
+    if not options.quiet:
+        tell_compiling()
     from ..pipeline import overwriting
 
     with overwriting(options.overwrite):
@@ -88,17 +90,19 @@ def _load_script(path: Path) -> Any:
 
 
 def prepare_for_a_run() -> None:
-    """Let SIGTERM end this process as Ctrl-C does, and spare it the searches for reference loops that a run pays for in
+    """Let SIGTERM and SIGHUP end this process as Ctrl-C does, and spare it the searches for reference loops that a run pays for in
     vain."""
     import atexit
     import gc
     import signal
     import threading
 
-    ignored = signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
-    if threading.current_thread() is threading.main_thread() and not ignored:
-        # A batch system's SIGTERM ends a run as Ctrl-C does, with its summary written.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if threading.current_thread() is threading.main_thread():
+        # A batch system's SIGTERM and the SIGHUP of a terminal that is gone end a run as Ctrl-C does, with its summary
+        # written. `nohup` ignores the latter.
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.default_int_handler)
     # A cycle makes thousands of short-lived arrays and no reference loops worth speaking of: looking for loops every
     # 700 of them costs a twentieth of a run.
     gc.set_threshold(50_000, 20, 20)
