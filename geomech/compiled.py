@@ -25,14 +25,19 @@ import numpy as np
 from llvmlite import binding as llvm
 from numba import __version__ as numba_version
 from numba import config, njit
-from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.core.dispatcher import Dispatcher
 
 from .kernel_folder import SOURCE, kernel_place, prune
 
 log = logging.getLogger(__name__)
+
+try:
+    from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import Compiler
+    from numba.core.dispatcher import Dispatcher
+except ImportError:  # told below
+    IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
+    Dispatcher = type(njit(lambda: None))
 
 #: What of Numba's inner parts is relied on; they may move in any version.
 _INNER = (
@@ -41,6 +46,7 @@ _INNER = (
     (IndexDataCacheFile, ("_load_index", "_load_data", "_save_data", "_dump", "_data_path",
                           "_open_for_write", "load", "save")),
     (Compiler, ("compile_extra",)),
+    (UserProvidedCacheLocator, ("from_function", "ensure_cache_path", "get_cache_path")),
     (Dispatcher, ("_insert", "_compile_for_args")),
     (config, ("CACHE_LOCATOR_CLASSES", "CACHE_DIR")),
 )  # fmt: skip
