@@ -7,20 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State, corner_lengths
 from . import contact_rows
 from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
 from .contact_search import FACE, SMOOTHED, Corners, convex_corners, describe_contacts, find_contacts
 from .contact_set import ContactSet
-from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
+from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties, resolved
 from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
 from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
-from .rounded_corners import LARGEST_SHARE
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -34,6 +33,10 @@ _PRECISION = 1e-5
 #: What lies behind a line by less than this part of the smaller block's size (√area) when they first touch was pushed
 #: there by others' give, or by the rounding of arcs.
 _HAIR = 1e-4
+#: Sound crosses a model so often, and so many steps are taken, until its blocks bear what is put on them at the start. (The
+#: weight of a slope of 1 000 blocks, put on suddenly, sinks into eased springs by 6 % of the work of its first 0.3 s, after
+#: so long by 0.1 %.)
+_TRANSITS, _STEPS = 4.0, 20
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
 
@@ -42,7 +45,7 @@ class ContactFinder:
     """Finds the contacts of ``blocks`` and gives each its law and springs.
 
     ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow;
-    ``rigid`` (n_blocks,) those that do not strain; ``work`` counts searches.
+    ``rigid`` (n_blocks,) those that do not strain; ``mass`` (n_blocks,) kg/m; ``work`` counts searches.
     """
 
     def __init__(
@@ -53,6 +56,7 @@ class ContactFinder:
         settings: DdaSettings,
         modulus: np.ndarray,
         rigid: np.ndarray,
+        mass: np.ndarray,
         work: Work | None = None,
     ) -> None:
         self._work = work
@@ -64,6 +68,16 @@ class ContactFinder:
         self._modulus, self._area = modulus, blocks.areas()
         self._table = JointTable.of(joints)
         self._stiff = ~np.isnan(self._table.normal_stiffness)
+        # What bonds, waves cross as they do rock.
+        self._yields = ~self._stiff & (self._table.tension == 0.0) & (self._table.cohesion == 0.0)
+        self._mass = np.where(blocks.fixed, np.inf, mass)
+        #: s, from when on springs are eased to what steps resolve.
+        self._eased_from = np.inf
+        self._eases = settings.springs == "resolved" and bool(self._yields.any())
+        if self._eases and settings.dynamic_factor > 0.0:
+            self._eased_from = max(
+                _TRANSITS * _transit(blocks, modulus * self._area, mass), _STEPS * settings.time_step
+            )
         self._stiff_along = ~np.isnan(self._table.shear_stiffness)
         self._by_length = self._stiff & self._stiff_along
         self.has_face_nodes = bool(self._by_length.any())
@@ -119,11 +133,14 @@ class ContactFinder:
         table, met = find_contacts(
             vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
         )
-        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]), corners.pressed)
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
             table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
         )
+        known = np.append((old["state"] != OPEN) | (old["lift"] < 0.0), False)[parent]
+        keep = self._from_outside(table, vertices, known, corners.pressed)
+        if not keep.all():
+            table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
@@ -139,8 +156,11 @@ class ContactFinder:
             geometry[:, 4] = nodes.left(geometry[:, 4])
             parent = nodes.heirs(own, np.ascontiguousarray(old["state"]))
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
-        springs = self._springs(block, other, law, geometry[:, 4])
+        springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._eased_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
+        eased = 0.0
+        if self._eases and len(old):
+            eased = self._keep_forces(old, parent, geometry, springs, remembered, law)
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
         # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
@@ -188,6 +208,7 @@ class ContactFinder:
             springs=springs,
             relies_on_glue=glued is not None,
             faces=faces,
+            released=eased,
             **remembered,
         )
         if lumped or not (self._stiff.any() or found.inset.any()):
@@ -249,24 +270,30 @@ class ContactFinder:
         np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
         return Windows(window.pairs, reach)
 
-    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray, pressed):
-        """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
-        (sorted keys), and corners that meet corners, have; faces of blocks are ``pressed`` (n_blocks,) m in."""
+    def _from_outside(self, table: np.ndarray, vertices: np.ndarray, known: np.ndarray, pressed: np.ndarray):
+        """(n,) whether vertices of the rows of `find_contacts` may have come to their edges from outside: rows that are
+        ``known`` (n,), as they continue contacts that press or begin to behind the line, and corners that meet corners,
+        have; faces of blocks are ``pressed`` (n_blocks,) m in."""
         vertex, edge = table[:, 0], table[:, 1]
         block, other = self._owner[vertex], self._owner[edge]
         shallow = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
         shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed, np.where(table[:, 3] == FACE, -1.0, shallow),
+            self._owner, known, np.where(table[:, 3] == FACE, -1.0, shallow),
         )  # fmt: skip
-        keep |= table[:, 2] >= 0
-        return (table, met) if keep.all() else (table[keep], met[keep])
+        return keep | (table[:, 2] >= 0)
 
-    def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
+    def _springs(
+        self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray, eased: bool
+    ) -> Springs:
+        """Springs of contacts (n,), ``eased`` to what the steps of a run resolve."""
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
         if kn is None:
             normal = penalties(block, other, length, self._modulus, self._area, self._fixed, self._rigid)
+            if eased:
+                eased_to = resolved(normal, block, other, self._mass, self._settings.time_step)
+                normal = np.where(self._yields[law], eased_to, normal)
         else:
             normal = np.full(len(block), float(kn))
         return contact_springs(
@@ -306,6 +333,19 @@ class ContactFinder:
             "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
             "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset, "bare": bare,
         }  # fmt: skip
+
+    def _keep_forces(self, old, parent, geometry, springs, remembered, law) -> float:
+        """Faces that press with other springs than before keep the force, not the gap: what has come to bear on springs that
+        were not eased sinks in no further for these. J/m that the old springs had stored beyond what the new ones do."""
+        known = np.flatnonzero((parent >= 0) & (remembered["state"] != OPEN) & self._yields[law])
+        before, now = old["stiffness"][parent[known]], springs.normal[known]
+        ratio = np.where(before > 0.0, before / now, 1.0)
+        gap, lift = geometry[known, 3], remembered["lift"][known]
+        pressed = np.minimum(gap - lift, 0.0)
+        remembered["lift"][known] = np.where(pressed < 0.0, gap - ratio * pressed, lift)
+        # Of penalties, those along the face are as stiff as those across.
+        along = np.where(self._stiff_along[law[known]], 0.0, remembered["shear"][known] ** 2 / (ratio * springs.shear[known]))
+        return 0.5 * float(((1.0 - ratio) * (before * pressed**2 + along)).sum())
 
     def _pressed(self, old: np.ndarray) -> np.ndarray:
         """(n_blocks,) m: how deep the faces of each block were last pressed in."""
@@ -397,7 +437,7 @@ class ContactFinder:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, np.zeros(0, np.int64), np.full(len(vertex), -1.0),
+            self._owner, np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
@@ -431,12 +471,11 @@ class ContactFinder:
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
 
 
-def corner_lengths(blocks: Blocks, share: float) -> tuple[np.ndarray, np.ndarray]:
-    """(n_vertices,) m twice: the rounding length of every corner of ``blocks``, ``share`` times the block's size
-    (√area), and the longest that fits beside its shorter edge."""
-    edges = np.hypot(*(blocks.vertices[blocks.next_vertex] - blocks.vertices).T)
-    longest = LARGEST_SHARE * np.minimum(edges, edges[blocks.previous_vertex])
-    return share * np.sqrt(blocks.areas())[blocks.vertex_block], longest
+def _transit(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray) -> float:
+    """s that sound takes across ``blocks`` of E' A ``stiffness`` and ``mass`` (n_blocks,), at its slowest."""
+    heavy = mass > 0.0
+    slowest = float(np.sqrt(np.min(stiffness[heavy] / mass[heavy], initial=np.inf)))
+    return float(np.hypot(*np.ptp(blocks.vertices, axis=0))) / slowest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:
