@@ -16,9 +16,9 @@ class Interruption:
     """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do
     outside.
 
-    SIGTERM and SIGHUP are taken the same way where they raise KeyboardInterrupt already, as on the command line. What is ignored
-    stays ignored: a shell script starts its background jobs so, in order that a Ctrl-C meant for another program leaves
-    them alone. In other threads than the main one, where signals do not arrive, nothing changes.
+    SIGTERM and SIGHUP are taken the same way where they raise KeyboardInterrupt already, as on the command line. What is
+    ignored stays ignored: a shell script starts its background jobs so, in order that a Ctrl-C meant for another
+    program leaves them alone. In other threads than the main one, where signals do not arrive, nothing changes.
     """
 
     def __init__(self) -> None:

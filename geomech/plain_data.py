@@ -88,7 +88,7 @@ def read(file: BinaryIO, allowed: Allowed) -> Any:
         return _Reader(file, text, allowed).value(text["root"])
     except Broken:
         raise
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, OverflowError, EOFError) as error:
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError, ArithmeticError, EOFError) as error:
         raise Broken(f"no store of plain data: {type(error).__name__}: {error}") from error
 
 

@@ -30,7 +30,8 @@ def watched_runs(
 
     A variant runs into ``out`` / its name, None into ``out``, with all that the scene's ``[output]`` asks for and an
     observer of its own, ``watcher()``. All scenes are read before the first one runs: an error in the last does not
-    cost the time of the others, and neither does a folder that holds results already. Raises SceneError on bad input, and what `geomech.run` raises.
+    cost the time of the others, and neither does a folder that holds results already. Raises SceneError on bad input, and
+    what `geomech.run` raises.
     """
     from .output import standard_observers
     from .pipeline import refuse_results, run

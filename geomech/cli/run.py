@@ -90,8 +90,8 @@ def _load_script(path: Path) -> Any:
 
 
 def prepare_for_a_run() -> None:
-    """Let SIGTERM and SIGHUP end this process as Ctrl-C does, and spare it the searches for reference loops that a run pays for in
-    vain."""
+    """Let SIGTERM and SIGHUP end this process as Ctrl-C does, and spare it the searches for reference loops that a
+    run pays for in vain."""
     import atexit
     import gc
     import signal

@@ -6,7 +6,15 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path as FilePath
 
-from ..shapes.field_lines import UNFINISHED, FieldDrawing, FieldFile, FieldFileError, Named, drawing_of_lines, named_lines
+from ..shapes.field_lines import (
+    UNFINISHED,
+    FieldDrawing,
+    FieldFile,
+    FieldFileError,
+    Named,
+    drawing_of_lines,
+    named_lines,
+)
 from ..shapes.traces import read_field_file
 from .errors import Fault
 from .locator import Path

@@ -236,7 +236,8 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
     except RecursionError:
         line = _deepest_line(text)
         message = f"tables and arrays stand in one another, deeper than {DEEPEST}"
-        raise SceneError([Fault(f"{path}:{line}", message, "no key of a scene needs that: is a bracket open?")]) from None
+        fault = Fault(f"{path}:{line}", message, "no key of a scene needs that: is a bracket open?")
+        raise SceneError([fault]) from None
     except UnicodeDecodeError as error:
         raise SceneError([Fault(str(path), f"the file is not UTF-8 text ({error})", "save it as UTF-8")]) from error
     except tomllib.TOMLDecodeError as error:

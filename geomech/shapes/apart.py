@@ -41,7 +41,10 @@ _ALLOWED = plain_data.Allowed(
 )  # fmt: skip
 _ERRORS = {"model": GmshModelError, "field": FieldFileError, "gmsh": GmshUnavailable}
 #: What the child runs; the job comes by its standard input.
-_CHILD = "import json, sys; job = json.load(sys.stdin); sys.path[:] = job['path']; from geomech.shapes.apart import serve; serve(job)"
+_CHILD = (
+    "import json, sys; job = json.load(sys.stdin); sys.path[:] = job['path']; "
+    "from geomech.shapes.apart import serve; serve(job)"
+)
 
 
 def model_apart(path: Path, arguments: Mapping[str, Any]) -> GmshDrawing:

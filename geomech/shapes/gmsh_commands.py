@@ -46,8 +46,9 @@ _READS = ("Include", "Merge", "MergeWithBoundingBox", "ShapeFromFile", "ListFrom
 _LONGEST_STRING, _LONGEST_LINE = 1000, 8000
 
 _TOKEN = re.compile(
-    rb"""(?P<blank>[ \t\n\r\f]+) | (?P<line>//[^\n]*) | (?P<block>/\*.*?(?:\*/|\Z)) | (?P<text>"[^"]*(?:"|\Z)|'[^']*(?:'|\Z))
-    | (?P<word>[A-Za-z_][A-Za-z_0-9]*) | (?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?) | (?P<mark>>>|.)""",
+    rb"""(?P<blank>[ \t\n\r\f]+) | (?P<line>//[^\n]*) | (?P<block>/\*.*?(?:\*/|\Z))
+    | (?P<text>"[^"]*(?:"|\Z)|'[^']*(?:'|\Z)) | (?P<word>[A-Za-z_][A-Za-z_0-9]*)
+    | (?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?) | (?P<mark>>>|.)""",
     re.VERBOSE | re.DOTALL,
 )
 
