@@ -39,6 +39,7 @@ EDGE = {
     "bench",
     "cli",
     "doctor",
+    "installing",
     "interruption",
     "pipeline",
     "report",
