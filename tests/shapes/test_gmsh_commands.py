@@ -45,7 +45,6 @@ ATTACKS = {
     'Printf(StrCat("(", "x")) > "made";': "Printf > …",
     'Save "made.msh";': "Save",
     'CreateDir "made";': "CreateDir",
-    'General.LogFileName = "made";': "General.LogFileName",
     # What follows a text that Gmsh's scanner cuts is code.
     f"a = \"{'x' * 1100} ; SystemCall 'touch made' ; //\";": "a text without an end",
     # The second turn of a loop begins behind its first line, in the middle of the comment.
@@ -54,6 +53,7 @@ ATTACKS = {
     "a = '\nb = 1; // '; SystemCall \"touch made\";": "SystemCall",
 }
 OTHERS = {
+    'General.LogFileName = "made";': "General.LogFileName",  # which Gmsh 4.12 has not got
     'Print "made.png";': "Print",
     'OnelabRun("solver", "touch made");': "OnelabRun",
     'Field[1] = ExternalProcess; Field[1].CommandLine = "touch made";': "ExternalProcess",
