@@ -9,16 +9,14 @@ alone.
 import os
 import sys
 from importlib import import_module
-from pathlib import Path
+
+from .kernel_folder import kernel_place as _kernel_place
 
 __version__ = "0.1.0"
 
-# Compiled kernels are kept outside the package: beside the sources they would outlive an uninstall, and what is left
-# of a package folder shadows the next installation. Numba tells sources and versions apart within the folder, and goes
-# back to its own places where this one cannot be written.
+# Numba reads this once, when it is imported.
 if "numba" not in sys.modules:
-    _cache = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(_cache).expanduser() / "geomech" / "kernels"))
+    os.environ["NUMBA_CACHE_DIR"] = _kernel_place().folder
 
 # Resolved on first use, so that `import geomech` costs nothing that is not asked for.
 _PUBLIC = {

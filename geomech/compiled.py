@@ -14,18 +14,59 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import logging
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType
 
 import numpy as np
 from llvmlite import binding as llvm
+from numba import __version__ as numba_version
 from numba import config, njit
-from numba.core.caching import UserProvidedCacheLocator
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.core.dispatcher import Dispatcher
+
+from .kernel_folder import SOURCE, kernel_place, prune
+
+log = logging.getLogger(__name__)
+
+try:
+    from numba.core.caching import IndexDataCacheFile, UserProvidedCacheLocator
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import Compiler
+    from numba.core.dispatcher import Dispatcher
+except ImportError:  # told below
+    IndexDataCacheFile = UserProvidedCacheLocator = JITCodeLibrary = Compiler = object
+    Dispatcher = type(njit(lambda: None))
+
+#: What of Numba's inner parts is relied on; they may move in any version.
+_INNER = (
+    (JITCodeLibrary, ("_finalize_final_module", "_finalize_dynamic_globals", "_get_module_for_linking",
+                      "_raise_if_finalized")),
+    (IndexDataCacheFile, ("_load_index", "_load_data", "_save_data", "_dump", "_data_path",
+                          "_open_for_write", "load", "save")),
+    (Compiler, ("compile_extra",)),
+    (UserProvidedCacheLocator, ("from_function", "ensure_cache_path", "get_cache_path")),
+    (Dispatcher, ("_insert", "_compile_for_args")),
+    (config, ("CACHE_LOCATOR_CLASSES", "CACHE_DIR")),
+)  # fmt: skip
+
+
+def moved() -> list[str]:
+    """What of `_INNER` this Numba has not got."""
+    return [f"{owner.__name__}.{name}" for owner, names in _INNER for name in names if not hasattr(owner, name)]
+
+
+#: Whether kernels are compiled and kept our way; else by Numba's own, whose last digits may differ between the run that
+#: compiles and later ones, and which does not see that a file has changed that a kernel calls into.
+OWN_WAY = not moved()
+if not OWN_WAY:
+    log.warning("Numba %s has not got %s: kernels are kept in its own way", numba_version, ", ".join(moved()))
+if kernel_place().instead_of is not None:
+    log.warning(
+        "%s cannot be written: compiled kernels are kept in %s (NUMBA_CACHE_DIR names another folder)",
+        kernel_place().instead_of, kernel_place().folder,
+    )  # fmt: skip
 
 
 def kept(**options) -> Callable:
@@ -33,15 +74,21 @@ def kept(**options) -> Callable:
     that it calls within its package, and calls nothing that is compiled elsewhere."""
 
     def compiled(function: Callable) -> Dispatcher:
-        # Only while this one is declared: other packages' kernels are theirs. Where nothing can be written Numba has
-        # its own ways.
-        before = getattr(config, "CACHE_LOCATOR_CLASSES", "")
-        places = f"{__name__}.WithCalled,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator"
-        config.CACHE_LOCATOR_CLASSES = places
+        if not OWN_WAY:
+            return njit(cache=True, **options)(function)
+        # Only while this one is declared: other packages' kernels are theirs.
+        before = config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR
+        config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR = f"{__name__}.WithCalled", kernel_place().folder
         try:
-            return njit(cache=True, no_cfunc_wrapper=True, pipeline_class=_KernelCompiler, **options)(function)
+            made = njit(cache=True, no_cfunc_wrapper=True, pipeline_class=_KernelCompiler, **options)(function)
         finally:
-            config.CACHE_LOCATOR_CLASSES = before
+            config.CACHE_LOCATOR_CLASSES, config.CACHE_DIR = before
+        if isinstance(made, Dispatcher):  # not where compiling is switched off
+            file = made._cache._cache_file
+            file.__class__ = _CacheFile
+            # Not the name that Numba itself gives: what stands there has no sums.
+            file._index_path = str(Path(file._index_path).with_suffix(".summed.nbi"))
+        return made
 
     return compiled
 
@@ -50,6 +97,8 @@ def part(**options) -> Callable:
     """``njit(**options)`` for what kernels alone call: it is compiled with them."""
 
     def compiled(function: Callable) -> Dispatcher:
+        if not OWN_WAY:
+            return njit(**options)(function)
         made = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **options)(function)
         # There is nothing that Python could call: it is told so, and nothing is put where it would be found.
         made._insert = lambda *signature, **how: None
@@ -123,8 +172,11 @@ class _KernelCompiler(Compiler):
     """Numba's own, into a `_Kernel`."""
 
     library = _Kernel
+    told = "compiling %s"
 
     def compile_extra(self, function: Callable):
+        if self.told:
+            log.debug(self.told, function.__qualname__)
         if self.state.library is None:
             self.state.library = self.library(self.state.targetctx.codegen(), function.__qualname__)
             self.state.library.enable_object_caching()
@@ -135,6 +187,47 @@ class _PartCompiler(_KernelCompiler):
     """Numba's own, into a `_Part`."""
 
     library = _Part
+    told = ""
+
+
+class _CacheFile(IndexDataCacheFile):
+    """Numba's own, with a sum of what is kept: what is damaged is compiled anew, and what cannot be kept is not."""
+
+    def _load_index(self) -> dict:
+        try:
+            return super()._load_index()
+        except Exception as error:  # noqa: BLE001 (whatever unpickling a damaged file leads to)
+            self._drop(Path(self._index_path), error)
+            return {}
+
+    def load(self, key):
+        try:
+            return super().load(key)
+        except Exception as error:  # noqa: BLE001
+            self._drop(Path(self._data_path(self._load_index()[key])), error)
+            return None
+
+    def save(self, key, data) -> None:
+        try:
+            super().save(key, data)
+        except OSError as error:
+            log.warning("a compiled kernel cannot be kept in %s: %s", self._cache_path, error.strerror or error)
+
+    def _load_data(self, name: str):
+        stored = Path(self._data_path(name)).read_bytes()
+        if zlib.crc32(stored[:-4]).to_bytes(4, "little") != stored[-4:]:
+            raise ValueError("its sum is another")
+        return super()._load_data(name)
+
+    def _save_data(self, name: str, data) -> None:
+        stored = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            # The sum stands behind what unpickling reads.
+            file.write(stored + zlib.crc32(stored).to_bytes(4, "little"))
+
+    def _drop(self, path: Path, error: Exception) -> None:
+        log.warning("%s is damaged (%s): compiled anew", path, error)
+        path.unlink(missing_ok=True)
 
 
 class WithCalled(UserProvidedCacheLocator):
@@ -144,6 +237,17 @@ class WithCalled(UserProvidedCacheLocator):
     def __init__(self, function: Callable, file: str) -> None:
         super().__init__(function, file)
         self._function, self._file = function, file
+
+    def ensure_cache_path(self) -> None:
+        """Make it, with a note of the sources that its kernels are of; other kernels whose sources are gone, go."""
+        try:
+            super().ensure_cache_path()
+            noted = Path(self.get_cache_path()) / SOURCE
+            if not noted.exists():
+                noted.write_text(str(Path(self._file).absolute()), encoding="utf-8")
+            _prune_once(noted.parent.parent)
+        except OSError as error:
+            log.debug("%s: %s", self.get_cache_path(), error)  # told when a kernel cannot be kept there
 
     def get_source_stamp(self) -> str:
         files, constants = compiled_in(self._function)
@@ -173,6 +277,11 @@ def compiled_in(function: Callable) -> tuple[set[str], dict[str, object]]:
                 if hasattr(value, "__code__"):
                     rest.append(value)
     return files, constants
+
+
+@functools.cache
+def _prune_once(folder: Path) -> None:
+    prune(folder)
 
 
 @functools.cache

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 #: Debian packages of the shared libraries that the wheels leave to the system.
 DEBIAN = {
@@ -122,18 +123,23 @@ def _also_missing(package: str) -> list[str]:
 
 
 def _numba() -> Check:
-    # Compiled kernels are kept beside their modules or in NUMBA_CACHE_DIR; there, this user must be able to write.
+    from .kernel_folder import VARIABLE, kernel_place
+
+    place = kernel_place()
     code = (
-        "import importlib.util, pathlib, tempfile, numba\n"
-        "place = numba.config.CACHE_DIR or str(pathlib.Path(importlib.util.find_spec('geomech').origin).parent)\n"
-        "with tempfile.TemporaryFile(dir=place): pass\n"
-        "print('numba', numba.__version__ + ', kernels kept in', place)"
+        "import tempfile, numba, geomech.compiled as ours\n"
+        f"with tempfile.TemporaryFile(dir={place.folder!r}): pass\n"
+        "print('numba', numba.__version__ + ('' if ours.OWN_WAY else ' (unknown: kernels kept in its own way)'))"
     )
     done = _run(code)
-    if done.returncode == 0:
-        return Check("numba cache", True, done.stdout.strip())
-    last = (done.stderr.strip().splitlines() or ["?"])[-1]
-    return Check("numba cache", False, last, "export NUMBA_CACHE_DIR=$HOME/.cache/geomech")
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["?"])[-1]
+        return Check("numba cache", False, last, f"export {VARIABLE}=DIR, a folder that this user can write")
+    kept = len(list(Path(place.folder).glob("*/*.nbc")))
+    found = f"{done.stdout.strip()}, {kept} kernels kept in {place.folder}"
+    if place.instead_of is not None:
+        found += f", for {place.instead_of} cannot be written: {VARIABLE}=DIR names a folder that stays"
+    return Check("numba cache", True, found)
 
 
 def _rendering() -> Check:
@@ -156,3 +162,76 @@ def _run(code: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     except subprocess.TimeoutExpired as late:
         return subprocess.CompletedProcess(late.cmd, 1, "", "no answer within 120 s")
+
+
+#: Blocks that settle and slide, and one with a crack that grows until it is cut in two: together they call on the
+#: kernels of ordinary scenes.
+_SMALL = (
+    """
+    [geometry]
+    dead_ends = "trim"
+    zones = [{ name = "ground", rectangle = [0, -1, 4, 0] }, { name = "block", rectangle = [1, 0, 3, 1] }]
+    joints = [{ name = "cut", points = [[1, 0.3], [3, 0.6]] }]
+    [materials.rock]
+    youngs_modulus_pa = 1e9
+    poissons_ratio = 0.2
+    density_kg_m3 = 2000
+    [zones.ground]
+    fixed = true
+    [joints.default]
+    friction_angle_deg = 20
+    [loads]
+    gravity_m_s2 = [0, -9.81]
+    [dda]
+    time_step_s = 0.01
+    dynamic_factor = DYNAMIC
+    [run]
+    end_time_s = 0.05
+    """,
+    """
+    [geometry]
+    zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
+    cracks = [{ name = "flaw", points = [[-0.005, 0.0], [0.005, 0.002]] }]
+    edges = [
+        { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
+        { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
+    ]
+    [materials.rock]
+    youngs_modulus_pa = 17e9
+    poissons_ratio = 0.21
+    density_kg_m3 = 2200
+    k_ic_pa_sqrt_m = 1e6
+    [[loads.tractions]]
+    edge = "load:top"
+    rate_pa_per_s = [0.0, 0.05e6]
+    [[loads.tractions]]
+    edge = "load:bottom"
+    rate_pa_per_s = [0.0, -0.05e6]
+    [dda]
+    time_step_s = 10.0
+    max_displacement_ratio = 1.0
+    dynamic_factor = DYNAMIC
+    [growth]
+    increment_m = 6e-3
+    [run]
+    end_time_s = 400.0
+    stop_at = ["split"]
+    """,
+)
+
+
+def warm() -> None:
+    """Compile what ordinary scenes call on, so that the first of them need not: small ones are run, nothing is
+    kept of them but the kernels."""
+    import tempfile
+
+    from .output import standard_observers
+    from .pipeline import run
+    from .scene import load_scene
+
+    with tempfile.TemporaryDirectory() as folder:
+        for k, text in enumerate(_SMALL):
+            path = Path(folder) / f"scene_{k}.toml"
+            path.write_text(text.replace("DYNAMIC", "0.0"), encoding="utf-8")
+            scene = load_scene(path)
+            run(scene, Path(folder) / str(k), standard_observers(scene, quiet=True))

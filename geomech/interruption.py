@@ -1,10 +1,11 @@
-"""Ctrl-C and SIGTERM while a run lasts: the first lets the cycle end, the second ends the run at once."""
+"""Ctrl-C, SIGTERM and SIGHUP while a run lasts: the first lets the cycle end, the second ends the run at once."""
 
 from __future__ import annotations
 
 import os
 import signal
 import threading
+from contextlib import suppress
 from types import FrameType
 from typing import Any, Self
 
@@ -15,9 +16,9 @@ class Interruption:
     """While this context lasts, a first interrupt only sets ``asked``; the next raises KeyboardInterrupt, as all do
     outside.
 
-    SIGTERM is taken the same way where it raises KeyboardInterrupt already, as on the command line. What is ignored
-    stays ignored: a shell script starts its background jobs so, in order that a Ctrl-C meant for another program leaves
-    them alone. In other threads than the main one, where signals do not arrive, nothing changes.
+    SIGTERM and SIGHUP are taken the same way where they raise KeyboardInterrupt already, as on the command line. What is
+    ignored stays ignored: a shell script starts its background jobs so, in order that a Ctrl-C meant for another
+    program leaves them alone. In other threads than the main one, where signals do not arrive, nothing changes.
     """
 
     def __init__(self) -> None:
@@ -26,7 +27,7 @@ class Interruption:
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 if signal.getsignal(number) is signal.default_int_handler:
                     self._before[number] = signal.signal(number, self._take)
         return self
@@ -40,4 +41,5 @@ class Interruption:
         if self.asked:
             raise KeyboardInterrupt
         self.asked = True
-        os.write(2, _TOLD)
+        with suppress(OSError):  # of a terminal that is gone
+            os.write(2, _TOLD)

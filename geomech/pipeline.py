@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,28 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+#: Whether runs may replace the results of others in their folders, where their caller does not say.
+_OVERWRITE: ContextVar[bool] = ContextVar("overwrite", default=False)
+
+
+@contextmanager
+def overwriting(allowed: bool = True) -> Iterator[None]:
+    """While this context lasts runs may replace the results of others in their folders."""
+    before = _OVERWRITE.set(allowed)
+    try:
+        yield
+    finally:
+        _OVERWRITE.reset(before)
+
+
+def refuse_results(folders: Iterable[Path]) -> None:
+    """Refuse, before the first of several runs begins, folders that hold results already: raises
+    `geomech.output.run_lock.FolderTaken`, unless runs may overwrite (`overwriting`)."""
+    from .output import run_lock
+
+    if not _OVERWRITE.get():
+        run_lock.refuse_results(folders)
+
 
 def cycles(scene) -> Iterator[Cycle]:
     """The coupling cycles of ``scene`` (a loaded scene, or a path to one); nothing is written."""
@@ -26,16 +49,22 @@ def cycles(scene) -> Iterator[Cycle]:
 
 
 def run(
-    scene, out: str | Path | None = None, observers: Iterable[Any] | None = None, *, again: bool = False
+    scene,
+    out: str | Path | None = None,
+    observers: Iterable[Any] | None = None,
+    *,
+    again: bool = False,
+    overwrite: bool | None = None,
 ) -> dict[str, Any]:
     """Run ``scene`` to its end and return the summary that ``summary.json`` holds.
 
     ``out`` is the run folder (default ``outputs/<scene's name>``); ``observers`` are told of every cycle, by default
     the writers that the scene's ``[output]`` table asks for. ``again``: the scene is the copy that an earlier run has
-    left in ``out``. Whatever ends the run, what was written stays readable
-    and every observer is ended; the exception is raised again. Raises SceneError on bad input
-    or when ``out`` is where the scene itself is kept, `geomech.dda.NotConverged` when the blocks find no consistent
-    contact state.
+    left in ``out``. ``overwrite``: what an earlier run has left there may be replaced (None: as `overwriting` says).
+    Whatever ends the run, what was written stays readable and every observer is ended; the exception is raised again.
+    Raises SceneError on bad input or when ``out`` is where the scene itself is kept,
+    `geomech.output.run_lock.FolderRefused` where it holds the results of a run or another one is at work,
+    `geomech.dda.NotConverged` when the blocks find no consistent contact state.
     """
     scene = _loaded(scene)
     folder = Path(out) if out is not None else Path("outputs") / scene.name
@@ -46,14 +75,26 @@ def run(
         from .output import standard_observers
 
         observers = standard_observers(scene)
-    return run_problem(problem, folder, observers, [str(fault) for fault in scene.warnings])
+    warnings = [str(fault) for fault in scene.warnings]
+    if again:  # whoever goes on has the folder already
+        return CoupledRun(problem, folder, observers).go(warnings)
+    return run_problem(problem, folder, observers, warnings, overwrite=overwrite)
 
 
 def run_problem(
-    problem: Problem, folder: Path, observers: Iterable[Any], warnings: Iterable[str] = ()
+    problem: Problem,
+    folder: Path,
+    observers: Iterable[Any],
+    warnings: Iterable[str] = (),
+    *,
+    overwrite: bool | None = None,
 ) -> dict[str, Any]:
     """The same for a problem built in Python; ``warnings`` about it are logged once the run's log is open."""
-    return CoupledRun(problem, folder, observers).go(warnings)
+    from .output.run_lock import RunLock
+
+    with overwriting(_OVERWRITE.get() if overwrite is None else overwrite), RunLock(folder) as lock:
+        refuse_results([folder])
+        return CoupledRun(problem, folder, observers).go([*warnings, *([lock.stale] if lock.stale else [])])
 
 
 class CoupledRun:

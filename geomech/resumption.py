@@ -12,6 +12,7 @@ from typing import Any
 from .output import checkpoint
 from .output.checkpoint import FilesChanged, NotResumable
 from .output.checkpointing import digests
+from .output.run_lock import RunLock
 from .pipeline import CoupledRun, run
 
 log = logging.getLogger(__name__)
@@ -41,18 +42,33 @@ def resume(
     on the same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint
     are dropped.
 
-    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on). A run without a
-    checkpoint so far begins again. ``observers`` are those of the run, by default the standard ones (``quiet``: they
-    say nothing); ``tell`` is told when the run begins again. Raises `Finished` when there is
-    nothing left to do, `NotResumable` when the run cannot be gone on with, SceneError on bad input.
+    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on; it keeps
+    the step that ended at its first end, which a run that was as long from the beginning has not where steps are chosen
+    on the way). A run without a checkpoint so far begins again. ``observers`` are those of the run, by default the
+    standard ones (``quiet``: they say nothing); ``tell`` is told when the run begins again. Raises `Finished` when
+    there is nothing left to do, `NotResumable` when the run cannot be gone on with, `geomech.output.run_lock.FolderInUse`
+    while another process is at work in the folder, SceneError on bad input.
     """
     folder = Path(folder)
     _refuse_other_folders(folder)
+    with RunLock(folder) as lock:
+        if lock.stale:
+            tell(lock.stale)
+        return _resumed(folder, list(overrides), observers, quiet, tell)
+
+
+def _resumed(
+    folder: Path,
+    overrides: list[str],
+    observers: Iterable[Any] | None,
+    quiet: bool,
+    tell: Callable[[str], None],
+) -> dict[str, Any]:
     header, path = next(checkpoint.whole(folder / checkpoint.FOLDER), (None, None))
     if path is None:
-        return _begin_again(folder, list(overrides), observers, quiet, tell)
+        return _begin_again(folder, overrides, observers, quiet, tell)
     _refuse_other_sources(header, path)
-    scene = None if header["scene"] is None else _scene(folder, list(overrides))
+    scene = None if header["scene"] is None else _scene(folder, overrides)
     changes = {} if scene is None else _changes(header, scene.resolved())
     told = _told_end(folder)
     if told is not None:

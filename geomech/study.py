@@ -30,14 +30,16 @@ def watched_runs(
 
     A variant runs into ``out`` / its name, None into ``out``, with all that the scene's ``[output]`` asks for and an
     observer of its own, ``watcher()``. All scenes are read before the first one runs: an error in the last does not
-    cost the time of the others. Raises SceneError on bad input, and what `geomech.run` raises.
+    cost the time of the others, and neither does a folder that holds results already. Raises SceneError on bad input, and
+    what `geomech.run` raises.
     """
     from .output import standard_observers
-    from .pipeline import run
+    from .pipeline import refuse_results, run
     from .scene import load_scene
 
     names = list(variants) or list(load_scene(study).variants)
     scenes = {name: load_scene(study, overrides, variant=name) for name in names}
+    refuse_results(Path(out) / (name or "") for name in names)
     for name, scene in scenes.items():
         folder, watching = Path(out) / (name or ""), watcher()
         summary = run(scene, folder, [*standard_observers(scene, quiet=quiet), watching])

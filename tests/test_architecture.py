@@ -19,14 +19,17 @@ MAY_IMPORT = {
     "reference": BASE,
     "model": BASE,
     # How kernels are kept between runs: the solvers' own.
-    "compiled": set(),
+    "compiled": {"kernel_folder"},
+    "kernel_folder": set(),
+    # Objects as files: what checkpoints are made of, and what a reader in another process hands back.
+    "plain_data": set(),
     "dda": BASE | {"compiled"},
     "ddm": BASE | {"compiled"},
     "coupling": BASE | {"compiled", "dda", "ddm"},
-    "shapes": BASE - {"reference"},
+    "shapes": BASE - {"reference"} | {"plain_data"},
     "scene": BASE - {"reference"} | {"shapes"},
     # Output and pictures take records; they know nothing of how they were solved.
-    "output": BASE | {"shapes", "scene"},
+    "output": BASE | {"plain_data", "shapes", "scene"},
     "render": BASE | {"shapes", "scene", "output"},
 }
 #: The edge, where everything is put together; nothing above imports it.
@@ -36,6 +39,7 @@ EDGE = {
     "bench",
     "cli",
     "doctor",
+    "installing",
     "interruption",
     "pipeline",
     "report",

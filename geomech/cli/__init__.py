@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from .. import __version__
 from . import bench, build, check, doctor, render, report, resume, run, safety
 from .scenes import default_folder
-from .telling import say, say_errors
+from .telling import say, say_errors, silence, spell_out
 from .verb import BAD_INPUT, DONE, FAILED, INTERRUPTED, BadInput
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "default_folder", "main"]
@@ -30,10 +30,21 @@ VERBS = (check, build, run, resume, safety, render, report, bench, doctor)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code. ``arguments`` defaults to the process's own."""
+    spell_out()
     options = _parser().parse_args(arguments)
     verb: Callable[[argparse.Namespace], int] = options.verb
+    if getattr(options, "trust_models", False):
+        # Wherever models are read in this process, and in those that it starts.
+        os.environ["GEOMECH_TRUST_MODELS"] = "1"
     try:
-        return verb(options)
+        code = verb(options)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # Whoever reads has seen enough, as `head` has.
+        silence("stdout")
+        return DONE
     except KeyboardInterrupt:
         say("interrupted")
         return INTERRUPTED
@@ -67,6 +78,8 @@ def _parser() -> argparse.ArgumentParser:
 def _is_bad_input(error: Exception) -> bool:
     if isinstance(error, BadInput):
         return True
-    # The scene package is only asked when it has been imported: no other part raises its error.
-    scene = sys.modules.get("geomech.scene")
-    return scene is not None and isinstance(error, getattr(scene, "SceneError", ()))
+    # Packages are only asked when they have been imported: no other part raises their errors.
+    for module, name in (("geomech.scene", "SceneError"), ("geomech.output.run_lock", "FolderRefused")):
+        if isinstance(error, getattr(sys.modules.get(module), name, ())):
+            return True
+    return False

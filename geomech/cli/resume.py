@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 
 from .run import prepare_for_a_run
-from .telling import say
+from .scenes import trust_argument
+from .telling import say, tell_compiling
 from .verb import DONE, BadInput, Verbs, add_verb
 
 
@@ -28,10 +29,13 @@ def declare(verbs: Verbs) -> None:
         "(may be repeated)",
     )  # fmt: skip
     resume.add_argument("--quiet", action="store_true", help="say nothing but errors")
+    trust_argument(resume)
 
 
 def _resume(options: argparse.Namespace) -> int:
     prepare_for_a_run()
+    if not options.quiet:
+        tell_compiling()
     from ..resumption import Finished, NotResumable, resume
 
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .scenes import default_folder, scene_arguments, scenes_asked, variants_asked
-from .telling import say_warnings
+from .telling import say_warnings, tell_compiling
 from .verb import DONE, BadInput, Verbs, add_verb, check_folder
 
 
@@ -19,18 +19,30 @@ def declare(verbs: Verbs) -> None:
     )  # fmt: skip
     scene_arguments(run)
     run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default outputs/NAME[/VARIANT])")
+    run.add_argument(
+        "--overwrite", action="store_true", help="replace what an earlier run has left in the run folder (else refused)"
+    )
     run.add_argument("--quiet", action="store_true", help="say nothing but errors")
 
 
 def _run(options: argparse.Namespace) -> int:
     check_folder("--out", options.out)
     prepare_for_a_run()
+    if not options.quiet:
+        tell_compiling()
+    from ..pipeline import overwriting
+
+    with overwriting(options.overwrite):
+        return _run_all(options)
+
+
+def _run_all(options: argparse.Namespace) -> int:
     place: Path = options.scene
     if place.is_dir() and (place / "run.py").is_file():
         return _run_script(place, options)
 
     from ..output import standard_observers
-    from ..pipeline import run
+    from ..pipeline import refuse_results, run
     from ..scene import load_scene
 
     # Every variant is read before the first one runs: an error in the last should not cost an hour.
@@ -38,10 +50,12 @@ def _run(options: argparse.Namespace) -> int:
     if not options.quiet:
         say_warnings(scenes.values())
     base = options.out or default_folder(place)
+    # One variant with --out goes into exactly that folder.
+    alone = options.out and len(scenes) == 1
+    folders = {name: base if name is None or alone else base / name for name in scenes}
+    refuse_results(folders.values())
     for name, scene in scenes.items():
-        # One variant with --out goes into exactly that folder.
-        folder = base if name is None or (options.out and len(scenes) == 1) else base / name
-        run(scene, out=folder, observers=standard_observers(scene, quiet=options.quiet))
+        run(scene, out=folders[name], observers=standard_observers(scene, quiet=options.quiet))
     return DONE
 
 
@@ -76,17 +90,19 @@ def _load_script(path: Path) -> Any:
 
 
 def prepare_for_a_run() -> None:
-    """Let SIGTERM end this process as Ctrl-C does, and spare it the searches for reference loops that a run pays for in
-    vain."""
+    """Let SIGTERM and SIGHUP end this process as Ctrl-C does, and spare it the searches for reference loops that a
+    run pays for in vain."""
     import atexit
     import gc
     import signal
     import threading
 
-    ignored = signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
-    if threading.current_thread() is threading.main_thread() and not ignored:
-        # A batch system's SIGTERM ends a run as Ctrl-C does, with its summary written.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if threading.current_thread() is threading.main_thread():
+        # A batch system's SIGTERM and the SIGHUP of a terminal that is gone end a run as Ctrl-C does, with its summary
+        # written. `nohup` ignores the latter.
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.default_int_handler)
     # A cycle makes thousands of short-lived arrays and no reference loops worth speaking of: looking for loops every
     # 700 of them costs a twentieth of a run.
     gc.set_threshold(50_000, 20, 20)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from .scenes import scene_arguments, scenes_asked
-from .telling import say, say_warnings
+from .telling import say, say_warnings, tell_compiling
 from .verb import DONE, BadInput, Verbs, add_verb, check_writable
 
 
@@ -46,6 +46,8 @@ def _safety(options: argparse.Namespace) -> int:
     from ..pipeline import CracksInBlocks, cracked_and_free, factor_of_safety
     from ..scene import load_scene
 
+    if not options.quiet:
+        tell_compiling()
     scenes = scenes_asked(load_scene(options.scene, options.overrides, None), options)
     say_warnings(scenes.values())
     told = {}

@@ -21,6 +21,15 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
         "--variant", action="append", default=[], metavar="NAME", dest="variants",
         help="a variant that the scene names, or 'all' (may be repeated)",
     )  # fmt: skip
+    trust_argument(parser)
+
+
+def trust_argument(parser: argparse.ArgumentParser) -> None:
+    """The argument of every verb that reads models."""
+    parser.add_argument(
+        "--trust-models", action="store_true",
+        help="let Gmsh models run commands, write files and read any: of your own alone (else they are refused)",
+    )  # fmt: skip
 
 
 def scenes_asked(first: Any, options: argparse.Namespace, *, to_run: bool = True) -> dict[str | None, Any]:

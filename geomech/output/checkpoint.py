@@ -3,10 +3,10 @@
 A checkpoint holds whatever the run's solvers and writers keep, not only blocks, cracks and loads: factors that were
 renewed in part, face states that the next solution is tried with, meshes. They decide about round-off, so that a run
 goes on bit for bit only with them, and keeping them lets a run be stored at any moment without changing a bit of what
-it does afterwards. What they are is the solvers' own business; hence a pickle (of arrays, as good as binary), in which
-every object stands once and arrays that share memory go on sharing it. It is of use to the sources that wrote it alone:
-its first line, plain JSON, says which, and is read before anything else. As any pickle it can run code: resume only
-what you trust.
+it does afterwards. What they are is the solvers' own business: their objects stand there by the names of their classes
+and attributes, as plain data (`geomech.plain_data`), so that a file from anyone can be read without running anything.
+It is of use to the sources that wrote it alone: its first lines, the format and a header in JSON with a sum of its own,
+say which, and are read before anything else.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import importlib.metadata
 import io
 import json
 import os
-import pickle
 import platform
+import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -25,19 +25,35 @@ from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import numpy as np
+from geomech import plain_data
 
-#: Counts the ways in which this file has been written.
-FORMAT = 1
+#: Counts the ways in which this file has been written; the first was a pickle behind a line of JSON.
+FORMAT = 2
 #: Below the run folder.
 FOLDER = "checkpoint"
 #: So many checkpoints are kept: the last, and one more should that be damaged.
 KEPT = 2
 
-#: Behind the pickle: its CRC-32 and its length.
+#: The first line: what the file is, the CRC-32 and the length of the header in the second.
+_FIRST = "geomech checkpoint {format} {crc:08x} {length}\n"
+_FIRST_READ = re.compile(rb"geomech checkpoint (\d{1,9}) ([0-9a-f]{8}) (\d{1,12})\n")
+#: Behind the content: its CRC-32 and its length.
 _TRAILER = struct.Struct("<IQ")
+#: What a checkpoint may hold besides arrays, numbers, texts and Python's own containers.
+_ALLOWED = plain_data.Allowed(
+    parts=("geomech.model", "geomech.dda", "geomech.ddm", "geomech.coupling"),
+    classes=(
+        "geomech.output.deepest:Deepest", "geomech.output.grids:CrackLines", "geomech.output.grids:KeyBlocks",
+        "geomech.output.histories:TableEnd", "geomech.output.interior:InteriorMeshes", "geomech.output.interior:_Kept",
+        "geomech.output.series:SeriesTime", "geomech.output.triangulate:Triangles",
+        "geomech.shapes.meshing:InteriorMesh",
+    ),
+    methods=("geomech.model.problem:Problem.joint_index",),
+)  # fmt: skip
 #: Sources that decide what a run does and what a checkpoint holds.
 _DECISIVE = ("conventions.py", "model", "dda", "ddm", "coupling", "output")
+#: Bytes: no header is as long.
+_LONGEST_HEADER = 1 << 24
 
 
 class NotResumable(RuntimeError):
@@ -70,9 +86,10 @@ def write(folder: Path, header: dict[str, Any], content: Any) -> Path:
     beside = path.with_name(path.name + ".part")
     try:
         with open(beside, "wb") as file:
-            file.write(json.dumps(header).encode() + b"\n")
+            head = json.dumps(header).encode()
+            file.write(_FIRST.format(format=FORMAT, crc=zlib.crc32(head), length=len(head)).encode() + head + b"\n")
             summed = _Summed(file)
-            _Pickler(summed, protocol=5).dump(content)
+            plain_data.write(summed, content, _ALLOWED)
             file.write(_TRAILER.pack(summed.crc, summed.length))
             file.flush()
             os.fsync(file.fileno())
@@ -91,7 +108,7 @@ def found(folder: Path) -> list[Path]:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """The first line of the checkpoint ``path``. Raises NotResumable where it is none, or not whole."""
+    """The header of the checkpoint ``path``. Raises NotResumable where it is none, or not whole."""
     with open(path, "rb") as file:
         return _read_header(path, file)
 
@@ -99,8 +116,13 @@ def read_header(path: Path) -> dict[str, Any]:
 def read(path: Path) -> Any:
     """The content of the checkpoint ``path``, which these sources wrote. Raises NotResumable where it is not whole."""
     with open(path, "rb") as file:
-        _read_header(path, file)
-        return pickle.load(file)
+        header = _read_header(path, file)
+        if header["format"] != FORMAT:
+            raise NotResumable(f"{path} is a checkpoint of format {header['format']}, and this geomech reads {FORMAT}")
+        try:
+            return plain_data.read(file, _ALLOWED)
+        except plain_data.Broken as error:
+            raise NotResumable(f"{path} does not hold what a checkpoint holds ({error}): run the scene anew") from error
 
 
 def whole(folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
@@ -113,13 +135,20 @@ def whole(folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
 
 
 def _read_header(path: Path, file: BinaryIO) -> dict[str, Any]:
-    """The first line; ``file`` then stands at the pickle, whose sum is right."""
+    """The header; ``file`` then stands at the content, whose sum is right. Of another format the header says no more
+    than which."""
     damaged = NotResumable(f"{path} is no whole checkpoint: remove it, and the one before it is taken")
-    line = file.readline(1 << 24)
-    try:
-        header = json.loads(line)
-    except ValueError:
-        raise damaged from None
+    first = file.readline(256)
+    if first.startswith(b"{"):
+        return {"format": 1}
+    found = _FIRST_READ.fullmatch(first)
+    if found is None:
+        raise damaged
+    head = file.read(min(int(found[3]), _LONGEST_HEADER))
+    if zlib.crc32(head) != int(found[2], 16) or file.read(1) != b"\n":
+        raise damaged
+    if int(found[1]) != FORMAT:
+        return {"format": int(found[1])}
     start = file.tell()
     length = file.seek(0, os.SEEK_END) - start - _TRAILER.size
     if length < 0:
@@ -132,7 +161,10 @@ def _read_header(path: Path, file: BinaryIO) -> dict[str, Any]:
     if _TRAILER.unpack(file.read(_TRAILER.size)) != (crc, length):
         raise damaged
     file.seek(start)
-    return header
+    try:
+        return json.loads(head) | {"format": FORMAT}
+    except (ValueError, TypeError):
+        raise damaged from None
 
 
 class _Summed(io.RawIOBase):
@@ -145,27 +177,6 @@ class _Summed(io.RawIOBase):
         self.crc = zlib.crc32(data, self.crc)
         self.length += memoryview(data).nbytes
         return self._file.write(data)
-
-
-class _Pickler(pickle.Pickler):
-    """Stores views of arrays as views: they go on sharing memory, and are laid out as they were. Strides decide which
-    of BLAS' ways a product is taken by, and so about its last bits."""
-
-    def reducer_override(self, value: Any) -> Any:
-        if type(value) is np.ndarray and type(value.base) is np.ndarray and not value.dtype.hasobject:
-            base = value.base
-            (low, high), (first, last) = np.lib.array_utils.byte_bounds(value), np.lib.array_utils.byte_bounds(base)
-            if first <= low and high <= last and (base.flags.c_contiguous or base.flags.f_contiguous):
-                start = value.__array_interface__["data"][0] - first
-                return _view, (base, value.dtype, value.shape, value.strides, start, value.flags.writeable)
-        return NotImplemented
-
-
-def _view(base: np.ndarray, dtype, shape, strides, start: int, writeable: bool) -> np.ndarray:
-    memory = base.reshape(-1, order="A").view(np.uint8) if base.size else np.empty(0, np.uint8)
-    view = np.ndarray(shape, dtype, memory, start, strides)
-    view.flags.writeable = writeable and view.flags.writeable
-    return view
 
 
 def _sources() -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from geomech import __version__
+from geomech import __version__, plain_data
 from geomech.model import Cycle, Problem
 
 from . import checkpoint
@@ -75,8 +75,9 @@ class Checkpoints:
         }  # fmt: skip
         try:
             checkpoint.write(self._folder, header, content)
-        except OSError as error:
-            log.warning("no checkpoint of cycle %d: %s; the one before it is kept", cycle, error.strerror or error)
+        except (OSError, plain_data.NotPlain) as error:
+            why = getattr(error, "strerror", None) or error
+            log.warning("no checkpoint of cycle %d: %s; the one before it is kept", cycle, why)
             written = False
         else:
             written = True

@@ -17,8 +17,8 @@ class Observer(Protocol):
     """A run calls `on_start` once, `on_cycle` for every cycle in order, and `on_end` once, also after a failure.
 
     An observer that writes what a resumed run is to go on with has two methods more: ``memory()``, what it needs for
-    that (anything that pickles), and ``on_resume(problem, folder, memory)``, called in place of `on_start`, which
-    brings its files back to where they were then. Whoever has none of them is started anew.
+    that (plain data, see `geomech.plain_data`), and ``on_resume(problem, folder, memory)``, called in place of
+    `on_start`, which brings its files back to where they were then. Whoever has none of them is started anew.
 
     ``summary`` is one mapping that all observers share: whoever runs the cycles puts in what it knows (``end``, the
     reason; ``wall_s``), and each observer may add to it. ``error`` is the exception that ended the run, if one did.

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import sys
 import textwrap
 import time
 from collections import deque
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -111,7 +113,7 @@ class Progress:
         self._percent, self._last = -1, None
         self._pace = Pace()
         self._bar = None
-        if not self.quiet and self._out.isatty():
+        if not self.quiet and self._out is not None and self._out.isatty():
             from tqdm import tqdm
 
             self._bar = tqdm(
@@ -148,7 +150,8 @@ class Progress:
             if now - self._said >= self._bar.mininterval:
                 self._said = now
                 self._bar.set_postfix_str(_told(cycle) + self._left(cycle), refresh=False)
-            self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
+            with suppress(OSError):  # of a terminal that is gone
+                self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
         elif now - self._said >= self.interval:
             percent = self._share(cycle)
             if percent == self._percent and now - self._said < 2 * self.interval:
@@ -159,7 +162,8 @@ class Progress:
     def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
         self._warnings.end()
         if self._bar is not None:
-            self._bar.close()
+            with suppress(OSError):
+                self._bar.close()
         if error is not None:
             # Why it stopped is the exception's own to say, to whoever catches it.
             last = self._last
@@ -179,8 +183,18 @@ class Progress:
         return f", about {_duration(seconds)} left" if 0.5 <= seconds < math.inf else ""
 
     def _say(self, text: str) -> None:
-        self._out.write(text + "\n")
-        self._out.flush()
+        if self._out is None:
+            return
+        try:
+            self._out.write(text + "\n")
+            self._out.flush()
+        except UnicodeEncodeError:
+            self._out.write(text.encode("ascii", "replace").decode() + "\n")
+        except (OSError, ValueError):
+            # Nobody can read it: a full disk, a closed stream, a terminal that is gone. The run goes on.
+            if self._out is sys.stderr:
+                sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+            self._out = None
 
 
 def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 from geomech.model import Cycle, Problem, Skip
@@ -21,14 +20,7 @@ WORDS = {
     "compliances": "compliances of cracked blocks whose crack faces were in the states of before",
     "interior fields": "cycles whose fields inside cracked blocks were not written",
     "series": "cycles whose ParaView files were not written",
-    "modules": "parts that were not loaded",
 }
-
-#: What a run may do without, and how to tell whether it did: the module that stands for it.
-PARTS = {
-    "crack solver": "geomech.ddm.body", "Gmsh": "gmsh", "VTK": "vtkmodules", "matplotlib": "matplotlib",
-    "PyVista": "pyvista",
-}  # fmt: skip
 
 
 def told(name: str, skip: Skip) -> dict[str, Any]:
@@ -41,11 +33,8 @@ def told(name: str, skip: Skip) -> dict[str, Any]:
 
 
 def skipped(problem: Problem, last: Cycle) -> dict[str, dict[str, Any]]:
-    """name → entry of all that the solvers of a run to its ``last`` cycle did not do, and of modules not loaded."""
+    """name → entry of all that the solvers of a run to its ``last`` cycle did not do."""
     found = {name: told(name, skip) for name, skip in last.skips.items()}
     if not last.work and not problem.cracks.n_cracks:
         found["crack solver"] = told("crack solver", Skip(last.number + 1))
-    away = [part for part, module in PARTS.items() if module not in sys.modules]
-    if away:
-        found["modules"] = {**told("modules", Skip(len(away))), "which": away}
     return {name: found[name] for name in WORDS if name in found}

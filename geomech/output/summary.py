@@ -53,7 +53,7 @@ class Summary:
 
     def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
         self._begin(problem, folder)
-        vars(self).update(memory)
+        vars(self).update({name: memory[name] for name in _COUNTED})
         self._events = list(self._events)
 
     def on_cycle(self, cycle: Cycle) -> None:

@@ -16,6 +16,9 @@ from .locator import Path
 from .tables import SceneTables
 from .validation import nearest
 
+#: No tip advances by less, in units of the rock's largest side: coordinates of a drawing keep twelve digits.
+SHORTEST_ADVANCE = 1e-9
+
 
 def check(c: Check) -> None:
     """Run every check that the sections at hand allow."""
@@ -131,6 +134,16 @@ def _growth_lengths(c: Check) -> None:
             f'trial kinks are judged by the criterion "f", not by "{growth.criterion}"',
             'leave it out, or set growth.criterion = "f"',
         )
+    if growth is not None and c.drawing is not None and c.drawing.blocks is not None:
+        size = float(np.ptp(c.drawing.blocks.vertices, axis=0).max())
+        for key in ("increment_m", "min_increment_m"):
+            value = getattr(growth, key)
+            if value is not None and value < SHORTEST_ADVANCE * size:
+                c.refuse(
+                    ("growth", key),
+                    f"an advance of {value:g} m is lost in the round-off of coordinates of {size:g} m",
+                    f"make it at least {SHORTEST_ADVANCE * size:.1g} m; a tenth of the shortest crack is usual",
+                )
     if growth is None or growth.increment_m is None or growth.min_increment_m is None:
         return
     if growth.min_increment_m > growth.increment_m:

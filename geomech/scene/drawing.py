@@ -37,7 +37,7 @@ class Drawing:
     ``blocks`` is None where the drawing cannot be assembled. ``marks`` are lines and points that cut nothing,
     ``mark_places`` (path in the scene, where in the file) of each by name, ``crack_paths`` the paths of the drawn
     cracks; ``origin`` m, world coordinates of what is (0, 0) in all these, ``crs`` their reference
-    system as a GeoJSON file says it."""
+    system as a GeoJSON file says it; ``folder`` that of the scene."""
 
     zones: tuple[str, ...]
     cracks_drawn: tuple[str, ...]
@@ -53,6 +53,7 @@ class Drawing:
     origin: tuple[float, float] = (0.0, 0.0)
     crack_paths: dict[str, Path] = field(default_factory=dict)
     crs: dict[str, Any] | None = None
+    folder: FilePath | None = None
 
     def path_of_crack(self, name: str) -> Path:
         """Where in the scene the crack ``name`` is drawn, or what made it."""
@@ -70,7 +71,7 @@ class Drawing:
             found = []
             for choice in choices:
                 try:
-                    other = read_gmsh_model(self.model, {**self.parameters, parameter: choice})
+                    other = read_gmsh_model(self.model, {**self.parameters, parameter: choice}, folder=self.folder)
                 except GmshModelError:
                     continue
                 labels = [zone.edge_names or () for zone in other.zones]
@@ -146,7 +147,7 @@ def draw(
     parts, parameters, choices = _Parts(), {}, {}
     model = None if geometry.model is None else folder / geometry.model
     if model is not None:
-        read = _read_model(geometry, model, place, faults)
+        read = _read_model(geometry, model, folder, place, faults)
         if read is None:
             return None
         warnings += [Fault(place(("geometry", "model")), message, way_out) for message, way_out in read.warnings]
@@ -192,8 +193,9 @@ def draw(
         parts.move(origin)
         geometry = moved_section(geometry, "geometry", origin)
     return _assembled(
-        geometry, parts, Drawing((), (), None, None, parameters, choices, model, crs=crs), origin, place, faults, warnings
-    )
+        geometry, parts, Drawing((), (), None, None, parameters, choices, model, crs=crs, folder=folder), origin, place,
+        faults, warnings,
+    )  # fmt: skip
 
 
 def _draw_here(geometry: Geometry, parts: _Parts) -> None:
@@ -218,7 +220,9 @@ def _refuse_two_of_a_name(parts: _Parts, place: Callable[[Path], str], faults: l
         seen.add(trace.name)
 
 
-def _read_model(geometry: Geometry, model: FilePath, place: Callable[[Path], str], faults: list[Fault]):
+def _read_model(
+    geometry: Geometry, model: FilePath, folder: FilePath, place: Callable[[Path], str], faults: list[Fault]
+):
     """The `GmshDrawing` of the model, without parameters that are faulty; None where it cannot be read."""
     # Imported here: a scene drawn in TOML needs no Gmsh.
     from ..shapes import GmshModelError, GmshUnavailable, read_gmsh_model
@@ -227,7 +231,7 @@ def _read_model(geometry: Geometry, model: FilePath, place: Callable[[Path], str
     wanted = dict(geometry.parameters)
     while True:
         try:
-            return read_gmsh_model(model, wanted, geometry.chord_tolerance_m, geometry.unit)
+            return read_gmsh_model(model, wanted, geometry.chord_tolerance_m, geometry.unit, folder)
         except GmshModelError as error:
             at = ("geometry", "parameters", error.parameter) if error.parameter is not None else source
             faults.append(Fault(place(at), error.message, error.way_out))

@@ -7,7 +7,15 @@ from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
-from ..shapes.field_lines import UNFINISHED, FieldDrawing, FieldFileError, Named, drawing_of_lines, named_lines
+from ..shapes.field_lines import (
+    UNFINISHED,
+    FieldDrawing,
+    FieldFile,
+    FieldFileError,
+    Named,
+    drawing_of_lines,
+    named_lines,
+)
 from ..shapes.traces import read_field_file
 from .errors import Fault
 from .locator import Path
@@ -34,7 +42,7 @@ def read_traces(
     for k, entry in enumerate(geometry.traces):
         source: Path = ("geometry", "traces", k, "file")
         try:
-            file = read_field_file(
+            file = _read(
                 folder / entry.file, entry.unit or geometry.unit, geometry.chord_tolerance_m, entry.set_property
             )
         except FieldFileError as error:
@@ -104,6 +112,16 @@ def read_traces(
             warnings.append(Fault(place(at), message, way_out))
         add(part, partial(_source, part, path_of), zones)
     return True, crs
+
+
+def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:
+    """The file; one of a CAD program in a process of its own."""
+    arguments = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
+    if path.suffix.lower() == ".dxf" and path.is_file():
+        from ..shapes.apart import field_file_apart
+
+        return field_file_apart(path, arguments)
+    return read_field_file(path, **arguments)
 
 
 def _source(drawn: FieldDrawing, path_of: dict[str, Path], part: str, index: int) -> tuple[Path, str]:

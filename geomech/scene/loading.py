@@ -35,6 +35,9 @@ SCENE_FILE = "scene.toml"
 #: What a scene's geometry.model may be, and is taken for a scene at times.
 MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf")
 
+#: A scene nests tables and arrays some six deep; what is nested deeper than this is a mistake, or meant to exhaust.
+DEEPEST = 40
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -58,7 +61,7 @@ class Scene:
     @property
     def name(self) -> str:
         """What run folders are called: the pipeline folder's name, or the file's."""
-        return self.path.parent.name if self.path.name == SCENE_FILE else self.path.stem
+        return self.path.absolute().parent.name if self.path.name == SCENE_FILE else self.path.stem
 
     @property
     def output(self) -> OutputTable:
@@ -85,7 +88,13 @@ class Scene:
 
     def problem(self) -> Problem:
         """The scene as the solvers take it; its title names the variant."""
-        return replace(build_problem(self.tables, self.drawing, self._check), title=self._full_title)
+        try:
+            return replace(build_problem(self.tables, self.drawing, self._check), title=self._full_title)
+        except SceneError:
+            raise
+        except ValueError as error:
+            # What the checks have let through and the model does not take.
+            raise SceneError([Fault(str(self.path), str(error), "")]) from error
 
     @property
     def _full_title(self) -> str:
@@ -225,7 +234,15 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
     try:
         # Line ends as tomllib sees them, so that lines count alike; editors on Windows put a mark at the beginning.
         text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
-        return tomllib.loads(text), text
+        data = tomllib.loads(text)
+        if _is_deep(data):
+            raise RecursionError
+        return data, text
+    except RecursionError:
+        line = _deepest_line(text)
+        message = f"tables and arrays stand in one another, deeper than {DEEPEST}"
+        fault = Fault(f"{path}:{line}", message, "no key of a scene needs that: is a bracket open?")
+        raise SceneError([fault]) from None
     except UnicodeDecodeError as error:
         raise SceneError([Fault(str(path), f"the file is not UTF-8 text ({error})", "save it as UTF-8")]) from error
     except tomllib.TOMLDecodeError as error:
@@ -243,6 +260,31 @@ def _parsed(path: FilePath) -> tuple[dict[str, Any], str]:
                 )
             ]
         ) from error
+
+
+def _is_deep(data: Any) -> bool:
+    """Whether a parsed document is nested deeper than `DEEPEST`; found without recursion."""
+    level = [data]
+    for _ in range(DEEPEST):
+        level = [item for node in level if isinstance(node, (dict, list))
+                 for item in (node.values() if isinstance(node, dict) else node)]  # fmt: skip
+        if not level:
+            return False
+    return True
+
+
+def _deepest_line(text: str) -> int:
+    """The first line where more than `DEEPEST` brackets are open, or dots stand in a key; brackets in texts count as
+    well."""
+    open_ones = 0
+    for number, line in enumerate(text.split("\n"), 1):
+        for character in line.partition("#")[0]:
+            open_ones += (character in "[{") - (character in "]}")
+            if open_ones > DEEPEST:
+                return number
+        if line.partition("=")[0].count(".") >= DEEPEST:
+            return number
+    return 1
 
 
 def _syntax_hint(source: str) -> str:

@@ -88,6 +88,8 @@ def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[
         flaws.append(Flaw("zones", k, f"zone {zone.name!r}: {message}", way_out))
         return None, [], []
 
+    if not zone.loops:
+        return refuse("it has no outline", "draw one, or export the file again")
     found = []
     for number, loop in enumerate(zone.loops):
         what = "the outline" if number == 0 else f"hole {number}"

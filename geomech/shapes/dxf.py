@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -23,6 +24,9 @@ _INSUNITS = {
 _LEAST_TURN = math.pi / 2
 #: Points of an entity, whether it closes, and where the piece after each point stands for a curve (one for all).
 _Sampled = tuple[Any, bool, "bool | list[bool]"]
+#: What ezdxf raises where an entity is not what its kind says (DXFError is a plain Exception).
+_DAMAGED = (AttributeError, LookupError, TypeError, ValueError, ArithmeticError, StopIteration, RecursionError)
+_AGAIN = "delete or redraw it, or export the drawing again"
 #: References to references, deeper than this, go in a circle.
 _DEEPEST = 32
 
@@ -43,26 +47,35 @@ def read_dxf(path: Path, unit: str | None = None, chord_tolerance: float | None 
         raise FieldFileError(
             f"{path.name}: DXF files are read by ezdxf, which is not installed ({error})", "`pip install ezdxf`"
         ) from error
+    warnings: list[tuple[str, str]] = []
     try:
         try:
             document = ezdxf.readfile(path)
-        except (ezdxf.DXFStructureError, UnicodeDecodeError):
+        except (ezdxf.DXFStructureError, *_DAMAGED) as error:
             # Some programs write what the format does not allow; what can be saved of it is read.
-            document, _ = recover.readfile(path)
-    except (ezdxf.DXFError, OSError, ValueError) as error:
+            with _Recoveries() as recoveries:
+                document, _ = recover.readfile(path)
+            warnings.append(recoveries.told(path, error))
+    except (ezdxf.DXFError, OSError, *_DAMAGED) as error:
         raise FieldFileError(
-            f"{path.name} cannot be read as DXF: {error}", "save it as DXF again (R2000 or later)"
+            f"{path.name} cannot be read as DXF: {error or type(error).__name__}",
+            "save it as DXF again (R2000 or later)",
         ) from error
-    warnings: list[tuple[str, str]] = []
     factor = _factor(document, path, unit, warnings)
     reader = _Reader(document, path)
-    entities = list(reader.entities())
-    box = bbox.extents((entity for _, entity in entities), fast=True)
+    try:
+        entities = list(reader.entities())
+        box = bbox.extents((entity for _, entity in entities), fast=True)
+    except _DAMAGED as error:
+        raise FieldFileError(f"{path.name}: {reader.at}: {_told(error)}", _AGAIN) from error
     size = max(box.size.x, box.size.y) if box.has_data else 1.0
     chord = CHORD * size if chord_tolerance is None else chord_tolerance / factor
     lines, heights = [], []
     for layer, entity in entities:
         points, closed, bent = reader.points(entity, chord)
+        if not len(points):
+            reader.left[entity.dxftype() + " without points"] += 1
+            continue
         heights.append(float(np.abs(points[:, 2]).max()))
         if len(points) > 1:
             apart = (np.diff(points[:, :2], axis=0) != 0).any(axis=1)
@@ -107,11 +120,37 @@ def _factor(document: Any, path: Path, unit: str | None, warnings: list[tuple[st
     return 1.0
 
 
+class _Recoveries(logging.Handler):
+    """While this context lasts, what ezdxf logs of what it has made of a file that is no right DXF."""
+
+    def __enter__(self) -> Self:
+        self.found: list[str] = []
+        self._log = logging.getLogger("ezdxf")
+        self._propagates, self._log.propagate = self._log.propagate, False
+        self._log.addHandler(self)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._log.removeHandler(self)
+        self._log.propagate = self._propagates
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.found.append(record.getMessage())
+
+    def told(self, path: Path, error: Exception) -> tuple[str, str]:
+        made = f"; {len(self.found)} guesses were made, the first: {self.found[0]}" if self.found else ""
+        return (
+            f"{path.name} is no right DXF ({error or type(error).__name__}): what could be saved of it is read{made}",
+            "hold the picture of `geomech build` against the drawing, or save it as DXF again",
+        )
+
+
 class _Reader:
     """Entities of a document's model space that are seen, and what was left out."""
 
     def __init__(self, document: Any, path: Path) -> None:
         self.document, self.path = document, path
+        self.at = "its entities"  # what is being read
         self.hidden: Counter[str] = Counter()
         self.left: Counter[str] = Counter()
 
@@ -121,6 +160,7 @@ class _Reader:
 
     def _of(self, entities: Any, host: str, depth: int) -> Iterator[tuple[str, Any]]:
         for entity in entities:
+            self.at = _named(entity)
             layer = entity.dxf.get("layer", "0")
             # Layer 0 inside a block stands for the layer that the block is put on.
             layer = host if layer == "0" and depth else layer
@@ -152,7 +192,10 @@ class _Reader:
     def points(self, entity: Any, chord: float) -> tuple[np.ndarray, bool, np.ndarray]:
         """(n, 3) points of an entity, in the file's unit; whether it closes; (n,) True where the piece after a point
         stands for a curve."""
-        points, closed, bent = _POINTS[entity.dxftype()](entity, chord)
+        try:
+            points, closed, bent = _POINTS[entity.dxftype()](entity, chord)
+        except _DAMAGED as error:
+            raise FieldFileError(f"{self.path.name}: {_named(entity)}: {_told(error)}", _AGAIN) from error
         points = np.array([tuple(point)[:3] for point in points], dtype=float).reshape(-1, 3)
         if not np.isfinite(points).all():
             raise FieldFileError(
@@ -174,6 +217,15 @@ class _Reader:
                 (f"{self.path.name}: no traces, left out: {listed}", "explode what should be lines in the drawing")
             )
         return warnings
+
+
+def _named(entity: Any) -> str:
+    handle = entity.dxf.get("handle") if entity.is_alive else None
+    return f"{entity.dxftype()} #{handle}" if handle else f"{entity.dxftype()} of a block"
+
+
+def _told(error: Exception) -> str:
+    return f"what belongs to it is missing or spoilt ({error})"
 
 
 def _is_line(polyline: Any) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .curves import ended_on
 from .field_lines import METRES
+from .gmsh_commands import SCRIPTS, refuse_commands, trusted
 from .gmsh_curves import Curves
 from .gmsh_drawing import CRACK, GmshDrawing, GmshModelError, Parameter, scaled
 from .gmsh_left_out import lost_curves, out_of_plane
@@ -28,6 +29,7 @@ def read_gmsh_model(
     parameters: Mapping[str, float | str] | None = None,
     chord_tolerance: float | None = None,
     unit: str | None = None,
+    folder: Path | None = None,
 ) -> GmshDrawing:
     """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep,
     .step.
@@ -42,6 +44,11 @@ def read_gmsh_model(
     cracks that are as near to a curve are on its chords. ``unit`` (a key of
     `geomech.shapes.field_lines.METRES`) is what the model is drawn in, default m; for a .step, what the file says.
 
+    A model may draw; one that would run programs or write files is refused before Gmsh sees it, unless
+    GEOMECH_TRUST_MODELS is set (`gmsh_commands`). It may read files below ``folder`` (default: its own).
+
+    Meshes and shapes, and scripts that read such, are read in another process (`apart`): damaged ones can end it.
+
     Raises GmshModelError for a missing or faulty file, unknown parameters and values out of range, models without
     named surfaces, and GmshUnavailable where Gmsh cannot be loaded.
     """
@@ -53,17 +60,47 @@ def read_gmsh_model(
             f"there is no file {path}",
             f"did you mean {close[0]}?" if close else "paths are relative to the scene file",
         )
+    files = [path] if trusted() else refuse_commands(path, folder)
+    arguments = {"parameters": dict(parameters or {}), "chord_tolerance": chord_tolerance, "unit": unit}
+    if all(file.suffix in (*SCRIPTS, ".opt") for file in files):
+        return read_here(path, **arguments)
+    from .apart import model_apart
+
+    return model_apart(path, arguments)
+
+
+def read_here(
+    path: Path, parameters: Mapping[str, float | str], chord_tolerance: float | None, unit: str | None
+) -> GmshDrawing:
+    """`read_gmsh_model` without a look at the file before, in this process: a damaged one may end it."""
     metres = METRES[unit or "m"]
     if path.suffix.lower() in STEP:
         # Every length of a STEP file arrives in millimetres, whatever its unit.
         metres = 1e-3 if unit is None else 1e-3 * metres / metres_in_step(path)
-    with gmsh_session() as gmsh:
-        known = open_with_parameters(gmsh, path, parameters or {})
-        if path.suffix == ".msh":
-            found = drawing_of_mesh(gmsh, path)
-        else:
-            found = _drawing(gmsh, path, known, None if chord_tolerance is None else chord_tolerance / metres)
+    try:
+        with gmsh_session() as gmsh:
+            known = open_with_parameters(gmsh, path, parameters)
+            if path.suffix == ".msh":
+                found = drawing_of_mesh(gmsh, path)
+            else:
+                found = _drawing(gmsh, path, known, None if chord_tolerance is None else chord_tolerance / metres)
+    except UnicodeDecodeError as error:
+        raise _no_text(path, error) from error
     return found if metres == 1.0 else scaled(found, metres)
+
+
+def _no_text(path: Path, error: UnicodeDecodeError) -> GmshModelError:
+    """A name in the file is no UTF-8: where, as far as the file's own lines tell."""
+    at = ""
+    for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
+        try:
+            line.decode("utf-8")
+        except UnicodeDecodeError:
+            at = f":{number}"
+            if b'"' in line or b"'" in line:
+                break
+    byte = error.object[error.start]
+    return GmshModelError(f"{path}{at}: a name with the byte 0x{byte:02x} is no UTF-8 text", "save the file as UTF-8")
 
 
 def _drawing(gmsh, path: Path, parameters: dict[str, Parameter], chord: float | None) -> GmshDrawing:

@@ -157,25 +157,32 @@ def _read_geojson(path: Path, set_property: str) -> FieldFile:
         data = json.loads(_text(path))
     except json.JSONDecodeError as error:
         raise FieldFileError(f"{path.name}:{error.lineno}: not valid JSON: {error.msg}", "export it again") from error
+    except RecursionError:
+        raise FieldFileError(f"{path.name}: its arrays are nested too deep", "export it again") from None
     kind = data.get("type") if isinstance(data, dict) else None
     features = {"FeatureCollection": lambda: data.get("features"), "Feature": lambda: [data]}.get(kind)
     if features is None:
         raise FieldFileError(f"{path.name} is no GeoJSON of features", 'its "type" must be "FeatureCollection"')
-    crs = str((data.get("crs") or {}).get("properties", {}).get("name", ""))
+    about_crs = data["crs"].get("properties") if isinstance(data.get("crs"), dict) else None
+    crs = str(about_crs.get("name", "")) if isinstance(about_crs, dict) else ""
     if any(name in crs for name in _DEGREES):
         raise FieldFileError(
             f"{path.name}: its coordinates are degrees ({crs})", "export it in metres of the section, or of a UTM zone"
         )
     lines: list[FieldLine] = []
     left: dict[str, int] = {}
-    for k, feature in enumerate(features() or ()):
+    if not isinstance(features() or [], list):
+        raise FieldFileError(f'{path.name}: its "features" are no array', "export it again")
+    for k, feature in enumerate(features() or []):
         place = f"{path.name}: feature {k + 1}"
+        if not isinstance(feature, dict) or not isinstance(feature.get("properties") or {}, dict):
+            raise FieldFileError(f"{place} is no feature of GeoJSON", "export it again")
         about = feature.get("properties") or {}
         layer = str(about.get(set_property) or about.get("layer") or about.get("Layer") or path.stem)
         label = str(about.get("name") or "")
         try:
             _of_geometry(feature.get("geometry") or {}, layer, label, place, lines, left)
-        except (TypeError, ValueError, KeyError, IndexError) as error:
+        except (TypeError, ValueError, LookupError, AttributeError, RecursionError, OverflowError) as error:
             raise FieldFileError(f"{place}: its coordinates cannot be read ({error})", "export it again") from error
     warnings = [
         (f"{path.name}: {number} × {kind or 'no geometry'}, left out", "traces are lines, zones polygons")

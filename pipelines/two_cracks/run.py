@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from geomech.output import standard_observers
-from geomech.pipeline import run
+from geomech.pipeline import refuse_results, run
 from geomech.scene import load_scene
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -23,6 +23,7 @@ def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False
     # All are read before the first one runs: an error in the last should not cost the time of the others.
     names = list(variants) or [name for name in load_scene(folder).variants if not family(name)]
     scenes = {name: load_scene(folder, [*(FEWER_FILES if family(name) else ()), *overrides], name) for name in names}
+    refuse_results(Path(out) / name for name in names)
     watched, failed = {}, 0
     for name, scene in scenes.items():
         watched[name] = Watch()

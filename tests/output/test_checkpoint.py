@@ -1,11 +1,16 @@
 """What a run goes on from: files whole or not at all, arrays as they were, tables and series cut back."""
 
 import errno
+import json
 import os
+import pickle
+from collections import Counter, deque
 
 import numpy as np
 import pytest
 
+from geomech import plain_data
+from geomech.model import History, JointLaw
 from geomech.output import Checkpoints, RunFolder, checkpoint, standard_observers
 from geomech.output.checkpoint import FilesChanged, NotResumable
 from geomech.output.histories import Table
@@ -46,6 +51,101 @@ def test_one_object_stays_one(tmp_path):
     one = np.ones(3)
     back = through(tmp_path, {"a": one, "b": [one]})
     assert back["a"] is back["b"][0]
+
+
+def test_all_kinds_of_data_come_back_as_they_were(tmp_path):
+    law, ring = JointLaw("bed", friction_angle=0.5), [1]
+    ring.append(ring)
+    stored = {
+        "scalars": [None, True, 3, -0.0, 1e-310, float("inf"), float("nan"), 2 + 1j, b"\x00\xff", "\u00fc\ud800"],
+        "numpy": [np.float64(0.1), np.bool_(True), np.dtype([("a", "<f8", (2, 3)), ("b", "<i4")]), np.array(2.0)],
+        "held": [{(1, ("a",)): law}, {1, 2}, frozenset({3}), Counter("aab"), deque([1, 2], maxlen=2), law],
+        "history": History.constant([1.0, 2.0]),
+        ("a", 1): (ring, law, ()),
+    }
+    back = through(tmp_path, stored)
+    assert repr(back["scalars"]) == repr(stored["scalars"])
+    assert list(map(repr, back["numpy"])) == list(map(repr, stored["numpy"]))
+    assert back["held"] == stored["held"] and back["held"][4].maxlen == 2 and type(back["held"][3]) is Counter
+    ring_back, law_back, _ = back["a", 1]
+    assert ring_back[1] is ring_back and law_back is back["held"][5] and type(law_back) is JointLaw
+    assert list(back) == list(stored) and np.array_equal(back["history"].values, stored["history"].values)
+
+
+class _Runs:
+    """Makes a file where it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return open, (str(self.path), "w")
+
+
+def test_an_old_checkpoint_is_named_and_not_unpickled(tmp_path):
+    marker, path = tmp_path / "ran", tmp_path / "cycle_0000007.checkpoint"
+    path.write_bytes(json.dumps(HEAD | {"format": 1}).encode() + b"\n" + pickle.dumps(_Runs(marker)))
+    assert checkpoint.read_header(path) == {"format": 1}
+    with pytest.raises(NotResumable, match="of format 1, and this geomech reads 2"):
+        checkpoint.read(path)
+    assert not marker.exists()
+
+
+def _crafted(tmp_path, classes, nodes):
+    """A checkpoint with right sums whose content somebody has made up."""
+
+    def made_up(file, value, allowed):
+        text = json.dumps({"root": ["r", 0], "classes": classes, "nodes": nodes}).encode()
+        file.write(len(text).to_bytes(8, "little") + text)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plain_data, "write", made_up)
+        return checkpoint.write(tmp_path, HEAD, None)
+
+
+@pytest.mark.parametrize(
+    ("classes", "nodes"),
+    [
+        (["subprocess:Popen"], [["o", 0, "args", "true"]]),
+        (["os:system"], [["o", 0]]),
+        (["geomech.output.record:SceneCopy"], [["o", 0]]),
+        (["geomech.model.state:np"], [["o", 0]]),
+        (["geomech.model.history:Path"], [["o", 0]]),
+        (["geomech.coupling.cycle:_go_on"], [["o", 0]]),
+        (["geomech.model.problem:Problem"], [["m", ["r", 1], "__init__"], ["o", 0]]),
+        (["geomech.model.problem:Problem"], [["s", 0, 1]]),
+        (["geomech.model.state:Skip"], [["n", 0, 1]]),
+        ([], [["a", 0, "|O", [2], "C", True]]),
+        ([], [["v", 1, "<f8", [9], [8], 0, True], ["a", 0, "<f8", [0], "C", True]]),
+        ([], [["v", 1, "|O", [1], [8], 0, True], ["a", 0, "<f8", [0], "C", True]]),
+        ([], [["z", 1]]),
+        ([], [["r", 7]]),
+        ([], "no list"),
+    ],
+)
+def test_a_crafted_checkpoint_is_refused(tmp_path, classes, nodes):
+    with pytest.raises(NotResumable, match="does not hold what a checkpoint holds"):
+        checkpoint.read(_crafted(tmp_path, classes, nodes))
+
+
+def test_what_is_no_data_is_not_stored_and_ends_nothing(tmp_path, caplog):
+    observer = Checkpoints(every=1)
+    observer.on_start(None, tmp_path)
+    for value in (print, lambda: None, open(os.devnull), np.array([object()]), [_Runs(tmp_path)]):
+        assert not observer.write(1, 0.1, value)
+    assert caplog.text.count("no checkpoint of cycle 1") == 5
+
+
+def test_any_flipped_bit_is_seen(tmp_path):
+    """Also in the header, which then would tell of another version that wrote it."""
+    before, last = (checkpoint.write(tmp_path, checkpoint.identity() | {"cycle": k}, [k, np.ones(2)]) for k in (1, 2))
+    content = last.read_bytes()
+    for at in range(len(content)):
+        spoiled = bytearray(content)
+        spoiled[at] ^= 1 << at % 8
+        last.write_bytes(spoiled)
+        header, path = next(checkpoint.whole(tmp_path))
+        assert path == before and header["cycle"] == 1, f"byte {at}"
 
 
 def test_the_last_two_are_kept_and_a_damaged_one_is_passed_over(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 
 import pytest
 
@@ -82,8 +81,8 @@ def test_blocks_alone_tell_of_the_crack_solver_and_of_pairs_not_sought(tmp_path)
     # Every step looks for contacts at least once, and nothing has moved by more than some micrometres.
     assert skipped["pair searches"]["count"] >= summary["load_steps"] - 1
     assert not {"bodies", "solutions", "compliances", "interior fields", "contact searches"} & set(skipped)
-    # A part is told of as not loaded exactly where its module is not there.
-    assert ("VTK" in skipped.get("modules", {"which": []})["which"]) == ("vtkmodules" not in sys.modules)
+    # What else the process has loaded is no matter of the run.
+    assert "modules" not in skipped
 
 
 def test_a_single_cracked_block_tells_of_its_contacts_compliances_and_fields(tmp_path):

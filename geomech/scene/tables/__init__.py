@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, Strict, field_validator
 
-from .entries import Table
+from .entries import FolderName, Table
 from .geometry import Geometry
 from .loads import LoadsTable
 from .output import GaugeTable, MonitorTable, OutputTable, RenderTable
@@ -34,8 +34,10 @@ class SceneTables(Table):
     monitors: Annotated[tuple[MonitorTable, ...], Strict(False)] = Field((), description="points that are recorded")
     output: OutputTable = Field(OutputTable(), description="files of a run")
     render: RenderTable = Field(RenderTable(), description="pictures of a run")
-    variants: dict[str, dict[str, Any]] = Field(
-        {}, description='named sets of changes: [variants.NAME] with "section.key" = value'
+    variants: dict[FolderName, dict[str, Any]] = Field(
+        {},
+        description='named sets of changes: [variants.NAME] with "section.key" = value; NAME becomes the name of a run '
+        "folder",
     )
 
     @field_validator("materials")

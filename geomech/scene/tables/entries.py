@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -14,6 +14,25 @@ Pair = Annotated[tuple[Finite, Finite], Strict(False)]
 Four = Annotated[tuple[Finite, Finite, Finite, Finite], Strict(False)]
 Points = Annotated[tuple[Pair, ...], Strict(False)]
 Names = Annotated[tuple[str, ...], Strict(False)]
+
+#: Bytes: file systems take names of up to 255, and what is written beside a folder may add to its name.
+LONGEST_FOLDER = 200
+
+
+def _folder(name: str) -> str:
+    """``name`` where a folder can be called so, below another and nowhere else."""
+    if not name.strip() or name.startswith(".") or any(c in "/\\:" or not c.isprintable() for c in name):
+        raise ValueError(
+            f"{name!r} cannot be the name of a folder: it must not be empty, begin with a dot, or have a slash, a "
+            "backslash, a colon or a control character"
+        )
+    if len(name.encode("utf-8", "surrogateescape")) > LONGEST_FOLDER:
+        raise ValueError(f"{name[:20]!r}… is too long for the name of a folder: at most {LONGEST_FOLDER} bytes")
+    return name
+
+
+#: A name that becomes that of a folder.
+FolderName = Annotated[str, AfterValidator(_folder)]
 
 
 class Table(BaseModel):

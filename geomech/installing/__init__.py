@@ -1,0 +1,1 @@
+"""How geomech is built into what `pip install` installs."""

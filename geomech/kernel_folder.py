@@ -1,0 +1,79 @@
+"""Where compiled kernels are kept: a folder that can be written, whatever this user's home is like.
+
+They are kept outside the package: beside the sources they would outlive an uninstall, and what is left of a package
+folder shadows the next installation. What stands there is code that is run, so that a folder that others can write is
+not taken.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+#: What the user may say.
+VARIABLE = "NUMBA_CACHE_DIR"
+
+
+class Place(NamedTuple):
+    """The ``folder``; ``instead_of`` that which cannot be written, None where it is the usual one."""
+
+    folder: str
+    instead_of: str | None = None
+
+
+@cache
+def kernel_place() -> Place:
+    """The user's own choice, else below ~/.cache; a temporary one where that cannot be written."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    wanted = os.environ.get(VARIABLE) or os.path.join(home, "geomech", "kernels")
+    return Place(wanted) if _writable(wanted) else Place(_temporary(), wanted)
+
+
+def _writable(folder: str) -> bool:
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
+
+
+def _temporary() -> str:
+    """One that lasts until the machine clears it, where it is this user's alone; else one for this process."""
+    import atexit
+    import shutil
+    import tempfile
+
+    user = os.getuid() if hasattr(os, "getuid") else "user"
+    folder = os.path.join(tempfile.gettempdir(), f"geomech-kernels-{user}")
+    try:
+        os.makedirs(folder, mode=0o700, exist_ok=True)
+        found = os.lstat(folder)
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == user and not found.st_mode & 0o022 and _writable(folder):
+            return folder
+    except OSError:
+        pass
+    folder = tempfile.mkdtemp(prefix="geomech-kernels-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+#: In each folder of kernels: the source file that they are of.
+SOURCE = "source.txt"
+
+
+def prune(folder: Path) -> int:
+    """Remove the kernels in ``folder`` whose sources are gone; how many folders they were in."""
+    import shutil
+
+    removed = 0
+    for noted in folder.glob(f"*/{SOURCE}"):
+        try:
+            if not Path(noted.read_text(encoding="utf-8")).exists():
+                shutil.rmtree(noted.parent)
+                removed += 1
+        except (OSError, ValueError):
+            continue
+    return removed

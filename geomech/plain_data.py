@@ -1,0 +1,322 @@
+"""Objects as plain data: one JSON text and the bytes of arrays, from which nothing but data can come back.
+
+A store is a list of nodes, one for each object that others may refer to: lists, tuples, dictionaries, sets, arrays and
+instances of the classes that the reader allows. Each object stands once however many refer to it, and an array that is
+a view of another goes on sharing its memory, laid out as it was: strides decide which of BLAS' ways a product is taken
+by, and so about its last bits. An instance is its class by name and its attributes; reading makes it without calling
+its class, and no function, no module and no class but those allowed can be named. What is read may be wrong data, never
+a program.
+"""
+
+from __future__ import annotations
+
+import collections
+import importlib
+import json
+import math
+import types
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, BinaryIO
+
+import numpy as np
+
+#: Containers of Python's own that are made empty and filled.
+_EMPTY = {"l": list, "d": dict, "S": set, "C": collections.Counter, "q": collections.deque}
+_KINDS = {kind: letter for letter, kind in _EMPTY.items()}
+
+
+class NotPlain(TypeError):
+    """Something that is no data: a function, an open file, an instance of a class that is not allowed."""
+
+
+class Broken(ValueError):
+    """A text that is no store, or names what is not allowed."""
+
+
+class Allowed:
+    """Which classes may be stored: all that are defined in the modules below ``parts`` ("geomech.dda"), those named
+    "module:Class" in ``classes``, and bound methods "module:Class.method" in ``methods``."""
+
+    def __init__(self, parts: Iterable[str] = (), classes: Iterable[str] = (), methods: Iterable[str] = ()) -> None:
+        self.parts, self.classes, self.methods = tuple(parts), frozenset(classes), frozenset(methods)
+
+    def has(self, name: str) -> bool:
+        module = name.partition(":")[0]
+        return name in self.classes or any(module == part or module.startswith(f"{part}.") for part in self.parts)
+
+    def found(self, name: str) -> type:
+        """The class called ``name``. Raises Broken where it is not allowed, or none is called so."""
+        module, _, path = name.partition(":")
+        if not self.has(name):
+            raise Broken(f"{name} is not allowed")
+        try:
+            found: Any = importlib.import_module(module)
+            for part in path.split("."):
+                found = vars(found)[part]
+        except (ImportError, KeyError, TypeError) as error:
+            raise Broken(f"there is no {name}") from error
+        if not isinstance(found, type) or found.__module__ != module:
+            raise Broken(f"{name} is no class of that module")
+        return found
+
+
+def name_of(kind: type) -> str:
+    return f"{kind.__module__}:{kind.__qualname__}"
+
+
+def write(file: BinaryIO, value: Any, allowed: Allowed) -> None:
+    """``value`` into ``file``. Raises NotPlain for what is no data."""
+    table = _Table(allowed)
+    root = table.written(value)
+    # Nodes are written as they are found; writing one finds others.
+    for node in table.waiting():
+        table.nodes.append(node)
+    text = json.dumps(
+        {"root": root, "classes": table.classes, "nodes": table.nodes}, separators=(",", ":"), allow_nan=False
+    ).encode()
+    file.write(len(text).to_bytes(8, "little"))
+    file.write(text)
+    for array in table.arrays:
+        file.write(_memory(array))
+
+
+def read(file: BinaryIO, allowed: Allowed) -> Any:
+    """What `write` has written. Raises Broken for anything else."""
+    try:
+        length = int.from_bytes(_exactly(file, 8), "little")
+        text = json.loads(_exactly(file, length))
+        return _Reader(file, text, allowed).value(text["root"])
+    except Broken:
+        raise
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError, ArithmeticError, EOFError) as error:
+        raise Broken(f"no store of plain data: {type(error).__name__}: {error}") from error
+
+
+def _exactly(file: BinaryIO, length: int) -> bytes:
+    found = file.read(length)
+    if len(found) != length:
+        raise Broken("the file ends early")
+    return found
+
+
+def _memory(array: np.ndarray) -> memoryview:
+    """The bytes of a contiguous array, in the order in which they lie."""
+    flat = array.reshape(-1, order="A")
+    return memoryview(flat.view(np.uint8) if flat.size and flat.dtype.itemsize else np.empty(0, np.uint8))
+
+
+class _Table:
+    """Objects as nodes, each once."""
+
+    def __init__(self, allowed: Allowed) -> None:
+        self.allowed = allowed
+        self.nodes: list[Any] = []
+        self.arrays: list[np.ndarray] = []
+        self.classes: list[str] = []
+        self._class_at: dict[type, int] = {}
+        self._at: dict[int, int] = {}
+        self._objects: list[Any] = []  # alive as long as their ids are in use
+
+    def waiting(self):
+        done = 0
+        while done < len(self._objects):
+            yield self._node(self._objects[done])
+            done += 1
+
+    def written(self, value: Any) -> Any:
+        """``value`` as it stands in a node: itself, or where it is found."""
+        kind = type(value)
+        if value is None or kind in (bool, int, str):
+            return value
+        if kind is float:
+            return value if math.isfinite(value) else ["f", str(value)]
+        return ["r", self._place(value)]
+
+    def _place(self, value: Any) -> int:
+        if id(value) not in self._at:
+            self._at[id(value)] = len(self._objects)
+            self._objects.append(value)
+        return self._at[id(value)]
+
+    def _class(self, kind: type) -> int:
+        if kind not in self._class_at:
+            name = name_of(kind)
+            if not self.allowed.has(name):
+                raise NotPlain(f"{name} is none of the classes that are stored")
+            self._class_at[kind] = len(self.classes)
+            self.classes.append(name)
+        return self._class_at[kind]
+
+    def _node(self, value: Any) -> list[Any]:
+        kind = type(value)
+        if kind is np.ndarray:
+            return self._array(value)
+        if kind in (list, set, tuple, frozenset, collections.deque):
+            letter = {tuple: "t", frozenset: "F"}.get(kind) or _KINDS[kind]
+            head = [value.maxlen] if kind is collections.deque else []
+            return [letter, *head, *(self.written(item) for item in value)]
+        if kind in (dict, collections.Counter):
+            return [_KINDS[kind], *(self.written(part) for pair in value.items() for part in pair)]
+        if kind in (bytes, complex):
+            return ["b", value.hex()] if kind is bytes else ["c", value.real.hex(), value.imag.hex()]
+        if isinstance(value, np.generic) and not value.dtype.hasobject:
+            return ["g", _described(value.dtype), value.tobytes().hex()]
+        if isinstance(value, np.dtype) and not value.hasobject:
+            return ["y", _described(value)]
+        if kind is types.MethodType:
+            name = f"{name_of(type(value.__self__))}.{value.__name__}"
+            if name not in self.allowed.methods:
+                raise NotPlain(f"{name} is none of the methods that are stored")
+            return ["m", self.written(value.__self__), value.__name__]
+        if isinstance(value, tuple) and hasattr(kind, "_fields"):
+            return ["n", self._class(kind), *(self.written(item) for item in value)]
+        return self._instance(value, kind)
+
+    def _instance(self, value: Any, kind: type) -> list[Any]:
+        place = self._class(kind)
+        if isinstance(value, (dict, list, tuple, set, np.ndarray)) or hasattr(kind, "__slots__"):
+            raise NotPlain(f"{name_of(kind)} keeps more than attributes")
+        state = value.__getstate__()
+        if hasattr(kind, "__setstate__"):
+            return ["s", place, self.written(state)]
+        return ["o", place, *(part if k % 2 == 0 else self.written(part) for pair in (state or {}).items()
+                              for k, part in enumerate(pair))]  # fmt: skip
+
+    def _array(self, value: np.ndarray) -> list[Any]:
+        if value.dtype.hasobject:
+            raise NotPlain("an array of objects")
+        if type(base := value.base) is np.ndarray:
+            (low, high), (first, last) = np.lib.array_utils.byte_bounds(value), np.lib.array_utils.byte_bounds(base)
+            if first <= low and high <= last and (base.flags.c_contiguous or base.flags.f_contiguous):
+                start = value.__array_interface__["data"][0] - first
+                described, layout = _described(value.dtype), [list(value.shape), list(value.strides), start]
+                return ["v", self._place(base), described, *layout, value.flags.writeable]
+        order = "F" if value.flags.f_contiguous and not value.flags.c_contiguous else "C"
+        stored = np.asarray(value, order=order)
+        self.arrays.append(stored)
+        return ["a", len(self.arrays) - 1, _described(value.dtype), list(value.shape), order, value.flags.writeable]
+
+
+def _described(dtype: np.dtype) -> Any:
+    return np.lib.format.dtype_to_descr(dtype)
+
+
+def _dtype(described: Any) -> np.dtype:
+    """The dtype of a description that JSON has made lists of."""
+
+    def tuples(part: Any) -> Any:
+        # [[name, type], [name, type, shape]] are fields; a pair whose first is a type is a subarray.
+        if isinstance(part, list):
+            return [(field[0], tuples(field[1]), *(tuple(shape) for shape in field[2:])) for field in part]
+        return part
+
+    found = np.lib.format.descr_to_dtype(tuples(described))
+    if found.hasobject:
+        raise Broken("an array of objects")
+    return found
+
+
+class _Reader:
+    """Objects of nodes: first all of them, empty; then what is in them."""
+
+    def __init__(self, file: BinaryIO, text: dict[str, Any], allowed: Allowed) -> None:
+        self.allowed, self.nodes = allowed, text["nodes"]
+        self.classes = [allowed.found(name) for name in text["classes"]]
+        self.made: dict[int, Any] = {}
+        self._bytes(file)
+        later: list[tuple[int, Callable[[], None]]] = []
+        for k, node in enumerate(self.nodes):
+            self._object(k)
+            later += self._filling(k, node)
+        # Attributes before dictionaries, whose keys may be found by them; last, what is set from a whole state.
+        for _, fill in sorted(later, key=lambda entry: entry[0]):
+            fill()
+
+    def value(self, written: Any) -> Any:
+        if not isinstance(written, list):
+            return written
+        letter, what = written
+        if letter == "f":
+            return {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}[what]
+        if letter != "r":
+            raise Broken(f"{letter!r} means nothing")
+        return self._object(what)
+
+    def _values(self, written: Sequence[Any]) -> list[Any]:
+        return [self.value(item) for item in written]
+
+    def _bytes(self, file: BinaryIO) -> None:
+        """The arrays that own their memory, in the order in which they were written."""
+        own = sorted((node[1], k) for k, node in enumerate(self.nodes) if node[0] == "a")
+        for _, k in own:
+            _, _, described, shape, order, writeable = self.nodes[k]
+            array = np.empty(tuple(shape), _dtype(described), order)
+            memory = _memory(array)
+            if file.readinto(memory) != memory.nbytes:
+                raise Broken("the file ends within an array")
+            array.flags.writeable = writeable
+            self.made[k] = array
+
+    def _object(self, k: int) -> Any:
+        if k not in self.made:
+            self.made[k] = self._empty(self.nodes[k])
+        return self.made[k]
+
+    def _empty(self, node: list[Any]) -> Any:
+        letter, *rest = node
+        if letter in _EMPTY:
+            return collections.deque(maxlen=rest[0]) if letter == "q" else _EMPTY[letter]()
+        if letter in ("o", "s"):
+            return object.__new__(self.classes[rest[0]])
+        if letter == "n":
+            kind = self.classes[rest[0]]
+            if not (issubclass(kind, tuple) and hasattr(kind, "_fields") and len(rest) == 1 + len(kind._fields)):
+                raise Broken(f"{name_of(kind)} has other fields")
+            return tuple.__new__(kind, self._values(rest[1:]))
+        made: dict[str, Callable[[], Any]] = {
+            "t": lambda: tuple(self._values(rest)),
+            "F": lambda: frozenset(self._values(rest)),
+            "v": lambda: self._view(*rest),
+            "b": lambda: bytes.fromhex(rest[0]),
+            "c": lambda: complex(float.fromhex(rest[0]), float.fromhex(rest[1])),
+            "g": lambda: np.frombuffer(bytes.fromhex(rest[1]), _dtype(rest[0]))[0],
+            "y": lambda: _dtype(rest[0]),
+            "m": lambda: self._method(*rest),
+        }
+        return made[letter]()
+
+    def _view(self, base: int, described: Any, shape, strides, start: int, writeable: bool) -> np.ndarray:
+        base = self._object(base)
+        memory = base.reshape(-1, order="A").view(np.uint8) if base.size else np.empty(0, np.uint8)
+        dtype = _dtype(described)
+        spans = [(n - 1) * step for n, step in zip(shape, strides, strict=True)]
+        first, last = start + sum(s for s in spans if s < 0), start + sum(s for s in spans if s > 0) + dtype.itemsize
+        if min(shape, default=0) < 0 or (0 not in shape and not 0 <= first <= last <= memory.nbytes):
+            raise Broken("a view beyond its array")
+        view = np.ndarray(tuple(shape), dtype, memory, start, tuple(strides))
+        view.flags.writeable = writeable and view.flags.writeable
+        return view
+
+    def _method(self, owner: Any, name: str) -> types.MethodType:
+        owner = self.value(owner)
+        if f"{name_of(type(owner))}.{name}" not in self.allowed.methods:
+            raise Broken(f"{name} is not allowed")
+        return types.MethodType(vars(type(owner))[name], owner)
+
+    def _filling(self, k: int, node: list[Any]) -> list[tuple[int, Callable[[], None]]]:
+        """What fills the object of a node, and when."""
+        letter, *rest = node
+        this = self.made[k]
+        if letter in ("l", "q"):
+            return [(0, lambda: this.extend(self._values(rest[letter == "q" :])))]
+        if letter == "o":
+            return [(1, lambda: vars(this).update(zip(rest[1::2], self._values(rest[2::2]), strict=True)))]
+        if letter in ("d", "C"):
+            # Not Counter.update, which adds.
+            pairs = lambda: zip(self._values(rest[0::2]), self._values(rest[1::2]), strict=True)  # noqa: E731
+            return [(2, lambda: dict.update(this, pairs()))]
+        if letter == "S":
+            return [(2, lambda: this.update(self._values(rest)))]
+        if letter == "s":
+            return [(3, lambda: this.__setstate__(self.value(rest[1])))]
+        return []
