@@ -23,6 +23,7 @@ TOPICS = {
     "motion": "geomech.bench.motion_cost",
     "output": "geomech.bench.output_cost",
     "schemes": "geomech.bench.block_schemes",
+    "safety": "geomech.bench.slope_factors",
     "skips": "geomech.bench.skips",
     "sliding": "geomech.bench.sliding_slopes",
     "slopes": "geomech.bench.fuzzed_slopes",
