@@ -133,8 +133,8 @@ def _with_limits(drawn: _Drawn, seed: int, family: str) -> FactorSlope | None:
             limit = sliding_factor(problem, drawn.planes, drawn.interface)
         except ValueError:
             return None
-        if limit > bound * (1 + _AS_GOOD):
-            # Moments, not forces: it turns before it slides.
+        if limit > (admissible_factor(problem, OPEN, whole=True) if drawn.cohesion else bound) * (1 + _AS_GOOD):
+            # Moments, not forces: it turns before it slides, or faces part at their edges and lose cohesion there.
             return None
     if not _LEAST < (bound if math.isnan(limit) else limit) < _MOST:
         return None
@@ -175,8 +175,6 @@ def _planar(rng) -> _Drawn:
         drawn.water = [(0.0, 0.0), (x, foot[1] + depth)]
         drawn.traits.append("water")
     if rng.random() < 0.35:
-        middle = (0.45 * x, 0.45 * (crest + x) * height / (crest + x))
-        middle = (0.5 * (crest + x), 0.5 * (foot[1] + height)) if middle[1] < 0.3 * height else middle
         _anchor(rng, drawn, _inside(drawn.blocks["block"]), "block", dip)
     return drawn
 
@@ -252,15 +250,16 @@ def _toppling(rng) -> _Drawn:
         low, high = rng.uniform(0.3, 0.7) * slender, rng.uniform(1.05, 1.5) * slender
         heights = np.interp(np.arange(number), [0, peak, number + 1], [low, high, 0.4 * slender]) * width
     else:
-        share = {"slides": rng.uniform(0.3, 0.85), "anchored": rng.uniform(1.1, 1.6), "glued": rng.uniform(0.9, 1.4)}
+        share = {"slides": rng.uniform(0.3, 0.85), "anchored": rng.uniform(1.1, 1.6), "glued": rng.uniform(1.05, 1.4)}
         heights = np.array([share[kind] * slender * width])
     blocks = {
         f"column {k + 1}": [at(k * width, 0), at((k + 1) * width, 0), at((k + 1) * width, h), at(k * width, h)]
         for k, h in enumerate(heights)
     }
     far = number * width + 20.0
+    feet = [at(k * width, 0) for k in range(number, -1, -1)]
     drawn = _Drawn(
-        [at(-3 * width, -25), at(far, -25), at(far, 0), at(-3 * width, 0)], blocks,
+        [at(-3 * width, -25), at(far, -25), at(far, 0), *feet, at(-3 * width, 0)], blocks,
         [(PLANE, at(0, 0), at(number * width, 0))], dip + rng.uniform(3, 16), planes=(), traits=[kind],
     )  # fmt: skip
     height = float(heights[0])
@@ -282,7 +281,7 @@ def _toppling(rng) -> _Drawn:
 def _base(before: list[tuple[float, float]], under: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Under the blocks, whose lower side is ``under`` from the toe to the crest, and ``before`` the toe."""
     (x, y), low = under[-1], before[0][1]
-    return [before[0], (x + 30.0, low), (x + 30.0, y), *under[::-1], *before[:0:-1]]
+    return [before[0], (x + 60.0, low), (x + 60.0, y), *under[::-1], *before[:0:-1]]
 
 
 def _inside(polygon: list[tuple[float, float]]) -> tuple[float, float]:

@@ -115,11 +115,14 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def admissible_factor(problem: Problem, open_faces: Collection[str] = (), tolerance: float = 1e-5) -> float:
+def admissible_factor(
+    problem: Problem, open_faces: Collection[str] = (), tolerance: float = 1e-5, whole: bool = False
+) -> float:
     """The largest F with admissible contact forces (0: none even at 1/64; inf: still at 64). ``open_faces``: names of
     edges that carry nothing, such as tension cracks. Bolts pull with anything up to their yield force; a tensile
-    strength lets the ends of a face pull by half of what all of it holds."""
-    programme = _Programme(problem, open_faces)
+    strength lets the ends of a face pull by half of what all of it holds. ``whole``: faces with cohesion hold as long
+    as no fibre of them pulls beyond the tensile strength, 2 Nᵢ − Nⱼ ≥ −σₜ ℓ/(2 F)."""
+    programme = _Programme(problem, open_faces, whole)
     low, high = 1.0 / FARTHEST, FARTHEST
     if not programme.balances(low):
         return 0.0
@@ -134,7 +137,7 @@ def admissible_factor(problem: Problem, open_faces: Collection[str] = (), tolera
 class _Programme:
     """Equilibrium of all free blocks by N₀, N₁, S of each face and the pull of each bolt."""
 
-    def __init__(self, problem: Problem, open_faces: Collection[str]) -> None:
+    def __init__(self, problem: Problem, open_faces: Collection[str], whole: bool) -> None:
         from scipy import sparse
 
         faces = shared_faces(problem)
@@ -175,7 +178,7 @@ class _Programme:
         shape = (3 * len(free), 3 * m + len(self.most))
         self.matrix = sparse.csr_matrix((values, (rows, columns)), shape)
         self.right = -loads.ravel() / self.unit
-        self.m = m
+        self.m, self.whole = m, (self.hold > 0) & whole
 
     def balances(self, factor: float) -> bool:
         from scipy import optimize, sparse
@@ -186,8 +189,12 @@ class _Programme:
         cone = sparse.hstack([sparse.vstack([-friction] * 2), sparse.vstack([-friction] * 2),
                               sparse.vstack([eye, -eye]), bolts])  # fmt: skip
         hold = np.tile(self.hold / factor / self.unit, 2)
-        pull = (np.maximum(-self.pull / factor / self.unit, -1e9)).tolist()
-        bounds = [(low, None) for low in pull * 2] + [(None, None)] * m
+        pull = np.minimum(self.pull / factor / self.unit, 1e9)
+        if self.whole.any():
+            one, none = eye.tocsr()[self.whole], sparse.csr_matrix((int(self.whole.sum()), m + n_bolts))
+            fibres = sparse.vstack([sparse.hstack([a * one, b * one, none]) for a, b in ((-2, 1), (1, -2))])
+            cone, hold = sparse.vstack([cone, fibres]), np.append(hold, np.tile(pull[self.whole], 2))
+        bounds = [(-low, None) for low in pull.tolist() * 2] + [(None, None)] * m
         bounds += [(0.0, most / self.unit if math.isfinite(most) else None) for most in self.most]
         found = optimize.linprog(
             np.zeros(3 * m + n_bolts), cone.tocsr(), hold, self.matrix, self.right, bounds, method="highs"
