@@ -13,8 +13,10 @@ from .polygon import (
     area_moments,
     crossing_edges,
     crossing_loops,
+    distance_to_edges,
     plainly_simple,
     point_in_both,
+    roundoff_of,
     signed_area,
     winding_number,
 )
@@ -325,9 +327,11 @@ def _refuse_crooked(loop: np.ndarray, name: str) -> None:
 
 
 def _refuse_stray(outline: np.ndarray, hole: np.ndarray, name: str) -> None:
+    near, following = roundoff_of(outline, hole), np.roll(outline, -1, axis=0)
     for x, y in hole:
-        # On a corner where it touches the outline, a hole sees the outline's angle there.
-        if abs(winding_number([outline], np.array([x, y]))) < 1e-6:
+        # On a corner where it touches the outline, a hole sees the outline's angle there; beside an edge, either side.
+        at = np.array([x, y])
+        if abs(winding_number([outline], at)) < 1e-6 and distance_to_edges(at, outline, following) > near:
             raise ValueError(f"{name}: a hole reaches out of the outline at ({x:g}, {y:g})")
     crossing = crossing_loops(outline, hole)
     if crossing is not None:

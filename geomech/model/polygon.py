@@ -83,34 +83,40 @@ def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray,
     return good, area > 0
 
 
+def roundoff_of(*loops: np.ndarray) -> float:
+    """What is nearer than this touches, m: round-off of the coordinates of ``loops`` (n, 2), or 1e-12 of their size."""
+    low, high = np.min([loop.min(axis=0) for loop in loops], axis=0), np.max([loop.max(axis=0) for loop in loops], axis=0)
+    return max(1e-12 * float((high - low).max()), 4 * np.finfo(float).eps * float(np.abs([low, high]).max()))
+
+
 def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
-    """Two edges of ``loop`` (n, 2) that cross or touch away from a shared corner, the first found; None for a simple
-    polygon.
+    """Two edges of ``loop`` (n, 2) that cross, or come within round-off of the coordinates (or 1e-12 of the loop's
+    size) away from a shared corner, the first found; None for a simple polygon.
 
     Edge k leaves vertex k.
     """
     n = len(loop)
     p = loop - loop[0]
     along = np.roll(p, -1, axis=0) - p
-    # Ends of every edge j from the line of every edge i: they lie on different sides where i and j cross.
+    span = np.hypot(along[:, 0], along[:, 1])
+    near = roundoff_of(loop)
+    # Of every vertex j from every edge i: on which side of its line, and how far from the edge itself. Edges that stand
+    # in one line with a gap between them meet nowhere, whatever round-off says of their sides.
     arm = p[None, :] - p[:, None]
     side = along[:, None, 0] * arm[..., 1] - along[:, None, 1] * arm[..., 0]
-    span = np.hypot(along[:, 0], along[:, 1])
-    side = np.where(np.abs(side) <= 1e-12 * span[:, None] * np.ptp(p, axis=0).max(), 0.0, np.sign(side))
-    start, end = side, np.roll(side, -1, axis=1)
-    meet = (start * end <= 0) & (start * end <= 0).T
-    flat = (start == 0) & (end == 0)
-    for i, j in np.argwhere(meet & np.triu(np.ones((n, n), bool), 1)):
-        ahead, behind = (i + 1) % n == j, (j + 1) % n == i
-        if flat[i, j] and flat[j, i]:
-            # In one line: they must share a stretch, or neighbours fold back on themselves.
-            s = np.sort((np.stack([p[j], p[j] + along[j]]) - p[i]) @ along[i]) / span[i] ** 2
-            shared = min(1.0, s[1]) - max(0.0, s[0])
-            if shared > 1e-9 or (shared >= -1e-12 and not (ahead or behind)):
-                return int(i), int(j)
-        elif not (ahead or behind):
-            return int(i), int(j)
-    return None
+    side = _sides(side, along[:, None], near)
+    share = np.clip(np.einsum("ix,ijx->ij", along, arm) / (span * span)[:, None], 0.0, 1.0)
+    touch = np.hypot(*np.moveaxis(arm - share[..., None] * along[:, None], 2, 0)) <= near
+    through = side * np.roll(side, -1, axis=1) < 0
+    ends = touch | np.roll(touch, -1, axis=1)
+    meet = (through & through.T) | ends | ends.T
+    # Neighbours share a corner; they fold back on one another where the far end of one lies on the other.
+    here = np.arange(n)
+    following = (here + 1) % n
+    back = touch[here, (here + 2) % n] | touch[following, here]
+    meet[here, following] = meet[following, here] = back
+    found = np.argwhere(meet & np.triu(np.ones((n, n), bool), 1))
+    return tuple(found[0].tolist()) if len(found) else None
 
 
 def crossing_loops(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
@@ -119,11 +125,11 @@ def crossing_loops(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
     origin = one[0]
     p, q = one - origin, other - origin
     a, b = np.roll(p, -1, axis=0) - p, np.roll(q, -1, axis=0) - q
-    size = max(np.ptp(p, axis=0).max(), np.ptp(q, axis=0).max())
+    near = roundoff_of(one, other)
     # Ends of every edge from the line of every edge of the other: on different sides of both where they cross.
     arm = q[None, :] - p[:, None]
-    of_other = _sides(a[:, None, 0] * arm[..., 1] - a[:, None, 1] * arm[..., 0], a[:, None], size)
-    of_one = _sides(-(b[None, :, 0] * arm[..., 1] - b[None, :, 1] * arm[..., 0]), b[None, :], size)
+    of_other = _sides(a[:, None, 0] * arm[..., 1] - a[:, None, 1] * arm[..., 0], a[:, None], near)
+    of_one = _sides(-(b[None, :, 0] * arm[..., 1] - b[None, :, 1] * arm[..., 0]), b[None, :], near)
     cross = (of_other * np.roll(of_other, -1, axis=1) < 0) & (of_one * np.roll(of_one, -1, axis=0) < 0)
     if not cross.any():
         return None
@@ -132,9 +138,9 @@ def crossing_loops(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:
     return origin + p[i] + share * a[i]
 
 
-def _sides(area: np.ndarray, along: np.ndarray, size: float) -> np.ndarray:
-    """−1, 0 on the line, or 1."""
-    return np.where(np.abs(area) <= 1e-12 * np.hypot(along[..., 0], along[..., 1]) * size, 0.0, np.sign(area))
+def _sides(area: np.ndarray, along: np.ndarray, near: float) -> np.ndarray:
+    """−1, 0 within ``near`` of the line, or 1."""
+    return np.where(np.abs(area) <= near * np.hypot(along[..., 0], along[..., 1]), 0.0, np.sign(area))
 
 
 def point_in_both(one: np.ndarray, other: np.ndarray) -> np.ndarray | None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model import Blocks, Cracks
-from ..model.polygon import signed_area
+from ..model.polygon import crossing_edges, signed_area
 from .network import crack_network
 from .parts import EdgeLine, Flaw, ShapeError, Trace, Zone, extent_of, grid_decimals
 
@@ -114,6 +114,13 @@ def _canonical(k: int, zone: Zone, decimals: int, tolerance: float, flaws: list[
             return refuse(
                 f"{what} crosses or touches itself at ({where})",
                 "list the corners in order along the outline, or split the zone in two",
+            )
+        crossing = crossing_edges(loop)
+        if crossing is not None:
+            (x, y), (u, v) = loop[list(crossing)].tolist()
+            return refuse(
+                f"{what} touches itself: its edges from ({x:g}, {y:g}) and from ({u:g}, {v:g}) meet",
+                "move them apart, or split the zone in two",
             )
         found.append(_turned(loop, label, counter_clockwise=number == 0))
     if len(found) > 1:

@@ -29,6 +29,58 @@ def test_crossing_outlines_are_refused(loop, edges, offset):
         Blocks.from_polygons([loop], names=["rock"])
 
 
+def turned(loop, seed: int, offset: float = 0.0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0, 2 * np.pi)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(loop, dtype=float) @ np.array([[c, s], [-s, c]]) + offset * rng.uniform(-1, 1, 2)
+
+
+#: With two edges in one line: what round-off says of their sides changes from one rotation to the next.
+IN_ONE_LINE = [
+    [[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [3, 2], [3, 3], [0, 3]],  # a C
+    [[0, 0], [5, 0], [5, 3], [4, 3], [4, 1], [3, 1], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]],  # a comb
+    [[0, 0], [1, 0.3], [2, 0], [3, 0.3], [4, 0], [4, 2], [0, 2]],  # corners in one line
+    [[0, 0], [1, 0], [2, 0], [3, 0], [3, 1], [2, 1], [1, 1], [0, 1]],  # flat nodes
+    [[0.1, 0.7], [10.3, 1.9], [10.3, 4.4], [5.7, 3.1], [5.7, 7.7], [10.3, 7.7], [10.3, 9.1], [0.1, 9.1]],
+]
+
+
+@pytest.mark.parametrize("loop", IN_ONE_LINE)
+@pytest.mark.parametrize("offset", [0.0, 1e5])
+def test_edges_in_one_line_meet_nowhere_at_any_rotation(loop, offset):
+    for seed in range(300):
+        own = turned(loop, seed, offset)
+        assert crossing_edges(own) is None
+        assert crossing_edges(own[::-1]) is None
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        [[0, 0], [1, 1], [1, 0], [0, 1]],  # a bow
+        [[0, 0], [4, 0], [4, 1], [2, 0], [0, 1]],  # a corner on an edge
+        [[0, 0], [3, 0], [1, 0], [1, 2]],  # folded back on itself
+        [[0, 0], [2, 0], [2, 1], [1, 1], [1, 0], [1.5, 0], [1.5, -1], [0, -1]],  # along another edge
+        [[0, 0], [4, 0], [4, 2], [2, 0], [2, 3], [0, 3]],  # a corner on the middle of an edge
+    ],
+)
+@pytest.mark.parametrize("offset", [0.0, 1e5])
+def test_crossing_outlines_are_refused_at_any_rotation(loop, offset):
+    for seed in range(100):
+        assert crossing_edges(turned(loop, seed, offset)) is not None
+
+
+def test_blocks_with_holes_stand_at_any_rotation():
+    """A hole whose edges are in line with those of the outline and of another hole, and one that touches the outline at
+    a corner."""
+    outline = [[0, 0], [6, 0], [6, 2], [4, 2], [4, 4], [6, 4], [6, 6], [0, 6]]
+    holes = [[1, 1], [1, 2], [2, 2], [2, 1]], [[1, 4], [1, 5], [2, 5], [2, 4]], [[4, 3], [3, 2.5], [3, 3.5]]
+    for seed in range(100):
+        blocks = Blocks.from_polygons([[turned(loop, seed, 100.0) for loop in (outline, *holes)]])
+        assert blocks.areas()[0] == pytest.approx(32 - 1 - 1 - 0.5, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "loop",
     [

@@ -131,3 +131,10 @@ def test_edge_lines_that_name_nothing_or_clash():
     assert flaw.index == 1 and "called 'top' already" in flaw.message
     (flaw,) = flaws(zone, edges=[EdgeLine("top", (0.0, 1.0), (1.0, 1.0), "stone")])
     assert "no zone 'stone'" in flaw.message
+
+
+def test_an_outline_that_touches_itself_by_round_off_is_refused_with_its_zone():
+    """Shapely calls it valid: the corner stands 1e-12 m before an edge that slants."""
+    outline = np.array([[0, 0], [3, 1], [3, 3], [0.7, 0.233333333334], [0, 3]])
+    (flaw,) = flaws([Zone("rock", (outline,))])
+    assert flaw.part == "zones" and "'rock'" in flaw.message and "touches itself" in flaw.message
