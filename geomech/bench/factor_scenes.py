@@ -79,10 +79,18 @@ class _Drawn:
     traits: list[str] = field(default_factory=list)
     limit: float | None = None
 
+    @property
+    def planes_drawn(self) -> list[str]:
+        return [name for name, _, _ in self.edges if name not in OPEN]
+
     def scene(self, title: str) -> dict[str, Any]:
         laws: dict[str, Any] = {"default": {"friction_angle_deg": self.friction}}
         if self.cohesion:
             laws["default"] |= {"cohesion_pa": self.cohesion, "tensile_strength_pa": self.tension}
+            if len(self.planes_drawn) > 1:
+                # Several faces share the load: cohesion that broke at once would let them fail one after the other,
+                # below what limit equilibrium says.
+                laws["default"]["residual_cohesion_pa"] = self.cohesion
         drawn = {name for name, _, _ in self.edges}
         if not self.same_law and drawn & set(OPEN):
             laws["open"] = {"friction_angle_deg": 0.0, "edges": sorted(drawn & set(OPEN))}
