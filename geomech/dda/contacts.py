@@ -21,7 +21,7 @@ from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
 from .rounded_corners import LARGEST_SHARE
-from .toes import SHARP, ToeCorners, stand_off
+from .toes import ROUNDED, SHARP, ToeCorners, stand_off
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -424,6 +424,10 @@ class ContactFinder:
         start = vertices[edge]
         along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
         return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
+
+    def toes_among(self, found: ContactSet, vertices: np.ndarray) -> np.ndarray:
+        """(n,) m by which rounded toes among the contacts ``found`` stand off; below zero for other contacts."""
+        return stand_off(found.vertex, found.edge, found.geometry, vertices, self._corners, ROUNDED)
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""

@@ -5,7 +5,7 @@ pressed, blocks by what they are strained, and bolts by what they are stretched:
 structure that was drawn. A block that slides or falls until it lands balances too, but as another structure. Blocks of
 the size h = √area have therefore collapsed, wherever they end, once a vertex has moved farther than
 
-    h / 2000  +  the largest displacement were no joint to fail  +  three times the largest stretch of a bolt
+    h / 2000  +  the largest displacement were no joint to fail  +  what stretches a bolt as far as it is elastic
 
 and than any other block that has not. Blocks that were drawn apart from all that holds them first fall on it: their way
 counts from there.
@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 #: What blocks may move beside what elasticity explains, in parts of their size √area. Slopes, walls and arches that
 #: stand move by 1e-6 to 1e-5 of it on springs of 40 E'.
 MOVED = 5e-4
-#: A block may move this many times as far as a bolt that holds it is stretched: what moves across a bolt at 70°
+#: A block may move this many times as far as a bolt that holds it is stretched, at most: what moves at 70° to a bolt
 #: stretches it by a third of its way.
 _STRETCHED = 3.0
 #: The strength of joints that do not fail, Pa.
@@ -98,7 +98,7 @@ class DisplacementLimit:
         moved = self.moved(state.vertices)
         if not (moved > own)[~self._system.fixed].any():
             return own
-        own = own + self.elastic + _STRETCHED * self.stretch(state)
+        own = own + self.elastic + self.stretching(state, moved)
         within = moved <= own
         return own + float(moved[within].max(initial=0.0))
 
@@ -109,13 +109,16 @@ class DisplacementLimit:
         order = np.argsort(-share, kind="stable")
         return order[share[order] > 1.0]
 
-    def stretch(self, state: State) -> float:
-        """m: the largest elastic stretch that a bolt has taken since it was installed."""
-        largest = 0.0
+    def stretching(self, state: State, moved: np.ndarray) -> float:
+        """m: the longest way, of what blocks have ``moved`` (n_blocks,), that has stretched a bolt elastically."""
+        longest = 0.0
         for bolt, row in zip(self._loads.bolts, state.bolts, strict=False):
-            if row["installed"] and not row["broken"]:
-                largest = max(largest, abs(row["force"] - bolt.pretension) / bolt.stiffness)
-        return float(largest)
+            if row["installed"] and not row["broken"] and bolt.stiffness > 0.0:
+                elastic, yielded = abs(row["force"] - bolt.pretension) / bolt.stiffness, abs(row["plastic"])
+                way = max(float(moved[b]) for b in (bolt.block, bolt.other) if b != GROUND)
+                if elastic > 0.0:
+                    longest = max(longest, min(_STRETCHED * elastic, way * elastic / (elastic + yielded)))
+        return longest
 
     @property
     def elastic(self) -> float:

@@ -98,10 +98,7 @@ def crossing_edges(loop: np.ndarray) -> tuple[int, int] | None:
     span = np.hypot(along[:, 0], along[:, 1])
     side = np.where(np.abs(side) <= 1e-12 * span[:, None] * np.ptp(p, axis=0).max(), 0.0, np.sign(side))
     start, end = side, np.roll(side, -1, axis=1)
-    # Edges nearly in one line may seem to meet by the rounding of sides, however far apart they are.
-    low, high = (of(p, p + along) for of in (np.minimum, np.maximum))
-    beside = (low[:, None] <= high[None] + 1e-12 * np.ptp(p, axis=0).max()).all(axis=2)
-    meet = (start * end <= 0) & (start * end <= 0).T & beside & beside.T
+    meet = (start * end <= 0) & (start * end <= 0).T
     flat = (start == 0) & (end == 0)
     for i, j in np.argwhere(meet & np.triu(np.ones((n, n), bool), 1)):
         ahead, behind = (i + 1) % n == j, (j + 1) % n == i
