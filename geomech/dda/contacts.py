@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State, corner_lengths
 from . import contact_rows
 from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
@@ -20,7 +20,6 @@ from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
-from .rounded_corners import LARGEST_SHARE
 from .toes import ROUNDED, SHARP, ToeCorners, stand_off
 from .work import Work
 
@@ -123,11 +122,14 @@ class ContactFinder:
         table, met = find_contacts(
             vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
         )
-        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]), corners.pressed)
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
             table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
         )
+        known = np.append((old["state"] != OPEN) | (old["lift"] < 0.0), False)[parent]
+        keep = self._from_outside(table, vertices, known, corners.pressed)
+        if not keep.all():
+            table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
@@ -256,19 +258,19 @@ class ContactFinder:
         np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
         return Windows(window.pairs, reach)
 
-    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray, pressed):
-        """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
-        (sorted keys), and corners that meet corners, have; faces of blocks are ``pressed`` (n_blocks,) m in."""
+    def _from_outside(self, table: np.ndarray, vertices: np.ndarray, known: np.ndarray, pressed: np.ndarray):
+        """(n,) whether vertices of the rows of `find_contacts` may have come to their edges from outside: rows that are
+        ``known`` (n,), as they continue contacts that press or begin to behind the line, and corners that meet corners,
+        have; faces of blocks are ``pressed`` (n_blocks,) m in."""
         vertex, edge = table[:, 0], table[:, 1]
         block, other = self._owner[vertex], self._owner[edge]
         shallow = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
         shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed, np.where(table[:, 3] == FACE, -1.0, shallow),
+            self._owner, known, np.where(table[:, 3] == FACE, -1.0, shallow),
         )  # fmt: skip
-        keep |= table[:, 2] >= 0
-        return (table, met) if keep.all() else (table[keep], met[keep])
+        return keep | (table[:, 2] >= 0)
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
@@ -404,7 +406,7 @@ class ContactFinder:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, np.zeros(0, np.int64), np.full(len(vertex), -1.0),
+            self._owner, np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
@@ -440,14 +442,6 @@ class ContactFinder:
         x, y = found.geometry[contact, 5:7]
         a, b = self.names[found.block[contact]], self.names[found.other[contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
-
-
-def corner_lengths(blocks: Blocks, share: float) -> tuple[np.ndarray, np.ndarray]:
-    """(n_vertices,) m twice: the rounding length of every corner of ``blocks``, ``share`` times the block's size
-    (√area), and the longest that fits beside its shorter edge."""
-    edges = np.hypot(*(blocks.vertices[blocks.next_vertex] - blocks.vertices).T)
-    longest = LARGEST_SHARE * np.minimum(edges, edges[blocks.previous_vertex])
-    return share * np.sqrt(blocks.areas())[blocks.vertex_block], longest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:

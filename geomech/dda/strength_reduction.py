@@ -180,6 +180,7 @@ def factor_of_safety(
     max_steps: int = 200,
     watch: Callable[[Trial], None] | None = None,
     toes: str = ROUNDED,
+    compare_toes: bool = True,
 ) -> FactorOfSafety:
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
@@ -187,8 +188,8 @@ def factor_of_safety(
     (default: blocks at rest). ``reduce`` names the joint laws that are weakened (default: all). The answer is bracketed
     to ``tolerance`` (relative); a trial stands when no block has more than the part ``unbalanced`` of the forces on it
     left to move it. Static steps are ``time_step`` s long (default: free fall over it is a hundredth of the smallest
-    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `toes`; rounded ones whose tips
-    would hold, and others that hold, are told with the factor that it would be otherwise.
+    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `toes`; with ``compare_toes``
+    rounded ones whose tips would hold, and others that hold, are told with the factor that it would be otherwise.
 
     Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what
     stands, and another way there may find a factor that differs by some thousandths where contacts slide and stick
@@ -231,7 +232,7 @@ def factor_of_safety(
             return factor_of_safety(
                 blocks, materials, joints, loads, settings, joint_index=joint_index, state=state, load_time=load_time,
                 reduce=reduce, tolerance=tolerance, unbalanced=unbalanced, time_step=time_step, max_steps=max_steps,
-                toes=way,
+                toes=way, compare_toes=False,
             )  # fmt: skip
         except NotConverged:
             return None
@@ -240,20 +241,14 @@ def factor_of_safety(
         """With what bolts hold, and what toes do or would."""
         held = found.state
         found = replace(found, anchors=_anchors(loads, held, found.moved))
-        if toes == FREE:
-            return found
         system = with_strength(found.lower)
-        system.finder.toes = ROUNDED
-        bars = _toes(system, held, failed if toes == ROUNDED else None)
-        weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
-        holding = tuple(t for t in bars if t.force > _BEARS * weight[t.block])
+        if toes == FREE or not compare_toes:
+            return found
+        holding = _holding(system, held, loads, load_time)
         if holding:
-            less = otherwise(FREE)
-            return replace(
-                found, toes=holding, toes_hold=True, other_factor=None if less is None else less.factor,
-                warnings=_of_toes(blocks, holding, found, less, True),
-            )  # fmt: skip
-        if toes == ROUNDED and bars:
+            return _held_by_toes(blocks, found, holding, otherwise(FREE))
+        bars = () if toes == SHARP or failed is None else _toes(system, held, failed)
+        if bars:
             sharp = otherwise(SHARP)
             if sharp is not None and sharp.upper > found.upper * (1.0 + tolerance):
                 return replace(
@@ -274,9 +269,11 @@ def factor_of_safety(
     trial, held = tried(1.0, begun)
     while not trial.stable:
         if trial.factor <= 1.0 / _FARTHEST:
-            sharp = otherwise(SHARP) if toes == ROUNDED and _toes(with_strength(1.0), rest) else None
+            sharp = otherwise(SHARP) if toes == ROUNDED and compare_toes and _toes(with_strength(1.0), rest) else None
             if sharp is not None:
-                return sharp
+                return _held_by_toes(
+                    blocks, sharp, _holding(with_strength(sharp.lower), sharp.state, loads, load_time), None
+                )
             raise NotConverged(
                 f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
                 "what moves is not held by joint strength, or the contacts find no states"
@@ -383,6 +380,21 @@ def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...
     return tuple(out)
 
 
+def _holding(system: BlockSystem, state: State, loads: Loads, load_time: float) -> tuple[Toe, ...]:
+    """The toes that bear forces in ``state``."""
+    weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
+    return tuple(toe for toe in _toes(system, state) if toe.force > _BEARS * weight[toe.block])
+
+
+def _held_by_toes(
+    blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], without: FactorOfSafety | None
+) -> FactorOfSafety:
+    """The answer ``found`` with the ``toes`` that hold in it, and what it would be ``without`` them."""
+    other = None if without is None else without.factor
+    lines = _of_toes(blocks, toes, found, without, True)
+    return replace(found, toes=toes, toes_hold=True, other_factor=other, warnings=lines)
+
+
 def _of_toes(
     blocks: Blocks, toes: tuple[Toe, ...], found: FactorOfSafety, other: FactorOfSafety | None, hold: bool
 ) -> tuple[str, ...]:
@@ -394,7 +406,7 @@ def _of_toes(
     lines = []
     for toe in toes[:_TOLD]:
         a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (toe.block, toe.other))
-        where = f"the toe of {a!r} touches {b!r} at x = {toe.at[0]:.6g}, y = {toe.at[1]:.6g} m"
+        where = f"the toe of {a!r} touches {b!r} at x = {_metres(toe.at[0])}, y = {_metres(toe.at[1])} m"
         if hold:
             without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
             lines.append(f"{where} and holds {toe.force / 1e3:.4g} kN/m; without it {without}")
@@ -404,6 +416,11 @@ def _of_toes(
                 f"A sharp tip would hold: factor {factor(other)}, which is not to be relied on"
             )
     return tuple(lines)
+
+
+def _metres(value: float) -> str:
+    """To the millimetre; adding zero makes a plain 0 of −0."""
+    return f"{round(value, 3) + 0.0:.7g}"
 
 
 def _has_strength(law: JointLaw) -> bool:
