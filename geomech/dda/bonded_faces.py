@@ -256,9 +256,12 @@ def check_faces(
             )
             parts = parts and in_tension <= in_shear
             when = min(max(in_shear, 0.0), 1.0)
+            opens = False
             for k in range(start[f], start[f + 1]):
-                # Before its corners would open it may slide, and then they need not.
-                pulls = pulls and (strength > 0.0 or normal0[rows[k]] + when * (forces[rows[k], 0] - normal0[rows[k]]) <= 0.0)
+                c = rows[k]
+                opens = opens or normal0[c] + when * (forces[c, 0] - normal0[c]) <= 0.0
+            # Before its corners would open it may slide, and then they need not.
+            pulls = pulls and (strength > 0.0 or opens)
         for k in range(start[f], start[f + 1]):
             c = rows[k]
             if strength == 0.0 and pulls:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State
+from ..model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State, corner_lengths
 from . import contact_rows
 from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
@@ -20,7 +20,7 @@ from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
-from .rounded_corners import LARGEST_SHARE
+from .toes import ROUNDED, SHARP, ToeCorners, stand_off
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -80,6 +80,9 @@ class ContactFinder:
         self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
         #: (n_vertices,) m: the lengths over which corners are rounded.
         self.rounding = np.minimum(self._rounding, self._longest)
+        #: Whether toes hold: `SHARP`, `ROUNDED` or `FREE` (`toes`).
+        self.toes = SHARP
+        self._corners = ToeCorners(self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner])
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
@@ -119,11 +122,14 @@ class ContactFinder:
         table, met = find_contacts(
             vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
         )
-        table, met = self._from_outside(table, met, vertices, np.sort(keys[old["state"] != OPEN]), corners.pressed)
         at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
         geometry, mate, parent = describe_contacts(
             table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
         )
+        known = np.append((old["state"] != OPEN) | (old["lift"] < 0.0), False)[parent]
+        keep = self._from_outside(table, vertices, known, corners.pressed)
+        if not keep.all():
+            table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
         law = self._laws(table[:, 1], mate)
         if self._removed is not None:
             law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
@@ -154,6 +160,9 @@ class ContactFinder:
         up = up[old["tilt"][parent[up]] != 0.0] if len(up) else up
         remembered["lift"][up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
         vertex, edge, corner = (column.copy() for column in table[:, :3].T)
+        if self.toes != SHARP:
+            off = stand_off(vertex, edge, geometry, vertices, self._corners, self.toes)
+            remembered["lift"] = np.where(off >= 0.0, -off, remembered["lift"])
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
             for name in ("normal", "shear") if len(old) else ():
@@ -249,19 +258,19 @@ class ContactFinder:
         np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
         return Windows(window.pairs, reach)
 
-    def _from_outside(self, table: np.ndarray, met: np.ndarray, vertices: np.ndarray, closed: np.ndarray, pressed):
-        """The rows of `find_contacts` of vertices that may have come to their edges from outside; ``closed`` contacts
-        (sorted keys), and corners that meet corners, have; faces of blocks are ``pressed`` (n_blocks,) m in."""
+    def _from_outside(self, table: np.ndarray, vertices: np.ndarray, known: np.ndarray, pressed: np.ndarray):
+        """(n,) whether vertices of the rows of `find_contacts` may have come to their edges from outside: rows that are
+        ``known`` (n,), as they continue contacts that press or begin to behind the line, and corners that meet corners,
+        have; faces of blocks are ``pressed`` (n_blocks,) m in."""
         vertex, edge = table[:, 0], table[:, 1]
         block, other = self._owner[vertex], self._owner[edge]
         shallow = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
         shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
         keep = from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, closed, np.where(table[:, 3] == FACE, -1.0, shallow),
+            self._owner, known, np.where(table[:, 3] == FACE, -1.0, shallow),
         )  # fmt: skip
-        keep |= table[:, 2] >= 0
-        return (table, met) if keep.all() else (table[keep], met[keep])
+        return keep | (table[:, 2] >= 0)
 
     def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
@@ -397,7 +406,7 @@ class ContactFinder:
         """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
         return ~from_outside(
             vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
-            self._owner, np.zeros(0, np.int64), np.full(len(vertex), -1.0),
+            self._owner, np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
         )  # fmt: skip
 
     def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
@@ -418,6 +427,10 @@ class ContactFinder:
         along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
         return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
 
+    def toes_among(self, found: ContactSet, vertices: np.ndarray) -> np.ndarray:
+        """(n,) m by which rounded toes among the contacts ``found`` stand off; below zero for other contacts."""
+        return stand_off(found.vertex, found.edge, found.geometry, vertices, self._corners, ROUNDED)
+
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""
         return contact_rows.carried(rows, vertices, self._next)
@@ -429,14 +442,6 @@ class ContactFinder:
         x, y = found.geometry[contact, 5:7]
         a, b = self.names[found.block[contact]], self.names[found.other[contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
-
-
-def corner_lengths(blocks: Blocks, share: float) -> tuple[np.ndarray, np.ndarray]:
-    """(n_vertices,) m twice: the rounding length of every corner of ``blocks``, ``share`` times the block's size
-    (√area), and the longest that fits beside its shorter edge."""
-    edges = np.hypot(*(blocks.vertices[blocks.next_vertex] - blocks.vertices).T)
-    longest = LARGEST_SHARE * np.minimum(edges, edges[blocks.previous_vertex])
-    return share * np.sqrt(blocks.areas())[blocks.vertex_block], longest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:

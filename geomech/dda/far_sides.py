@@ -7,8 +7,8 @@ middle of the wall, of the thickness T below its foot on the edge,
     −g > T / 2,
 
 it has come to the other side of the wall, or lies outside beyond that: of a corner's two faces it touches the one that
-it is before. (Two corners that meet have one contact, see `rounded_corners`.) A contact that was closed before is what
-it was.
+it is before. (Two corners that meet have one contact, see `rounded_corners`.) A contact that was closed before, or begins to
+press behind its line (as the faces of a crack do that was open when it cut its block), is what it was.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ def _convex(vertices, next_vertex, previous_vertex, i):
 
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
-def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, closed, shallow):
+def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, known, shallow):
     """(n,) False for contacts of ``vertex`` with ``edge`` (n,) whose vertex is on the far side of the edge's block;
-    ``gap`` (n,) m, ``start`` (n_blocks + 1,) first vertices, ``owner`` (n_vertices,) blocks; ``closed`` (sorted
-    vertex·n_vertices + edge) are the contacts that press already. Of corners that meet both faces are kept, unless
+    ``gap`` (n,) m, ``start`` (n_blocks + 1,) first vertices, ``owner`` (n_vertices,) blocks; ``known`` (n,)
+    are those that came from outside before. Of corners that meet both faces are kept, unless
     the vertex lies before one and deeper than ``shallow`` (n,) m behind the other; −1 for what is no corner."""
     keep = np.ones(vertex.shape[0], np.bool_)
     for c in range(vertex.shape[0]):
@@ -68,7 +68,7 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
         f = next_vertex[e]
         dx, dy = vertices[f, 0] - vertices[e, 0], vertices[f, 1] - vertices[e, 1]
         length = np.sqrt(dx * dx + dy * dy)
-        if gap[c] >= -_BEHIND * length:
+        if known[c] or gap[c] >= -_BEHIND * length:
             continue
         nx, ny = dy / length, -dx / length
         t = ((vertices[v, 0] - vertices[e, 0]) * dx + (vertices[v, 1] - vertices[e, 1]) * dy) / (length * length)
@@ -96,9 +96,5 @@ def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, star
             before = (vertices[v, 0] - vertices[far, 0]) * uy - (vertices[v, 1] - vertices[far, 1]) * ux
             if before <= 0.0 or depth <= shallow[c]:
                 continue
-        if depth <= 0.5 * thick:
-            continue
-        key = v * vertices.shape[0] + e
-        at = np.searchsorted(closed, key)
-        keep[c] = at < closed.shape[0] and closed[at] == key
+        keep[c] = depth <= 0.5 * thick
     return keep

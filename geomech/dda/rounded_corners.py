@@ -31,8 +31,6 @@ EASED = 0.02
 #: The rounding length is at least this many times as long as the faces of the two blocks are pressed in: a block on soft
 #: joints sinks in before it slides, and does not hang on the next one for it.
 _PRESSED = 4.0
-#: The rounding length takes no more than this part of the shortest edge at a corner.
-LARGEST_SHARE = 0.25
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)

@@ -2,6 +2,7 @@
 
 from .blocks import Blocks
 from .bolt import BOLT, GROUND, Bolt, CrossesNoJoint, grouted_bolt
+from .corners import corner_lengths
 from .cracks import Cracks
 from .damping import rayleigh_coefficients
 from .endless import EndlessRock, Fluid
@@ -75,6 +76,7 @@ __all__ = [
     "WaterTable",
     "Wave",
     "baseline_corrected",
+    "corner_lengths",
     "counted",
     "grouted_bolt",
     "rayleigh_coefficients",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..conventions import outward_normal_of
+from ..model.corners import LARGEST_SHARE, corner_lengths
 from ..model.polygon import distance_to_edges
 from .actions import traction_history
 from .checks import material_of
@@ -46,6 +47,7 @@ def check_plausible(c: Check) -> None:
     _shallow(c)
     _increment(c)
     _slivers(c)
+    _rounding(c)
 
 
 def _materials(c: Check) -> None:
@@ -93,6 +95,26 @@ def _slivers(c: Check) -> None:
         f"{blocks.names[least]!r} near x = {x:.4g}, y = {y:.4g} m has {areas[least]:.2g} m², where half of the blocks have "
         f"more than {usual:.2g} m²{others}: where such slivers move fast, they shorten the time step",
         f"merge them with their neighbours: geometry.smallest_block_m2 = {SLIVER * usual:.1g}",
+    )
+
+
+def _rounding(c: Check) -> None:
+    """A rounding length that was asked for and that the edges beside corners are too short for."""
+    if "corner_rounding" not in c.tables.dda.model_fields_set:
+        return
+    blocks, share = c.drawing.blocks, c.tables.dda.corner_rounding
+    rounding, longest = corner_lengths(blocks, share)
+    short = np.flatnonzero(longest < rounding)
+    if not len(short):
+        return
+    worst = int(short[np.argmin(longest[short] / rounding[short])])
+    x, y = blocks.vertices[worst]
+    c.warn(
+        ("dda", "corner_rounding"),
+        f"{len(short)} of {len(rounding)} corners have edges too short for {share:g} times √area and are rounded less: that "
+        f"of {blocks.names[int(blocks.vertex_block[worst])]!r} at x = {x:.4g}, y = {y:.4g} m over {longest[worst]:.2g} m "
+        f"instead of {rounding[worst]:.2g} m",
+        f"a corner is rounded over at most {LARGEST_SHARE:g} of its shorter edge",
     )
 
 

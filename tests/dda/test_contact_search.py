@@ -7,9 +7,8 @@ import pytest
 
 from geomech import dda
 from geomech.dda.contact_search import Corners, convex_corners, describe_contacts, find_contacts
-from geomech.dda.contacts import corner_lengths
 from geomech.dda.near_pairs import boxes, near_pairs
-from geomech.model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from geomech.model import Blocks, DdaSettings, JointLaw, Loads, Material, State, corner_lengths
 
 
 def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:

@@ -62,20 +62,20 @@ def test_a_vertex_meets_no_face_from_behind_a_wall():
     next_vertex, previous = (np.ascontiguousarray(a, np.int64) for a in (blocks.next_vertex, blocks.previous_vertex))
     owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
 
-    def kept(x, edge, closed=()):
+    def kept(x, edge, known=False):
         vertices = np.ascontiguousarray(blocks.vertices.copy())
         vertices[5] = x, 0.5
         gap = np.array([x - 0.01 if edge == 1 else -x])
         return bool(
             from_outside(
                 np.array([5]), np.array([edge]), gap, vertices, next_vertex, previous, start, owner,
-                np.array(closed, np.int64), np.full(1, -1.0),
+                np.array([known]), np.full(1, -1.0),
             )[0]
         )  # fmt: skip
 
     near, far = 3, 1
     assert not kept(-0.002, far) and not kept(0.002, far) and kept(0.002, near) and kept(0.008, far)
-    assert kept(0.002, far, closed=[5 * 8 + far])
+    assert kept(0.002, far, known=True)
 
 
 def c_with_wall(wall, x, tilt, ratio):

@@ -11,7 +11,7 @@ from geomech import dda
 from geomech.compiled import kept
 from geomech.dda.moments import block_moments
 from geomech.dda.rounded_corners import EASED, meeting
-from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from geomech.model import CONTACT, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 #: m, of the corners whose meeting is looked at alone, and a step that is none there.
 LENGTH, STEP = 0.01, EASED * 0.01
@@ -324,3 +324,25 @@ def test_the_setting_says_what_is_a_step(rounding, slides):
     """A fiftieth of the rounding lengths 0, 0.95, 9.5 and 47 mm against 0.1 mm."""
     gone = slid(1e-4, 4e-3, corner_rounding=rounding)[0]
     assert (abs(gone - 1.0) < 5e-7) == slides
+
+
+@pytest.mark.parametrize("turned", [1e-5, 3e-4, -1e-5])
+def test_faces_of_a_crack_that_was_open_close_where_they_were_open(turned):
+    """A blade of rock that a crack has cut off: its tip stands before the corner of the other part, 64 µm apart though the
+    outlines coincide. It may turn by as much into the other's outline before they press, under whatever names of corner
+    and edge the same meeting is found."""
+    mass = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 3.4], [0.2, 0.5], [0.0, 0.1]])
+    blade = np.array([[-0.05, 0.08], [0.0, 0.1], [0.2, 0.5]])
+    blocks = Blocks.from_polygons([mass, blade])
+    finder = dda.BlockSystem(blocks, [ROCK], [JointLaw("smooth")]).finder
+    tip, apart = 7, 6.4e-5
+    row = np.zeros(1, CONTACT)
+    row["vertex"], row["edge"], row["block"], row["other"] = tip, 3, 1, 0
+    row["normal"] = np.array([-0.4, 0.2]) / np.hypot(0.4, 0.2)
+    row["lift"], row["gap"], row["bonded"] = -apart, apart, 0
+    vertices = blocks.vertices.copy()
+    turn = np.array([[0.0, turned], [-turned, 0.0]])
+    vertices[5:] += (vertices[5:] - vertices[6]) @ turn.T + 1e-6 * np.array([0.2, 0.4])
+    found = finder.find(replace(State.at_rest(blocks), contacts=row), vertices, 0.01)
+    at = np.flatnonzero(np.isin(found.vertex, (tip, 3)) & (found.lift == -apart))
+    assert len(at) == 1

@@ -79,6 +79,20 @@ def test_slivers_that_shorten_steps_are_told(scene_file, changes, told):
         assert "geometry.smallest_block_m2 = 0.04" in warning.way_out
 
 
+def test_a_rounding_that_edges_are_too_short_for_is_told(scene_file):
+    """A base 6 m long and 1 m thick holds 25 cm; without the key, or where all edges are long enough, nothing is said."""
+
+    def told(*changes):
+        found = load_scene(scene_file(SLIVERS), changes).warnings
+        return [warning for warning in found if "rounded less" in warning.message]
+
+    assert not told() and not told("dda.corner_rounding=0.01")
+    (warning,) = told("dda.corner_rounding=0.25")
+    assert "dda.corner_rounding" in warning.place
+    assert "corners have edges too short for 0.25 times √area" in warning.message
+    assert "12 of 16" in warning.message and "over 0.25 m instead of 0.61 m" in warning.message
+
+
 BRIDGES = """
 [[geometry.joint_sets]]
 name = "bedding"
