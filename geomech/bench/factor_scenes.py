@@ -22,7 +22,7 @@ import numpy as np
 
 from ..model import Problem
 from .drawn_slopes import problem_of
-from .slope_limits import admissible_factor, sliding_factor
+from .slope_limits import admissible_factor, pressed_throughout, sliding_factor
 
 GRAVITY, DENSITY = 9.81, 2600.0
 FAMILIES = ("planar", "bilinear", "stepped", "wedge", "toppling")
@@ -141,7 +141,7 @@ def _with_limits(drawn: _Drawn, seed: int, family: str) -> FactorSlope | None:
             limit = sliding_factor(problem, drawn.planes, drawn.interface)
         except ValueError:
             return None
-        if limit > (admissible_factor(problem, OPEN, whole=True) if drawn.cohesion else bound) * (1 + _AS_GOOD):
+        if limit > bound * (1 + _AS_GOOD) or (drawn.cohesion and not _keeps_cohesion(drawn, problem, limit)):
             # Moments, not forces: it turns before it slides, or faces part at their edges and lose cohesion there.
             return None
     if not _LEAST < (bound if math.isnan(limit) else limit) < _MOST:
@@ -149,6 +149,12 @@ def _with_limits(drawn: _Drawn, seed: int, family: str) -> FactorSlope | None:
     stretch = max(((b["yield_force_n_per_m"] - b.get("pretension_n_per_m", 0.0)) / b["stiffness_n_per_m"]
                    for b in drawn.bolts), default=0.0)  # fmt: skip
     return FactorSlope(seed, family, scene, limit, bound, drawn.toe, tuple(drawn.traits), stretch)
+
+
+def _keeps_cohesion(drawn: _Drawn, problem: Problem, limit: float) -> bool:
+    if drawn.interface:
+        return limit <= admissible_factor(problem, OPEN, whole=True) * (1 + _AS_GOOD)
+    return pressed_throughout(problem, drawn.planes, limit)
 
 
 def _frame(rng, toe: str, depth: float) -> list[tuple[float, float]]:

@@ -255,6 +255,36 @@ def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "
     return factor
 
 
+def pressed_throughout(problem: Problem, planes: Collection[str], factor: float) -> bool:
+    """Whether the one block on parallel ``planes`` presses on all of them with the strength divided by ``factor``, the
+    pressure being a straight line a + b s along their dip, as of a rigid block on even springs (Navier). Where it does
+    not, they part at an edge, and cohesion is lost there."""
+    faces = shared_faces(problem)
+    block = int(np.flatnonzero(~problem.blocks.fixed)[0])
+    held = _held_on(problem, faces, {block}, planes)
+    loads = loads_on_blocks(problem)[block]
+    for bolt in problem.loads.bolts:
+        pull = bolt.yield_force * (np.array(bolt.end) - bolt.start) / math.dist(bolt.start, bolt.end)
+        loads = loads + [*pull, _cross(np.array(bolt.start), pull)]
+    way, normal = held.way, held.normal
+    rows = [k for k, name in enumerate(faces.name) if name in planes]
+    spans = np.array([sorted([faces.start[k] @ way, faces.end[k] @ way]) for k in rows])
+    heights = np.array([faces.start[k] @ normal for k in rows])
+    law = problem.joints[faces.law[rows[0]]]
+    low, high = spans.T
+    parts = np.stack([high - low, 0.5 * (high**2 - low**2), (high**3 - low**3) / 3])  # ∫ 1, s, s² ds of each
+    friction, shear = math.tan(law.friction_angle) / factor, law.cohesion / factor
+    turn, lift = float(_cross(way, normal)), -float(_cross(normal, way))  # of N at s, of S at the height h
+    matrix = np.array([
+        [parts[0].sum(), parts[1].sum()],
+        [turn * parts[1].sum() + lift * friction * (heights * parts[0]).sum(),
+         turn * parts[2].sum() + lift * friction * (heights * parts[1]).sum()],
+    ])  # fmt: skip
+    right = [-loads[:2] @ normal, -loads[2] - lift * shear * (heights * parts[0]).sum()]
+    a, b = np.linalg.solve(matrix, right)
+    return bool((a + b * spans >= 0).all())
+
+
 @dataclass(frozen=True, eq=False)
 class _Held:
     """What a face, or parallel ones, do to a block that slides along ``way``: N along ``normal``, and against the way
