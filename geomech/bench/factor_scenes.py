@@ -87,8 +87,8 @@ class _Drawn:
         laws: dict[str, Any] = {"default": {"friction_angle_deg": self.friction}}
         if self.cohesion:
             laws["default"] |= {"cohesion_pa": self.cohesion, "tensile_strength_pa": self.tension}
-            if len(self.planes_drawn) > 1:
-                # Several faces share the load: cohesion that broke at once would let them fail one after the other,
+            if len(self.planes_drawn) > 1 or self.bolts:
+                # Several faces or bolts share the load: cohesion that broke at once would let them fail one by one,
                 # below what limit equilibrium says.
                 laws["default"]["residual_cohesion_pa"] = self.cohesion
         drawn = {name for name, _, _ in self.edges}
