@@ -281,6 +281,6 @@ def check_faces(
                     when = 1.0
                 pressed = normal0[c] + when * (forces[c, 0] - normal0[c])
                 if pressed < 0.0:
-                    new_state[c], new_bonded[c] = OPEN, 0
+                    new_state[c], new_bonded[c] = OPEN, (0 if parts else new_bonded[c])
                 elif slides and (keeps[c] or abs(forces[c, 1]) > friction[c] * pressed):
                     new_state[c], new_direction[c] = SLIP, np.sign(forces[c, 1])

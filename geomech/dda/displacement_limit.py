@@ -28,8 +28,8 @@ log = logging.getLogger(__name__)
 #: stand move by 1e-6 to 1e-5 of it on springs of 40 E'.
 MOVED = 5e-4
 #: A block may move this many times as far as a bolt that holds it is stretched, at most: what moves at 70° to a bolt
-#: stretches it by a third of its way.
-_STRETCHED = 3.0
+#: stretches it by a third of its way; what is wedged in above the block that it holds moves farther than this.
+_STRETCHED, _WEDGED = 3.0, 10.0
 #: The strength of joints that do not fail, Pa.
 _UNBREAKABLE = 1e15
 #: With what is left out of balance below this part of forces, joints that do not fail have borne the loads.
@@ -109,15 +109,17 @@ class DisplacementLimit:
         order = np.argsort(-share, kind="stable")
         return order[share[order] > 1.0]
 
-    def stretching(self, state: State, moved: np.ndarray) -> float:
-        """m: the longest way, of what blocks have ``moved`` (n_blocks,), that has stretched a bolt elastically."""
-        longest = 0.0
+    def stretching(self, state: State, moved: np.ndarray) -> np.ndarray:
+        """(n_blocks,) m: how much of the way that blocks have ``moved`` (n_blocks,) has stretched a bolt elastically."""
+        longest = np.zeros(len(moved))
         for bolt, row in zip(self._loads.bolts, state.bolts, strict=False):
-            if row["installed"] and not row["broken"] and bolt.stiffness > 0.0:
-                elastic, yielded = abs(row["force"] - bolt.pretension) / bolt.stiffness, abs(row["plastic"])
-                way = max(float(moved[b]) for b in (bolt.block, bolt.other) if b != GROUND)
-                if elastic > 0.0:
-                    longest = max(longest, min(_STRETCHED * elastic, way * elastic / (elastic + yielded)))
+            if not row["installed"] or row["broken"] or not bolt.stiffness > 0.0:
+                continue
+            elastic, yielded = abs(row["force"] - bolt.pretension) / bolt.stiffness, abs(row["plastic"])
+            if elastic > 0.0:
+                most = np.full(len(moved), _WEDGED * elastic)
+                most[[b for b in (bolt.block, bolt.other) if b != GROUND]] = _STRETCHED * elastic
+                longest = np.maximum(longest, np.minimum(most, moved * elastic / (elastic + yielded)))
         return longest
 
     @property

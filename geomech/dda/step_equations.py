@@ -240,9 +240,11 @@ class Equations:
         return which & (when <= least + _AT_ONCE * np.abs(least))
 
     def settled(self, states: States, answer: Answer, iterations: int) -> Settled:
-        """The ``answer`` of consistent ``states``; bonds that hold no pull are lost where they are open."""
+        """The ``answer`` of consistent ``states``; bonds that hold no pull are lost where they are open by more than gaps
+        are known to: a face that opens by a micrometre because of how springs share its load, and closes as that
+        grows, is whole."""
         forces, springs = answer.forces, answer.springs
-        open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > self.slack)
+        open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > np.maximum(self.slack, self.found.precision))
         lifted = np.zeros(len(forces))
         slip = plastic_slip(forces, states.state, self.found.shear, springs)
         if self.curved is not None:

@@ -45,6 +45,9 @@ _TOLD, _TURNS = 8, 0.05
 _RELAXING = 100
 #: A trial whose unbalanced force does not tell goes on with steps this many times as long, so many of them.
 _LONGER, _MORE_STEPS = 4.0, 30
+#: What bounds the factor from above is tried again from just below it, if it was begun from farther than so many times
+#: the tolerance.
+_FROM_AFAR = 3.0
 #: Toes bar the way of blocks that come nearer to what they touch by this part of the fastest block's way, and hold
 #: what is more than this part of their block's weight.
 _BARRED, _BEARS = 1e-3, 1e-3
@@ -281,25 +284,30 @@ def factor_of_safety(
         weak = 0.5 * trial.factor
         begun, limit = _relaxed(with_strength(weak), loads, rest, load_time)
         trial, held = tried(weak, begun)
-    lower = trial.factor
-    upper = min((t.factor for t in trials if not t.stable), default=math.inf)
-    while math.isinf(upper):
-        if lower >= _FARTHEST:
-            return _told(FactorOfSafety(lower, lower, math.inf, tuple(trials), (), (), held, limit.moved(held.vertices)))
-        trial, end = tried(2.0 * lower, held)
+    lower, began = trial.factor, {t.factor: 0.0 for t in trials}
+    while True:
+        # What has failed from far below may stand when it is come to by small steps.
+        known = {t.factor: t for t in trials if t.stable or t.factor > lower}
+        upper = min((factor for factor, t in known.items() if not t.stable), default=math.inf)
+        if math.isinf(upper):
+            if lower >= _FARTHEST:
+                return _told(
+                    FactorOfSafety(lower, lower, math.inf, tuple(trials), (), (), held, limit.moved(held.vertices))
+                )
+            factor = 2.0 * lower
+        elif upper > lower * (1.0 + tolerance):
+            factor = _next_factor(list(known.values()), lower, upper, tolerance)
+        elif began[upper] < lower * (1.0 - _FROM_AFAR * tolerance):
+            factor = upper
+        else:
+            break
+        began[factor] = lower
+        trial, end = tried(factor, held)
         if trial.stable:
             lower, held = trial.factor, end
-        else:
-            upper = trial.factor
-    while upper > lower * (1.0 + tolerance):
-        trial, end = tried(_next_factor(trials, lower, upper, tolerance), held)
-        if trial.stable:
-            lower, held = trial.factor, end
-        else:
-            upper = trial.factor
-    last = min((t for t in trials if not t.stable), key=lambda t: t.factor)
+    last = known[upper]
     moving = _moving(last)
-    factor = _pointed_at(trials, lower, upper)
+    factor = _pointed_at(list(known.values()), lower, upper)
     return _told(
         FactorOfSafety(
             factor, lower, upper, tuple(trials), moving, _mechanism(blocks, last, moving), held,
@@ -347,7 +355,11 @@ def _toes(system: BlockSystem, state: State, failed: Trial | None = None) -> tup
 
 def reduced(law: JointLaw, factor: float) -> JointLaw:
     """``law`` with tan φ, cohesion and tensile strength (their residuals too) divided by ``factor``; an angle of
-    dilation is kept as long as it is below that of friction."""
+    dilation is kept as long as it is below that of friction.
+
+    A face that yields before others do keeps its cohesion on what it slips until these yield too, unless the law says
+    what strength slip leaves: limit equilibrium counts all of it, and which face yields first is a matter of how stiff
+    springs share loads."""
     if law.roughness is not None:
         rough = replace(law.roughness, reduction=law.roughness.reduction * factor)
         return replace(law, roughness=rough)
@@ -356,13 +368,15 @@ def reduced(law: JointLaw, factor: float) -> JointLaw:
         return None if of is None else math.atan(math.tan(of) / factor)
 
     friction = angle(law.friction_angle)
+    softens = law.residual_friction_angle is not None or law.residual_cohesion > 0 or law.softening_slip > 0
+    kept = law.residual_cohesion if softens else law.cohesion
     return replace(
         law,
         friction_angle=friction,
         cohesion=law.cohesion / factor,
         tensile_strength=law.tensile_strength / factor,
         residual_friction_angle=angle(law.residual_friction_angle),
-        residual_cohesion=law.residual_cohesion / factor,
+        residual_cohesion=kept / factor,
         dilation_angle=min(law.dilation_angle, friction),
     )
 
