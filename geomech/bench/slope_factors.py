@@ -205,6 +205,7 @@ def table(every: Sequence[Factored]) -> Measured:
         "share of slopes wrong": counts[WRONG] / len(every),
         "share of slopes above in silence": unsafe / len(every),
     }
-    times = {"a search among those slopes, mean": sum(e.seconds for e in every) / sum(len(e.searches) for e in every)}
+    number = sum(len(each.searches) for each in every)
+    times = {"a search among those slopes, mean": sum(each.seconds for each in every) / number}
     lines += [f"  {name:<50}{value:9.2g}" for name, value in (worst | times).items()]
     return Measured.of("\n".join(lines), errors=worst, times=times)

@@ -123,11 +123,15 @@ def admissible_factor(
     strength lets the ends of a face pull by half of what all of it holds. ``whole``: faces with cohesion hold as long
     as no fibre of them pulls beyond the tensile strength, 2 Nᵢ − Nⱼ ≥ −σₜ ℓ/(2 F)."""
     programme = _Programme(problem, open_faces, whole)
-    low, high = 1.0 / FARTHEST, FARTHEST
-    if not programme.balances(low):
-        return 0.0
-    if programme.balances(high):
-        return math.inf
+    low, high = 0.5, 2.0
+    while not programme.balances(low):
+        if low <= 1.0 / FARTHEST:
+            return 0.0
+        low, high = 0.5 * low, low
+    while programme.balances(high):
+        if high >= FARTHEST:
+            return math.inf
+        low, high = high, 2.0 * high
     while high > low * (1 + tolerance):
         middle = math.sqrt(low * high)
         low, high = (middle, high) if programme.balances(middle) else (low, middle)

@@ -1,4 +1,4 @@
-"""How much of their strength joints have mobilised in an equilibrium: Σ|S| / Σ (c ℓ + N tan φ) over the contacts of each.
+"""How much of their strength joints have mobilised in an equilibrium: Σ|S| / Σ (c ℓ + N tan φ) over their contacts.
 
 Strengths are those of the state, divided by the factor it was found at: where a joint slides all along, the share is 1.
 """

@@ -29,8 +29,8 @@ def draw_mechanism(
     problem: Problem, title: str, moving: Sequence[Moving], sliding: np.ndarray,
     toes: Sequence[tuple[float, float]], anchors: Mapping[str, float], path: Path | str,
 ) -> Path:  # fmt: skip
-    """Blocks of ``problem`` with those ``moving`` in colour and arrows as long as they go, faces that are ``sliding``
-    (n, 2, 2) m in red, corners that are ``toes`` (points, m), and bolts with the force that ``anchors`` tell (N/m by name)."""
+    """Blocks of ``problem`` with those ``moving`` in colour, arrows as long as they go, faces ``sliding`` (n, 2, 2) m
+    in red, corners that are ``toes`` (points, m), and bolts with the force that ``anchors`` tell (N/m by name)."""
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D

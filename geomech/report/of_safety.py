@@ -84,8 +84,8 @@ class SafetyReport:
     def mechanism(self) -> str:
         """In a word: "sliding", "toppling", "sliding and toppling"; empty where nothing fails."""
         kinds = Counter(each.kind for each in self.moving())
-        words = [word for word, kind in (("sliding", "slides"), ("toppling", "topples")) if any(kind in k for k in kinds)]
-        return " and ".join(words)
+        words = {"sliding": "slides", "toppling": "topples"}
+        return " and ".join(word for word, kind in words.items() if any(kind in each for each in kinds))
 
     def joints(self) -> list[MobilisedJoint]:
         """In the equilibrium at ``found.lower``."""
@@ -137,8 +137,8 @@ class SafetyReport:
         if found.anchors:
             lines.append("anchors at the factor:")
             lines += [
-                f"  bolt {a.name}: {a.force / 1e3:.4g} kN/m, {'at' if a.yields else 'not at'} its yield force, stretched "
-                f"by {1e3 * a.stretch:.3g} mm; its block has moved {1e3 * a.moved:.3g} mm"
+                f"  bolt {a.name}: {a.force / 1e3:.4g} kN/m, {'at' if a.yields else 'not at'} its yield force, "
+                f"stretched by {1e3 * a.stretch:.3g} mm; its block has moved {1e3 * a.moved:.3g} mm"
                 for a in found.anchors
             ]
         if found.toes:
@@ -180,8 +180,8 @@ class SafetyReport:
         far = free[int(np.argmax(found.moved[free]))]
         cracks = f"{counted(len(self.cracks), 'crack')} left out, " if self.cracks else ""
         return (
-            f"search: {cracks}{len(found.trials)} trials; at the factor blocks have moved by {1e3 * found.moved[far]:.3g}"
-            f" mm at most ({blocks.names[far]}) and are strained by {strain:.2g} ({strained}); what moves beyond "
+            f"search: {cracks}{len(found.trials)} trials; at the factor blocks have moved by "
+            f"{1e3 * found.moved[far]:.3g} mm at most ({blocks.names[far]}) and are strained by {strain:.2g} ({strained}); what moves beyond "
             f"{MOVED:g} of its size √area and what elasticity explains has failed"
         )
 
@@ -214,7 +214,8 @@ class SafetyReport:
             "along": self.along,
             "search": {
                 "tolerance": self.tolerance, "cracks_left_out": list(self.cracks), "largest_strain": strain,
-                "most_strained": strained, "largest_displacement_m": float(found.moved[~self.problem.blocks.fixed].max()),
+                "most_strained": strained,
+                "largest_displacement_m": float(found.moved[~self.problem.blocks.fixed].max()),
                 "displacement_limit_of_size": MOVED,
             },
         }  # fmt: skip
