@@ -249,7 +249,7 @@ def factor_of_safety(
         system = with_strength(found.lower)
         if toes == FREE or not compare_toes:
             return found
-        holding = _holding(system, held, loads, load_time)
+        holding = _holding(with_strength(found.lower), held, loads, load_time)
         if holding:
             return _held_by_toes(blocks, found, holding, otherwise(FREE))
         bars = () if toes == SHARP or failed is None else _toes(system, held, failed)
@@ -420,6 +420,7 @@ def _with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> Factor
 def _holding(system: BlockSystem, state: State, loads: Loads, load_time: float) -> tuple[Toe, ...]:
     """The toes that bear forces in ``state``."""
     weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
+    system.finder.toes = FREE
     return tuple(toe for toe in _toes(system, state) if toe.force > _BEARS * weight[toe.block])
 
 
