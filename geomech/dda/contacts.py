@@ -20,7 +20,7 @@ from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
-from .toes import ROUNDED, SHARP, ToeCorners, stand_off
+from .toes import SHARP, ToeCorners, stand_off
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -82,7 +82,9 @@ class ContactFinder:
         self.rounding = np.minimum(self._rounding, self._longest)
         #: Whether toes hold: `SHARP`, `ROUNDED` or `FREE` (`toes`).
         self.toes = SHARP
-        self._corners = ToeCorners(self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner])
+        self._corners = ToeCorners(
+            self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
+        )
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
@@ -428,8 +430,8 @@ class ContactFinder:
         return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
 
     def toes_among(self, found: ContactSet, vertices: np.ndarray) -> np.ndarray:
-        """(n,) m by which rounded toes among the contacts ``found`` stand off; below zero for other contacts."""
-        return stand_off(found.vertex, found.edge, found.geometry, vertices, self._corners, ROUNDED)
+        """(n,) m by which toes among the contacts ``found`` stand off; below zero for other contacts."""
+        return stand_off(found.vertex, found.edge, found.geometry, vertices, self._corners, self.toes)
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""

@@ -5,8 +5,9 @@ pressed, blocks by what they are strained, and bolts by what they are stretched:
 structure that was drawn. A block that slides or falls until it lands balances too, but as another structure. Blocks of
 the size h = √area have therefore collapsed, wherever they end, once a vertex has moved farther than
 
-    h / 2000  +  the largest displacement were no joint to fail  +  what stretches a bolt as far as it is elastic
+    h / 2000  +  the largest displacement were no joint to fail  +  what stretches a bolt to its yield force
 
+(the last at most h / 10, and nothing for a bolt that never yields: what it may take is a matter of how far blocks may move)
 and than any other block that has not. Blocks that were drawn apart from all that holds them first fall on it: their way
 counts from there.
 """
@@ -14,6 +15,7 @@ counts from there.
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +32,8 @@ MOVED = 5e-4
 #: A block may move this many times as far as a bolt that holds it is stretched, at most: what moves at 70° to a bolt
 #: stretches it by a third of its way; what is wedged in above the block that it holds moves farther than this.
 _STRETCHED, _WEDGED = 3.0, 10.0
+#: No bolt lets a block move by more than this part of its size.
+_FARTHEST = 0.1
 #: The strength of joints that do not fail, Pa.
 _UNBREAKABLE = 1e15
 #: With what is left out of balance below this part of forces, joints that do not fail have borne the loads.
@@ -113,14 +117,14 @@ class DisplacementLimit:
         """(n_blocks,) m: how much of the way that blocks have ``moved`` (n_blocks,) has stretched a bolt elastically."""
         longest = np.zeros(len(moved))
         for bolt, row in zip(self._loads.bolts, state.bolts, strict=False):
-            if not row["installed"] or row["broken"] or not bolt.stiffness > 0.0:
+            if not row["installed"] or row["broken"] or not 0.0 < bolt.stiffness or math.isinf(bolt.yield_force):
                 continue
             elastic, yielded = abs(row["force"] - bolt.pretension) / bolt.stiffness, abs(row["plastic"])
             if elastic > 0.0:
                 most = np.full(len(moved), _WEDGED * elastic)
                 most[[b for b in (bolt.block, bolt.other) if b != GROUND]] = _STRETCHED * elastic
                 longest = np.maximum(longest, np.minimum(most, moved * elastic / (elastic + yielded)))
-        return longest
+        return np.minimum(longest, _FARTHEST * self._size)
 
     @property
     def elastic(self) -> float:

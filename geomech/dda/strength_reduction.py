@@ -23,7 +23,7 @@ import numpy as np
 
 from ..model import GROUND, OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
 from .bolts import labels
-from .displacement_limit import DisplacementLimit
+from .displacement_limit import MOVED, DisplacementLimit
 from .equilibrium import equilibrium
 from .moments import block_moments
 from .step import NotConverged, StepResult
@@ -53,6 +53,8 @@ _FROM_AFAR = 3.0
 _BARRED, _BEARS = 1e-3, 1e-3
 #: A bolt within this part of its yield force is at it.
 _AT_YIELD = 1e-6
+#: A bolt that never yields has taken on load when it bears more than its pretension by this part.
+_TAKEN = 1e-3
 #: The search for a trial that stands, and for one that does not, ends at this factor.
 _FARTHEST = 64.0
 
@@ -243,11 +245,11 @@ def factor_of_safety(
     def _told(found: FactorOfSafety, failed: Trial | None = None) -> FactorOfSafety:
         """With what bolts hold, and what toes do or would."""
         held = found.state
-        found = replace(found, anchors=_anchors(loads, held, found.moved))
+        found = _with_anchors(blocks, loads, found)
         system = with_strength(found.lower)
         if toes == FREE or not compare_toes:
             return found
-        holding = _holding(system, held, loads, load_time)
+        holding = _holding(with_strength(found.lower), held, loads, load_time)
         if holding:
             return _held_by_toes(blocks, found, holding, otherwise(FREE))
         bars = () if toes == SHARP or failed is None else _toes(system, held, failed)
@@ -255,7 +257,7 @@ def factor_of_safety(
             sharp = otherwise(SHARP)
             if sharp is not None and sharp.upper > found.upper * (1.0 + tolerance):
                 return replace(
-                    found, toes=bars, other_factor=sharp.factor, warnings=_of_toes(blocks, bars, found, sharp, False)
+                    found, toes=bars, other_factor=sharp.factor, warnings=(*found.warnings, *_of_toes(blocks, bars, found, sharp, False)),
                 )
         return found
 
@@ -394,9 +396,31 @@ def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...
     return tuple(out)
 
 
+def _with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorOfSafety:
+    """The answer ``found`` with what bolts hold in it, and a warning where they hold less than they could or only after
+    their blocks have visibly moved."""
+    anchors, lines = _anchors(loads, found.state, found.moved), []
+    size = np.sqrt(blocks.areas())
+    for bolt, anchor in zip((b for b, row in zip(loads.bolts, found.state.bolts, strict=False)
+                             if row["installed"] and not row["broken"]), anchors, strict=True):  # fmt: skip
+        least = min(float(size[b]) for b in (bolt.block, bolt.other) if b != GROUND)
+        if math.isinf(bolt.yield_force) and anchor.force > bolt.pretension * (1.0 + _TAKEN):
+            lines.append(
+                f"bolt {anchor.name} has no yield force: it counts with the {anchor.force / 1e3:.4g} kN/m that it takes "
+                f"while its block moves {1e3 * anchor.moved:.3g} mm"
+            )
+        elif anchor.moved > MOVED * least and anchor.stretch > 0.0:
+            lines.append(
+                f"bolt {anchor.name} takes its {anchor.force / 1e3:.4g} kN/m only once its block has moved "
+                f"{1e3 * anchor.moved:.3g} mm, {100 * anchor.moved / least:.2g} % of the block's size"
+            )
+    return replace(found, anchors=anchors, warnings=(*found.warnings, *lines))
+
+
 def _holding(system: BlockSystem, state: State, loads: Loads, load_time: float) -> tuple[Toe, ...]:
     """The toes that bear forces in ``state``."""
     weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
+    system.finder.toes = FREE
     return tuple(toe for toe in _toes(system, state) if toe.force > _BEARS * weight[toe.block])
 
 
@@ -406,7 +430,7 @@ def _held_by_toes(
     """The answer ``found`` with the ``toes`` that hold in it, and what it would be ``without`` them."""
     other = None if without is None else without.factor
     lines = _of_toes(blocks, toes, found, without, True)
-    return replace(found, toes=toes, toes_hold=True, other_factor=other, warnings=lines)
+    return replace(found, toes=toes, toes_hold=True, other_factor=other, warnings=(*found.warnings, *lines))
 
 
 def _of_toes(

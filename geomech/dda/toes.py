@@ -49,13 +49,14 @@ class Toe:
 
 @dataclass(frozen=True, eq=False)
 class ToeCorners:
-    """Of each vertex (n_vertices,): the next one and the one before on its outline, its rounding length m, and the size
-    √area (m) of its block."""
+    """Of each vertex (n_vertices,): the next one and the one before on its outline, its rounding length m, the size
+    √area (m) of its block, and where it was ``drawn`` (n_vertices, 2)."""
 
     after: np.ndarray
     before: np.ndarray
     rounding: np.ndarray
     size: np.ndarray
+    drawn: np.ndarray
 
 
 def stand_off(
@@ -65,13 +66,13 @@ def stand_off(
     `FREE`; below zero for other contacts.
 
     ``vertex``, ``edge`` and ``geometry`` (n, 7) as in `ContactSet`, springs at the corners; ``vertices`` (n_vertices, 2)
-    m.
+    m. Of those that are `FREE` are also corners that have come to touch what they were drawn apart from.
     """
     out = np.full(len(vertex), -1.0)
     lone = geometry[:, 4] <= 0.0
     near = np.maximum(_NEAR * corners.rounding, _NEAR_IN_SIZES * corners.size)
     faces = np.flatnonzero(~lone & (geometry[:, 3] <= _TOUCHING * np.minimum(near[vertex], near[edge])))
-    if not (lone.any() and len(faces)):
+    if not lone.any():
         return out
     # Vertices that end a face which touches: those that stand on it, and those near which another's stand.
     ends = np.zeros(len(vertices), bool)
@@ -81,7 +82,10 @@ def stand_off(
     along = geometry[faces, 0] * length
     ends[start[along <= near[start]]] = True
     ends[end[length - along <= near[end]]] = True
-    rows = np.flatnonzero(lone & ends[vertex])
+    ending = ends[vertex]
+    if toes == FREE:
+        ending |= _drawn_apart(vertex, edge, corners) > _TOUCHING * near[vertex]
+    rows = np.flatnonzero(lone & ending)
     if not len(rows):
         return out
     v, n = vertex[rows], geometry[rows, 1:3]
@@ -104,3 +108,10 @@ def stand_off(
         off = corners.rounding[v] * (np.einsum("na,na->n", middle, n) / np.maximum(cosine, 1e-300) - tangent)
     out[rows[sharp]] = np.maximum(off[sharp], 0.0)
     return out
+
+
+def _drawn_apart(vertex: np.ndarray, edge: np.ndarray, corners: ToeCorners) -> np.ndarray:
+    """(n,) m by which each ``vertex`` was drawn off the line of its ``edge``."""
+    start = corners.drawn[edge]
+    along, out = corners.drawn[corners.after[edge]] - start, corners.drawn[vertex] - start
+    return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
