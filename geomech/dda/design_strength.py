@@ -103,18 +103,21 @@ def design_problem(
     known = {law.name for law in laws}
     drawn = {name.removeprefix(_DRAWN): name for name in problem.blocks.edge_names if name.startswith(_DRAWN)}
     chosen: list[str] = []
+    edges: set[str] = set()
     for name in dict.fromkeys(along):
         edge = drawn.get(name.removeprefix(_DRAWN))
         if name in known:
             chosen.append(name)
         elif edge is not None:
-            problem, new = _with_own_laws(problem, edge)
-            chosen += new
+            edges.add(edge)
         else:
             raise NothingToReduce(
                 f"no joint {name!r} to reduce; there are the joint laws {', '.join(map(repr, sorted(known)))}"
                 + (f", and the joints drawn as {', '.join(map(repr, sorted(drawn)))}" if drawn else "")
             )
+    for edge in sorted(edges):
+        problem, new = _with_own_laws(problem, edge)
+        chosen += new
     return problem, chosen
 
 

@@ -74,11 +74,15 @@ def mobilised_joints(
 
 
 def _names(blocks: Blocks, rows: np.ndarray) -> list[str]:
-    """What the faces of contacts are called: as they were drawn, else by their two blocks while these are few."""
+    """What the faces of contacts are called: as they were drawn, on either side, else by their two blocks while these
+    are few."""
     drawn = [blocks.edge_names[k] for k in blocks.edge_name[rows["edge"]]]
-    pairs = [" | ".join(blocks.names[k] for k in sorted(pair)) for pair in zip(rows["block"], rows["other"])]
-    few = len({pair for pair, name in zip(pairs, drawn) if not name}) <= _FEW
-    return [name or (pair if few else "") for name, pair in zip(drawn, pairs)]
+    pairs = [tuple(sorted(pair)) for pair in zip(rows["block"].tolist(), rows["other"].tolist())]
+    faces = list(zip(pairs, rows["law"].tolist()))
+    named = {face: name for face, name in zip(faces, drawn) if name}
+    plain = {pair: " | ".join(blocks.names[k] for k in pair) for face, pair in zip(faces, pairs) if face not in named}
+    few = len(plain) <= _FEW
+    return [name or named.get(face) or (plain[pair] if few else "") for name, face, pair in zip(drawn, faces, pairs)]
 
 
 def _strength(law: JointLaw, row: np.void) -> float:
