@@ -62,6 +62,12 @@ class DdaTable(Table):
     shear_penalty_pa: Positive | None = Field(
         None, description="stiffness of shear contact springs, Pa (unset: from the normal one)"
     )
+    springs: Literal["stiff", "resolved"] = Field(
+        "stiff",
+        description='"resolved": contact springs that are unset are in motion no stiffer than the time step resolves '
+        "(100 m/dt², at least E'/2; bonds stay stiff): slopes that move at 5 ms take half the time, and blocks sink by "
+        "fractions of a millimetre where they come to rest",
+    )
     contact: Literal["penalty", "augmented"] = Field(
         "penalty",
         description='"penalty": springs hold the faces of blocks; "augmented": forces are added until they neither '
