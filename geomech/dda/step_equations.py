@@ -248,7 +248,8 @@ class Equations:
         lifted = np.zeros(len(forces))
         slip = plastic_slip(forces, states.state, self.found.shear, springs)
         if self.curved is not None:
-            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, forces[:, 3])
+            along = forces[:, 3] + self.found.stretch
+            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, along)
         return Settled(
             unknowns=answer.unknowns.reshape(-1, 6),
             state=states.state,
