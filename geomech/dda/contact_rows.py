@@ -48,11 +48,11 @@ def inherited(rows, parent):
 @_jit
 def fill(
     rows, vertex, edge, block, other, law, inset, state, bonded, gap, normal_force, shear_force, slipped, worn, slip,
-    lift, lifted, acting, length, tilt,
+    lift, lifted, acting, length, tilt, stiffness,
 ):  # fmt: skip
     """Fill CONTACT ``rows`` (n,): ``slipped``, ``worn`` and ``lift`` (n,) m as the step began, ``slip`` and ``lifted``
-    in it; where contacts are by ``acting`` (n, 7), as in `ContactSet.geometry`, their ``length`` and
-    ``tilt`` (n,)."""
+    in it; where contacts are by ``acting`` (n, 7), as in `ContactSet.geometry`, their ``length``,
+    ``tilt`` and ``stiffness`` (n,)."""
     for c in range(len(rows)):
         row = rows[c]
         row.vertex, row.edge, row.block, row.other, row.law = vertex[c], edge[c], block[c], other[c], law[c]
@@ -65,7 +65,7 @@ def fill(
         # Sliding back undoes what sliding has lifted; faces that do not fit each other (less than nothing) stay so.
         row.lift = max(lift[c] + lifted[c], min(lift[c], 0.0))
         row.bare = row.stretch = 0.0
-        row.tilt = tilt[c]
+        row.tilt, row.stiffness = tilt[c], stiffness[c]
 
 
 @_jit

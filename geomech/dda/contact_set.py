@@ -38,7 +38,8 @@ class ContactSet:
                                in the step
     inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
     bare        (n,)     part of its face, from its corner on, that did not touch as the last step ended; −1: not known
-    released             J/m that shear had stored where faces part and that their new springs do not hold
+    released             J/m that shear had stored where faces part, and springs before they were eased, and that the new
+                         springs do not hold
     unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than
                          at the corners
     relies_on_glue             corners have been left out that hold as long as all bonds do
@@ -151,7 +152,7 @@ class ContactSet:
             geometry=points.geometry(),
             springs=springs,
             shear=shear,
-            released=0.5 * float(stored[points.ends].sum()),
+            released=self.released + 0.5 * float(stored[points.ends].sum()),
             normal=points.at_points(self.normal),
             lift=points.between_corners(self.lift),
             faces=None if self.faces is None else points.on_bonded(self.faces),
@@ -219,6 +220,7 @@ class ContactSet:
             rows, self.vertex, self.edge, self.block, self.other, self.law, self.inset, settled.state, settled.bonded,
             gap, normal, shear, self.slip, self.wear, settled.slip, lift, settled.lifted,
             geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]), self.tilt,
+            (self if self.lumped is None else self.lumped).springs.normal,
         )  # fmt: skip
         if points is not None:
             rows["bare"][points.ends] = np.abs(points.part - [0.0, 1.0])

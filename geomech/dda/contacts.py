@@ -13,7 +13,7 @@ from .approach import Approach, Windows, widths
 from .bonded_faces import BondedFaces
 from .contact_search import FACE, SMOOTHED, Corners, convex_corners, describe_contacts, find_contacts
 from .contact_set import ContactSet
-from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties
+from .contact_springs import JointTable, Springs, contact_springs, least_face, penalties, resolved
 from .curved_joints import CurvedJoints
 from .face_points import FacePoints, give_by_bending
 from .far_sides import from_outside
@@ -34,6 +34,10 @@ _PRECISION = 1e-5
 #: What lies behind a line by less than this part of the smaller block's size (√area) when they first touch was pushed
 #: there by others' give, or by the rounding of arcs.
 _HAIR = 1e-4
+#: Sound crosses a model so often, and so many steps are taken, until its blocks bear what is put on them at the start. (The
+#: weight of a slope of 1 000 blocks, put on suddenly, sinks into eased springs by 6 % of the work of its first 0.3 s, after
+#: so long by 0.1 %.)
+_TRANSITS, _STEPS = 4.0, 20
 #: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
 _DEEPER = 2.0
 
@@ -42,7 +46,7 @@ class ContactFinder:
     """Finds the contacts of ``blocks`` and gives each its law and springs.
 
     ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow;
-    ``rigid`` (n_blocks,) those that do not strain; ``work`` counts searches.
+    ``rigid`` (n_blocks,) those that do not strain; ``mass`` (n_blocks,) kg/m; ``work`` counts searches.
     """
 
     def __init__(
@@ -53,6 +57,7 @@ class ContactFinder:
         settings: DdaSettings,
         modulus: np.ndarray,
         rigid: np.ndarray,
+        mass: np.ndarray,
         work: Work | None = None,
     ) -> None:
         self._work = work
@@ -64,6 +69,16 @@ class ContactFinder:
         self._modulus, self._area = modulus, blocks.areas()
         self._table = JointTable.of(joints)
         self._stiff = ~np.isnan(self._table.normal_stiffness)
+        # What bonds, waves cross as they do rock.
+        self._yields = ~self._stiff & (self._table.tension == 0.0) & (self._table.cohesion == 0.0)
+        self._mass = np.where(blocks.fixed, np.inf, mass)
+        #: s, from when on springs are eased to what steps resolve.
+        self._eased_from = np.inf
+        self._eases = settings.springs == "resolved" and bool(self._yields.any())
+        if self._eases and settings.dynamic_factor > 0.0:
+            self._eased_from = max(
+                _TRANSITS * _transit(blocks, modulus * self._area, mass), _STEPS * settings.time_step
+            )
         self._stiff_along = ~np.isnan(self._table.shear_stiffness)
         self._by_length = self._stiff & self._stiff_along
         self.has_face_nodes = bool(self._by_length.any())
@@ -147,8 +162,11 @@ class ContactFinder:
             geometry[:, 4] = nodes.left(geometry[:, 4])
             parent = nodes.heirs(own, np.ascontiguousarray(old["state"]))
         block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
-        springs = self._springs(block, other, law, geometry[:, 4])
+        springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._eased_from)
         remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
+        eased = 0.0
+        if self._eases and len(old):
+            eased = self._keep_forces(old, parent, geometry, springs, remembered, law)
         if self._table.curved.any():
             self._pass_on_wear(old, block, other, geometry, remembered)
         # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
@@ -199,6 +217,7 @@ class ContactFinder:
             springs=springs,
             relies_on_glue=glued is not None,
             faces=faces,
+            released=eased,
             **remembered,
         )
         if lumped or not (self._stiff.any() or found.inset.any()):
@@ -274,10 +293,16 @@ class ContactFinder:
         )  # fmt: skip
         return keep | (table[:, 2] >= 0)
 
-    def _springs(self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray) -> Springs:
+    def _springs(
+        self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray, eased: bool
+    ) -> Springs:
+        """Springs of contacts (n,), ``eased`` to what the steps of a run resolve."""
         kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
         if kn is None:
             normal = penalties(block, other, length, self._modulus, self._area, self._fixed, self._rigid)
+            if eased:
+                eased_to = resolved(normal, block, other, self._mass, self._settings.time_step)
+                normal = np.where(self._yields[law], eased_to, normal)
         else:
             normal = np.full(len(block), float(kn))
         return contact_springs(
@@ -317,6 +342,19 @@ class ContactFinder:
             "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
             "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset, "bare": bare,
         }  # fmt: skip
+
+    def _keep_forces(self, old, parent, geometry, springs, remembered, law) -> float:
+        """Faces that press with other springs than before keep the force, not the gap: what has come to bear on springs that
+        were not eased sinks in no further for these. J/m that the old springs had stored beyond what the new ones do."""
+        known = np.flatnonzero((parent >= 0) & (remembered["state"] != OPEN) & self._yields[law])
+        before, now = old["stiffness"][parent[known]], springs.normal[known]
+        ratio = np.where(before > 0.0, before / now, 1.0)
+        gap, lift = geometry[known, 3], remembered["lift"][known]
+        pressed = np.minimum(gap - lift, 0.0)
+        remembered["lift"][known] = np.where(pressed < 0.0, gap - ratio * pressed, lift)
+        # Of penalties, those along the face are as stiff as those across.
+        along = np.where(self._stiff_along[law[known]], 0.0, remembered["shear"][known] ** 2 / (ratio * springs.shear[known]))
+        return 0.5 * float(((1.0 - ratio) * (before * pressed**2 + along)).sum())
 
     def _pressed(self, old: np.ndarray) -> np.ndarray:
         """(n_blocks,) m: how deep the faces of each block were last pressed in."""
@@ -444,6 +482,13 @@ class ContactFinder:
         x, y = found.geometry[contact, 5:7]
         a, b = self.names[found.block[contact]], self.names[found.other[contact]]
         return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
+
+
+def _transit(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray) -> float:
+    """s that sound takes across ``blocks`` of E' A ``stiffness`` and ``mass`` (n_blocks,), at its slowest."""
+    heavy = mass > 0.0
+    slowest = float(np.sqrt(np.min(stiffness[heavy] / mass[heavy], initial=np.inf)))
+    return float(np.hypot(*np.ptp(blocks.vertices, axis=0))) / slowest
 
 
 def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:

@@ -244,11 +244,13 @@ class Equations:
         are known to: a face that opens by a micrometre because of how springs share its load, and closes as that
         grows, is whole."""
         forces, springs = answer.forces, answer.springs
-        open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > np.maximum(self.slack, self.found.precision))
+        known = np.maximum(self.slack, self.found.precision)
+        open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > known)
         lifted = np.zeros(len(forces))
         slip = plastic_slip(forces, states.state, self.found.shear, springs)
         if self.curved is not None:
-            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, forces[:, 3])
+            along = forces[:, 3] + self.found.stretch
+            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, along)
         return Settled(
             unknowns=answer.unknowns.reshape(-1, 6),
             state=states.state,

@@ -256,9 +256,8 @@ def factor_of_safety(
         if bars:
             sharp = otherwise(SHARP)
             if sharp is not None and sharp.upper > found.upper * (1.0 + tolerance):
-                return replace(
-                    found, toes=bars, other_factor=sharp.factor, warnings=(*found.warnings, *_of_toes(blocks, bars, found, sharp, False)),
-                )
+                lines = _of_toes(blocks, bars, sharp, False)
+                return replace(found, toes=bars, other_factor=sharp.factor, warnings=(*found.warnings, *lines))
         return found
 
     def tried(factor: float, start: State) -> tuple[Trial, State]:
@@ -429,14 +428,14 @@ def _held_by_toes(
 ) -> FactorOfSafety:
     """The answer ``found`` with the ``toes`` that hold in it, and what it would be ``without`` them."""
     other = None if without is None else without.factor
-    lines = _of_toes(blocks, toes, found, without, True)
+    lines = _of_toes(blocks, toes, without, True)
     return replace(found, toes=toes, toes_hold=True, other_factor=other, warnings=(*found.warnings, *lines))
 
 
 def _of_toes(
-    blocks: Blocks, toes: tuple[Toe, ...], found: FactorOfSafety, other: FactorOfSafety | None, hold: bool
+    blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool
 ) -> tuple[str, ...]:
-    """What toes hold or would, in words."""
+    """What toes hold or would, in words; ``other`` is the answer without them or with sharp tips."""
 
     def factor(of: FactorOfSafety) -> str:
         return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"

@@ -116,7 +116,8 @@ class BlockSystem:
         rigid = np.array([m.rigid for m in self.materials])[of]
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
-        self.finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid, self.work)
+        mass = self.density * blocks.areas()
+        self.finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid, mass, self.work)
         self._take_out(None, None)
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)

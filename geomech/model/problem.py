@@ -23,7 +23,11 @@ class DdaSettings:
 
     ``time_step`` s is that of every step, or with ``automatic_time_step`` the longest, by which steps then grow and
     shrink as they prove easy or hard (`dda.StepLength`). ``normal_penalty`` and ``shear_penalty`` are contact spring
-    stiffnesses, N/m per metre of thickness (Pa); None picks them from the blocks' stiffness. ``contact`` "augmented"
+    stiffnesses, N/m per metre of thickness (Pa); None picks them from the blocks' stiffness. With ``springs`` "resolved"
+    those that are picked are in motion no stiffer than ``time_step`` resolves, 100 m/dt² (m of the lighter block) and at
+    least E'/2, once the blocks bear what was put on them at the start: faces keep their forces then and sink in no further,
+    and what opens and closes by micrometres takes no iterations (bonds and joints with a stiffness of their own stay as
+    they are). ``contact`` "augmented"
     adds multipliers to these springs until closed contacts gape and sticking ones give by less than
     ``penetration_tolerance`` times √area of the smallest block, whatever the penalty. ``corner_rounding`` is the length
     over which two corners that meet are rounded, in sizes (√area) of the smaller block, at most a quarter of the
@@ -60,6 +64,7 @@ class DdaSettings:
     normal_penalty: float | None = None
     shear_penalty: float | None = None
     contact: str = "penalty"
+    springs: str = "stiff"
     corner_rounding: float = 0.01
     penetration_tolerance: float = 1e-8
     max_open_close_iterations: int = 60
@@ -67,7 +72,8 @@ class DdaSettings:
 
     def __post_init__(self) -> None:
         refuse_numbers(self, _DDA_NUMBERS)
-        for name, known in (("contact", ("penalty", "augmented")), ("equilibrium", ("", "start", "loads"))):
+        words = ("contact", ("penalty", "augmented")), ("springs", ("stiff", "resolved"))
+        for name, known in (*words, ("equilibrium", ("", "start", "loads"))):
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} is {' or '.join(map(repr, known))}, not {getattr(self, name)!r}")
         if len(self.newmark) != 2 or not all(Number().holds(value) for value in self.newmark):

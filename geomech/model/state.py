@@ -45,6 +45,7 @@ CONTACT = np.dtype(
         ("bare", np.float64),  # part of its face, from this corner on, that does not touch; −1 where that is not known
         ("stretch", np.float64),  # m, motion along the edge while sticking that a multiplier has still to take back
         ("tilt", np.float64),  # rad, of the normal against that of the edge, where two rounded corners meet; else 0
+        ("stiffness", np.float64),  # N/m, of the normal spring that bears the force; 0 where that is not known
     ]
 )
 

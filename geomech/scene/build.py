@@ -221,6 +221,7 @@ def _dda(tables: SceneTables) -> DdaSettings:
         max_displacement_ratio=d.max_displacement_ratio,
         normal_penalty=d.normal_penalty_pa,
         shear_penalty=d.shear_penalty_pa,
+        springs=d.springs,
         contact=d.contact,
         penetration_tolerance=d.penetration_tolerance,
         corner_rounding=d.corner_rounding,

@@ -37,7 +37,8 @@ class DdaTable(Table):
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
         description='when static equilibrium is sought, whatever the time step: "" never, "start" before the run begins, '
-        '"loads" at every load of a static run too; a run ends where there is none',
+        '"loads" at every load of a static run too; a run ends where there is none, or only where blocks have moved by more '
+        "than a two-thousandth of their size beside what elasticity explains",
     )
     unbalanced_tolerance: Positive = Field(
         1e-6, description="equilibrium: largest unbalanced force on a block, over the mean force on blocks"
@@ -61,6 +62,12 @@ class DdaTable(Table):
     )
     shear_penalty_pa: Positive | None = Field(
         None, description="stiffness of shear contact springs, Pa (unset: from the normal one)"
+    )
+    springs: Literal["stiff", "resolved"] = Field(
+        "stiff",
+        description='"resolved": contact springs that are unset are in motion no stiffer than the time step resolves '
+        "(100 m/dt², at least E'/2; bonds stay stiff): slopes that move at 5 ms take half the time, and blocks sink by "
+        "fractions of a millimetre where they come to rest",
     )
     contact: Literal["penalty", "augmented"] = Field(
         "penalty",
