@@ -73,7 +73,7 @@ class ByMeanStress:
         for block in np.unique([pressed["block"], pressed["other"]]).tolist():
             if block not in bodies or block in self._blocks:
                 continue
-            if self._soft(block, bodies[block], elastic[block]) > SOFT:
+            if self.soft(block, bodies[block], elastic[block]):
                 self._blocks.add(block)
 
     def limit(self, block: int, body: Body, elastic: np.ndarray) -> np.ndarray:
@@ -110,6 +110,16 @@ class ByMeanStress:
         self.solutions[block], self.stress[block] = known, (own, limit)
         return known
 
+    def limits(self, block: int) -> bool:
+        """Whether ``block`` was taken for no softer than so much in the last pass."""
+        return not np.array_equal(self.stress[block][1], np.eye(3))
+
+    def strained(self, block: int, solution: Solution | EvenSolution) -> tuple[np.ndarray, np.ndarray]:
+        """The mean stress of the last pass (3,), Pa, and the strain (3,) that the cracks of ``solution``, under what the
+        limit leaves of it, bring; in the block's own axes."""
+        stress, limit = self.stress[block]
+        return stress, limit.T @ solution.crack_strain
+
     def take_step(self) -> None:
         """Go on from the end of a step."""
         self._memory = {b: known.memory for b, known in self.solutions.items() if known.memory is not None}
@@ -123,6 +133,10 @@ class ByMeanStress:
         )
         own = {b for b in whole.tolist() if parent[b] in self._blocks}
         return ByMeanStress(solutions, memory, stress, softness, own)
+
+    def soft(self, block: int, body: Body, elastic: np.ndarray) -> bool:
+        """Whether open cracks make ``block`` more than `SOFT` times as soft as its rock in some direction."""
+        return self._soft(block, body, elastic) > SOFT
 
     def _soft(self, block: int, body: Body, elastic: np.ndarray) -> float:
         """How many times the ``elastic`` compliance (3, 3) open cracks add, in the direction in which they add most."""

@@ -29,9 +29,21 @@ def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
         if not found.converged:
             log.warning("t = %g s: %s; going on from there", load_time, found.reason)
         return ()
-    log.warning("t = %g s: %s; the run ends", load_time, found.reason)
+    return _fallen(now, found, "", load_time)
+
+
+def collapse_in_situ(now: CrackedBlocks) -> tuple[Event, ...]:
+    """A collapse, when nothing held the blocks under the in-situ stress."""
+    if now.collapsed is None:
+        return ()
+    return _fallen(now, now.collapsed, "under the in-situ stress there is ", now.state.time)
+
+
+def _fallen(now: CrackedBlocks, found: dda.Equilibrium, where: str, time: float) -> tuple[Event, ...]:
+    detail = where + found.reason
+    log.warning("t = %g s: %s; the run ends", time, detail)
     first = int(now.blocks.vertex_start[found.moving[0]])
-    return (event(now, "collapse", now.state, now.blocks.vertices[first], found.reason),)
+    return (event(now, "collapse", now.state, now.blocks.vertices[first], detail),)
 
 
 def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:

@@ -4,9 +4,11 @@ released by cement that breaks and at tips as they grow, and set free where bloc
 The block solver knows the work of its mean stress on the strain of its cracks, A σ : dε_c. By Clapeyron's theorem a
 body with jumps [u] whose faces bear t where the same loads would bring t₀ without them stores ½ ∫ (t₀ − t)·[u] more;
 what a tip releases over an increment is ∫ G da, G = (K_I² + K_II²)/E' (Irwin 1957), by the trapezoidal rule of G
-before, of K_eq, for the way it turns, and after, each K once at the load of the step's end and once at that of its
-begin. So four quantities found apart from each other have to add up; what is left over is told. K is that of the forces
-whose strain the blocks feel: where that is their mean stress alone (`by_mean_stress`), that stress brings it.
+before, of K_eq, for the way it turns, and after (where it falls, as an exponential does), each K once at the load of the
+step's end and once at that of its begin. So four quantities found apart from each other have to add up; what is left
+over is told. K is that of the forces whose strain the blocks feel: where that is their mean stress alone
+(`by_mean_stress`), that stress brings it; where they are taken for no softer than so much and answer in proportion, what
+they release is what lies between the lines on which they are loaded.
 
 At rest forces have to be passed on as they are spread, and open cracks by more than their mean stress does. There the
 work of all of them counts (`work_on_cracks`), also where faces hold until these have come to their strength (`Released`);
@@ -22,13 +24,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..model import Blocks, Material, State
+from .release import FeltTips, Loaded, kink_release, mean_release
 from .work_on_cracks import first_work_on_cracks, work_on_cracks
 
 if TYPE_CHECKING:
@@ -37,9 +38,6 @@ if TYPE_CHECKING:
 
 _Key = tuple[int, int]
 
-#: rad; the series of kinks is good for no larger ones.
-_LARGEST_KINK = 2.2
-
 
 def _keys(tips: np.ndarray) -> list[_Key]:
     return list(zip(tips["crack"].tolist(), tips["end"].tolist()))
@@ -47,46 +45,6 @@ def _keys(tips: np.ndarray) -> list[_Key]:
 
 def _add(sums: dict[int, float], block: int, energy: float) -> None:
     sums[block] = sums.get(block, 0.0) + energy
-
-
-class _FeltTips:
-    """``tips``, and those of blocks that were left out, with the K that the mean stress brings in blocks that feel no
-    more, ``hang`` (block → solution); found when something grows."""
-
-    def __init__(self, tips: np.ndarray, hang: dict[int, Solution]) -> None:
-        self._tips, self._hang = tips, hang
-
-    def __getstate__(self) -> dict[str, np.ndarray]:
-        return {"rows": self.rows}
-
-    @cached_property
-    def rows(self) -> np.ndarray:
-        """(n_tips,) TIP."""
-        there = set(self._tips["block"].tolist())
-        left_out = [of.tips for block, of in self._hang.items() if block not in there]
-        out = np.concatenate([self._tips, *left_out])
-        for first, last in _runs(out["block"]):
-            solution = self._hang.get(int(out["block"][first]))
-            if solution is not None:
-                for name in ("k_i", "k_ii"):
-                    out[name][first:last] = solution.tips[name]
-        return out
-
-
-def _runs(number: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Where rows of one ``number`` (n,) begin and end; those of a block stand together."""
-    marks = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
-    return pairwise(marks) if len(number) else iter(())
-
-
-def _kink_release(tips: np.ndarray) -> np.ndarray:
-    """(n,) k₁² + k₂² at the tips of kinks of no length by the growth angles of ``tips`` (Amestoy & Leblond 1992), of
-    those that close k₂² alone."""
-    from ..ddm.criteria import kink_factors
-
-    angle = np.clip(tips["angle"], -_LARGEST_KINK, _LARGEST_KINK)
-    k = (kink_factors(angle) @ np.stack([tips["k_i"], tips["k_ii"]], axis=-1)[..., None])[..., 0]
-    return np.maximum(k[:, 0], 0.0) ** 2 + k[:, 1] ** 2
 
 
 @dataclass(frozen=True)
@@ -146,13 +104,17 @@ class CrackEnergy:
     #: block with tips that grow → its mean stress, Pa, its limit, the strain of its cracks then, and the share as of a
     #: tip.
     _limited: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray, float]] = field(default_factory=dict)
+    #: Blocks taken for no softer than so much (`ByMeanStress.limit`) in which tips have grown in the present step.
+    _grown: set[int] = field(default_factory=set)
+    #: block that feels its mean stress → how it was loaded as the present step began.
+    _hung: dict[int, Loaded] = field(default_factory=dict)
     #: At rest: block → its solution as the present step began, and what rock has taken in it since then, J/m.
     _rested: dict[int, Solution] = field(default_factory=dict)
     _taken: dict[int, float] = field(default_factory=dict)
     #: Tips with K as it is felt, as the present step began, in its first pass and in its last one.
-    _began: _FeltTips | None = None
-    _first: _FeltTips | None = None
-    _last: _FeltTips | None = None
+    _began: FeltTips | None = None
+    _first: FeltTips | None = None
+    _last: FeltTips | None = None
     #: … and the crack strains of blocks that feel their mean stress.
     _strain_began: dict[int, np.ndarray] = field(default_factory=dict)
     _strain_first: dict[int, np.ndarray] = field(default_factory=dict)
@@ -172,7 +134,7 @@ class CrackEnergy:
         by no more than their mean stress."""
         hang = {block: of for block, of in felt.items() if block in by_mean_stress}
         self._strain_last = {block: of.crack_strain for block, of in hang.items()}
-        self._last = _FeltTips(tips, hang)
+        self._last = FeltTips(tips, hang)
         if self._first is None:
             self._first, self._strain_first = self._last, self._strain_last
         if not len(tips):
@@ -191,8 +153,10 @@ class CrackEnergy:
         for key, of in self._growing.items():
             taken = of.way * of.cost
             _add(self._taken, of.block, taken)
+            if of.block in by_mean_stress and by_mean_stress.limits(of.block):
+                self._grown.add(of.block)
             if key in now:
-                released = 0.5 * of.way * of.share * (of.before + now[key])
+                released = of.way * of.share * mean_release(of.before, now[key])
                 _add(self._released, of.block, released)
                 _add(self._lost, of.block, max(0.0, released - taken) if self.static else 0.0)
             else:
@@ -206,7 +170,7 @@ class CrackEnergy:
                 less, known = now_limit - limit, felt[block]
                 both = float(strain @ less @ stress + known.crack_strain @ less @ now_stress)
                 _add(self._released, block, 0.5 * known.body.area * share * both)
-        turned = np.where(hangs, _kink_release(tips), tips["k_eq"] ** 2) / modulus
+        turned = np.where(hangs, kink_release(tips), tips["k_eq"] ** 2) / modulus
         shares = self._shares(stressed)
         grows = np.flatnonzero(tips["grown"] > 0)
         cost = np.array([m.k_ic for m in materials])[rock] ** 2 / modulus
@@ -258,10 +222,12 @@ class CrackEnergy:
         """Blocks part in the present step; from then on they are those of which ``parent`` (n_blocks,) were whole."""
         self._parted = True
         self._hangs, self._limited, self._strain_last = {}, {}, {}
-        if not self.static:
-            return
         whole = np.bincount(parent)[parent] == 1
         now = {int(parent[child]): child for child in np.flatnonzero(whole).tolist()}
+        self._grown = {now[block] for block in self._grown if block in now}
+        self._hung = {now[block]: of for block, of in self._hung.items() if block in now}
+        if not self.static:
+            return
         for block in [block for block in self._rested if block not in now]:
             self._runs_through(block)
         self._rested = {now[block]: of for block, of in self._rested.items()}
@@ -340,6 +306,7 @@ class CrackEnergy:
         new = [block for block, of in felt.items() if block not in self._hangs and of.jumps.size]
         self._parted |= bool(np.any(before.stress[new]))
         self._hangs = hangs
+        self._release_of_limited(felt, by_mean_stress)
         released, lost = sum(self._released.values()), sum(self._lost.values())
         rest = done + set_free - (stored - self.stored) - friction - bond - released
         self.work += work
@@ -359,7 +326,23 @@ class CrackEnergy:
         # What grows now does so as the next step begins.
         self._growing = {key: replace(of, share=1.0) for key, of in self._growing.items()}
         self._limited = {block: (*of[:3], 1.0) for block, of in self._limited.items()}
+        self._grown = set()
+        self._hung = {block: Loaded.of(block, of, by_mean_stress) for block, of in felt.items() if hangs[block]}
         self._rested = dict(felt) if self.static else {}
+
+    def _release_of_limited(self, felt: dict[int, Solution], by_mean_stress: ByMeanStress) -> None:
+        """What is taken for no softer than so much releases, where it answers in proportion to its load, what lies between
+        the lines on which it is loaded before and after, ½ A (σ₀·ε₁ − σ₁·ε₀), from where the present step began: K falls
+        by much in an increment, and the limit with it."""
+        for block in self._grown:
+            if block not in felt or block not in by_mean_stress:
+                continue
+            now = Loaded.of(block, felt[block], by_mean_stress)
+            before = self._hung.get(block, Loaded(np.zeros(3), np.zeros(3), True))
+            if now.in_proportion and before.in_proportion:
+                between = float(before.stress @ now.strain - now.stress @ before.strain)
+                self._released[block] = released = 0.5 * felt[block].body.area * between
+                self._lost[block] = max(0.0, released - self._taken.get(block, 0.0)) if self.static else 0.0
 
     def _work_at_rest(
         self, before: State, felt: dict[int, Solution], hangs: dict[int, bool], by_mean: np.ndarray

@@ -64,6 +64,8 @@ class CrackedBlocks:
         self.removed: np.ndarray | None = None
         self._motion: tuple[State, Motion] | None = None
         self._take_blocks()
+        #: Where the search for rest under the in-situ stress ended in a collapse.
+        self.collapsed: dda.Equilibrium | None = None
         if problem.in_situ is not None:
             self._settle_in_situ()
 
@@ -179,9 +181,16 @@ class CrackedBlocks:
 
     def _settle_in_situ(self) -> None:
         """Begin with the blocks at rest under the in-situ stress; where they are then is the reference. Cracks are as
-        if cut into them then: they open and slide from the first step on."""
+        if cut into them then: they open and slide from the first step on. Blocks that nothing holds have collapsed; raises
+        `dda.NoInSituEquilibrium` where no rest is found for another reason."""
         with self.timed("dda"):
-            found = dda.in_situ_state(self.system, self.problem.in_situ, self.problem.loads)
+            try:
+                found = dda.in_situ_state(self.system, self.problem.in_situ, self.problem.loads)
+            except dda.NoInSituEquilibrium as nothing:
+                if nothing.found is None or not nothing.found.collapsed:
+                    raise
+                self.collapsed, self.state = nothing.found, nothing.found.state
+                return
         motion = Motion.of(self.blocks, found.state.vertices)
 
         def moved(block: int, point) -> tuple[float, float]:

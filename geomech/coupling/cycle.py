@@ -5,6 +5,9 @@ At each load the cycle is repeated from the same start of the step until no tip 
 (`event_steps`), each pass in which they grow is a load step of its own. Blocks part where a pass has left them: in
 statics the passes that follow at the same load begin there (unless the block hung by a thread), in dynamics the next
 step does.
+
+At rest a load waits for tips that run: after ``max_passes`` passes the step is taken as it stands, and those that follow at
+the same load begin there, for `MOST_PASSES` in all.
 """
 
 from __future__ import annotations
@@ -21,9 +24,9 @@ from ..dda.blas_threads import alike, asked_for, blas_threads
 from ..dda.excavation import until_next_event
 from ..dda.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
-from .balance import Balance, balanced
+from .balance import Balance, balanced, toughness
 from .budget_watch import BudgetWatch
-from .collapse import lost, relax, unheld
+from .collapse import collapse_in_situ, lost, relax, unheld
 from .cracked_blocks import CrackedBlocks
 from .endless import out_of_sight, solved_pass
 from .event_steps import SETTLED, TOGETHER, EventSteps
@@ -35,6 +38,9 @@ from .record import event, record
 from .tips_in_time import TipsInTime
 
 log = logging.getLogger(__name__)
+
+#: Growth passes for which a static load waits, where fewer are asked for: increments far shorter than blocks take tens.
+MOST_PASSES = 200
 
 
 def cycles(problem: Problem) -> Iterator[Cycle]:
@@ -128,7 +134,9 @@ class Coupling:
 
     def _from_the_start(self) -> Iterator[Cycle]:
         now = self.now
-        collapse = relax(now, now.state.time) if self.problem.dda.equilibrium else ()
+        collapse = collapse_in_situ(now)
+        if not collapse and self.problem.dda.equilibrium:
+            collapse = relax(now, now.state.time)
         yield self._still(collapse)
         if not collapse:
             yield from self._load_steps()
@@ -164,7 +172,8 @@ class Coupling:
                 now.state = replace(now.state, time=load_time)
                 yield self._still(collapse)
                 return True
-        for growth_pass in range(begun.next_pass, growing.max_passes + 1):
+        most = max(growing.max_passes, MOST_PASSES) if static and growing.max_passes else growing.max_passes
+        for growth_pass in range(begun.next_pass, most + 1):
             now.number += 1
             if endless and not now.bodies:
                 # Cracks have cut a piece off, which nothing holds.
@@ -195,7 +204,7 @@ class Coupling:
             elif until is None:
                 until, whole = result.state.time, result.dt
             tips = found.tips
-            may_grow = growth_pass < growing.max_passes
+            may_grow = growth_pass < most
             if self.follows and not self.events.reached:
                 may_grow = False  # on the way to a lower load
             events = pending + self.changes.events(now, found)
@@ -225,6 +234,7 @@ class Coupling:
             cut = () if endless else part_here(now, growth, result.state)
             parts = len(cut) > 0
             ends = growth is None or self.follows or (parts and not static)
+            rests = parts or (not ends and most > growing.max_passes and (growth_pass + 1) % growing.max_passes == 0)
             # What is dug out takes what it stores along.
             dug = result.state.removed is not now.state.removed
             budget = (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time)
@@ -235,7 +245,7 @@ class Coupling:
                 statistics["dt"] = gone_by
             if (now.bodies or now.crack_energy.under_way) and not endless:
                 now.crack_energy.passed(tips, now.blocks, now.problem.materials, *self._felt())
-                if ends or parts:
+                if ends or rests:
                     self._count_at_cracks(result.state, budget, cut)
                 statistics |= now.crack_energy.statistics()
             statistics["budget_residual"] = budget.left_over(now.crack_energy.residual, now.crack_energy.uneven)
@@ -246,7 +256,7 @@ class Coupling:
                 statistics["fastest_tip"] = self.tips.speed.fastest(whole)
             yield record(now, result.state, tips, solutions, events, growth_pass, statistics, found.left_out)
             if ends:
-                if growth_pass == growing.max_passes:
+                if growth_pass == most and not stops and self._grow_on(tips, enough, whole):
                     log.warning(
                         "cycle %d: tips still grow after %d passes at one load; going on to the next load",
                         now.number,
@@ -264,12 +274,18 @@ class Coupling:
                 elif self.events is not None:
                     self.events.after(now, found)
                 return stops
-            if parts:
+            if rests:
                 now.take_step(result.state, budget)
             pending = take_growth(now, growth, result.state, solutions)
             self.under_way = UnderWay(dt, load_time, events, pending, growth_pass + 1, until, whole)
             self.between()
         raise AssertionError("unreachable: the last pass takes no growth")
+
+    def _grow_on(self, tips: np.ndarray, enough: float, whole: float) -> bool:
+        """Whether any of ``tips`` after the last pass of a load step has ``enough`` of its toughness, and may go on."""
+        now = self.now
+        longest = np.inf if self.tips is None else self.tips.may_go(tips, now.blocks, whole, now.loads)
+        return bool(np.any((tips["k_eq"] >= enough * toughness(now, tips)) & (longest > 0)))
 
     def _until(self, until: float) -> Balance:
         """A pass of a dynamic step of which another has ended at the time ``until``. Its tips have grown for all of

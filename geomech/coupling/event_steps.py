@@ -76,7 +76,7 @@ class EventSteps:
         start = now.state.time
         search = Crossing(self._rate)
         if self._drive is None:
-            found, excess = self._at(now, start)
+            found, excess = self._at(now, start, 0.0)
             search.slope *= 1 + excess
         else:
             found, excess = None, self._drive - 1
@@ -114,7 +114,7 @@ class EventSteps:
             aim = min(aim, max(self.changes.expected * (1 + FOUND), start + FOUND * limit))
             self.changes.expected = None
         for k in range(MOST):
-            found, excess = self._at(now, aim, free=k == 0)
+            found, excess = self._at(now, aim, limit - start, free=k == 0)
             at = found.result.state.time
             search.add(at, excess)
             self.reached = abs(excess) <= SETTLED or (excess > 0 and search.width <= JUMP * abs(at))
@@ -142,7 +142,7 @@ class EventSteps:
         whole = search.next >= limit and not self._far(start - search.next)
         aim = search.next if whole else max(start - APPROACH * (start - search.next), limit)
         for _ in range(MOST):
-            found, excess = self._at(now, aim)
+            found, excess = self._at(now, aim, start - limit)
             at = found.result.state.time
             search.add(at, excess)
             self.reached = abs(excess) <= SETTLED or (excess > 0 and (at == 0.0 or search.width <= JUMP * at))
@@ -157,13 +157,13 @@ class EventSteps:
             self.reached = True
         return found, excess
 
-    def _at(self, now: CrackedBlocks, time: float, free: bool = False) -> tuple[Balance, float]:
+    def _at(self, now: CrackedBlocks, time: float, most: float, free: bool = False) -> tuple[Balance, float]:
         """A pass at the loads of ``time`` from the start of the step, or at those at which something changes its state
-        on the way there, and how far the drive then is above one. A ``free`` one may be cut short by how far blocks may
-        move."""
+        on the way there, and how far the drive then is above one. ``most`` is how long the step may be, s; a ``free`` one
+        may be cut short by how far blocks may move."""
         found = self._solve(now, time, free)
         found = self.changes.first(
-            now, found, partial(self._solve, now), partial(self._towards, now.state.time), self._most(now)
+            now, found, partial(self._solve, now), partial(self._towards, now.state.time), most
         )
         return found, drive(now, found) - 1
 

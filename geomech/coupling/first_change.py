@@ -86,16 +86,18 @@ class FirstChange:
             at = _first_of(changes, low, high)
             if at is not None and abs(at - high.time) <= within:
                 break
-            if at is None or way * (at - high.time) > 0 or look % 3 == 2:
+            far = at is None or way * (at - high.time) > 0 or look % 3 == 2
+            if far:
                 # Something happens in between; or what is left shrinks from one side only.
                 share, at = FIRST_LOOK if len(low) == 1 else 0.5, None
                 aim = low[-1].time + share * (high.time - low[-1].time)
             else:
                 aim = at + 0.25 * way * within
-                if abs(aim - self._last) < grain and grain > within:
-                    aim = self._last + way * grain
-                    if way * (aim - high.time) >= 0:
-                        break
+            if abs(aim - self._last) < grain and grain > within:
+                aim = self._last + way * grain
+                if way * (aim - high.time) >= 0:
+                    break
+            if not far:
                 part = approach(at)
                 if part != at:
                     aim = part

@@ -50,7 +50,7 @@ _AGAIN, _LARGER = 4, 10.0
 _PASSED_ON = 3
 #: Where the step is as short as that because of so small a part of the contacts (or so few), those alone are centred
 #: again about the motion that the others allow, with so much larger an ε, at most so many times: those that stop it
-#: before so much of the way. (Friction on two neighbours' corners may leave no way along the path. On a slope of 1 000
+#: before so much of the way (and not larger than at the start). (Friction on two neighbours' corners may leave no way along the path. On a slope of 1 000
 #: blocks that slides, steps for which all contacts were centred again, in vain, took 250 iterations and now take 40;
 #: with ε 100 times larger one in three still does.)
 _ALONE, _ALONE_FEW, _ALONE_FAR, _ALONE_LARGER, _ALONE_AGAIN = 0.005, 8, 0.3, 1000.0, 40
@@ -175,7 +175,8 @@ class CentralPath:
         self._s = along - found.shear[some] / self._ks
         self._load = max(float(np.abs(left).max()), 1e-300)
         mean = float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0
-        self._begin(max(_START * mean, _LEAST_START))
+        self._start = max(_START * mean, _LEAST_START)
+        self._begin(self._start)
 
     @property
     def blocked(self) -> bool:
@@ -281,7 +282,7 @@ class CentralPath:
         self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
         if alone is not None:
             self._lone += 1
-            self._centre_alone(alone, _ALONE_LARGER * epsilon)
+            self._centre_alone(alone, max(epsilon, min(_ALONE_LARGER * epsilon, self._start)))
         self._blocked = self._blocked + 1 if far < _SHORT else 0
         self.epsilon = epsilon
         if epsilon > _END and self._again < _AGAIN and (self.blocked or not far > _STUCK):

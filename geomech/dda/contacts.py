@@ -181,7 +181,7 @@ class ContactFinder:
         remembered["lift"][up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
         vertex, edge, corner = (column.copy() for column in table[:, :3].T)
         if self.toes != SHARP:
-            off = stand_off(vertex, edge, geometry, vertices, self._corners, self.toes)
+            off = stand_off(vertex, edge, corner, geometry, vertices, self._corners, self.toes)
             remembered["lift"] = np.where(off >= 0.0, -off, remembered["lift"])
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
@@ -469,7 +469,8 @@ class ContactFinder:
 
     def toes_among(self, found: ContactSet, vertices: np.ndarray) -> np.ndarray:
         """(n,) m by which toes among the contacts ``found`` stand off; below zero for other contacts."""
-        return stand_off(found.vertex, found.edge, found.geometry, vertices, self._corners, self.toes)
+        parts = found.vertex, found.edge, found.corner, found.geometry
+        return stand_off(*parts, vertices, self._corners, self.toes)
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""

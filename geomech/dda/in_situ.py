@@ -26,7 +26,12 @@ _PASSES = 12
 
 
 class NoInSituEquilibrium(RuntimeError):
-    """The blocks do not come to rest under their stress and loads: the message says which move."""
+    """The blocks do not come to rest under their stress and loads: the message says which move, ``found`` where the
+    search ended."""
+
+    def __init__(self, message: str, found: Equilibrium | None = None) -> None:
+        super().__init__(message)
+        self.found = found
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +70,9 @@ def in_situ_state(
     for _ in range(_PASSES):
         found: Equilibrium = equilibrium(system, replace(state, stress=given.copy()), loads, tolerance=tolerance)
         if not found.converged:
-            raise NoInSituEquilibrium(f"the blocks do not come to rest under the in-situ stress: {found.reason}")
+            raise NoInSituEquilibrium(
+                f"the blocks do not come to rest under the in-situ stress: {found.reason}", found
+            )
         state = found.state
         if before is None or np.abs(state.stress - before).max() > stress_tolerance * max(size, 1e-300):
             before = state.stress

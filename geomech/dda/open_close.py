@@ -71,6 +71,8 @@ _FEW, _CAUTIOUS = 40, 12
 #: more than this part of the forces on blocks is out of balance. At its end, where ε is round-off, the first of these
 #: suffices: a wall of 100 000 bricks leaves twenty that hardly touch.
 _DECIDED, _LEFT, _LEFT_PART, _BALANCED = 0.006, 12, 2e-4, 1e-3
+#: … and ε is below this: where it still is large, contacts of blocks that fly apart are decided as well.
+_CENTRED = 1.0
 #: A path of many blocks that has used up its iterations goes on while ε falls to this part within so many of them, up
 #: to so many times as far: what would follow takes hundreds.
 _AHEAD, _LOOKED, _LONGER = 0.2, 5, 3
@@ -152,7 +154,7 @@ def _proposed(
                 return None, spent
             few = min(few, max(_LEFT, _LEFT_PART * len(bonded)))
         # Where no load comes to in so short a time, contacts neither bear nor part: round-off decides.
-        if (undecided <= max(2, few) or (hurried and path.arrived)) and path.missed < _BALANCED:
+        if (undecided <= max(2, few) or (hurried and path.arrived)) and path.missed < _BALANCED and path.epsilon < _CENTRED:
             states = States(*path.states(), bonded)
             if states.key not in offered:
                 offered.add(states.key)

@@ -60,18 +60,20 @@ class ToeCorners:
 
 
 def stand_off(
-    vertex: np.ndarray, edge: np.ndarray, geometry: np.ndarray, vertices: np.ndarray, corners: ToeCorners, toes: str
-) -> np.ndarray:
+    vertex: np.ndarray, edge: np.ndarray, met: np.ndarray, geometry: np.ndarray, vertices: np.ndarray,
+    corners: ToeCorners, toes: str,
+) -> np.ndarray:  # fmt: skip
     """(n,) m by which the corner of each contact that is a toe's stands off its edge, when ``toes`` are `ROUNDED` or
     `FREE`; below zero for other contacts.
 
-    ``vertex``, ``edge`` and ``geometry`` (n, 7) as in `ContactSet`, springs at the corners; ``vertices`` (n_vertices, 2)
+    ``vertex``, ``edge``, the corner that is ``met`` and ``geometry`` (n, 7) as in `ContactSet`, springs at the corners; ``vertices`` (n_vertices, 2)
     m. Of those that are `FREE` are also corners that have come to touch what they were drawn apart from.
     """
     out = np.full(len(vertex), -1.0)
-    lone = geometry[:, 4] <= 0.0
+    # Two corners that meet are rounded already.
+    lone = (geometry[:, 4] <= 0.0) & (met < 0)
     near = np.maximum(_NEAR * corners.rounding, _NEAR_IN_SIZES * corners.size)
-    faces = np.flatnonzero(~lone & (geometry[:, 3] <= _TOUCHING * np.minimum(near[vertex], near[edge])))
+    faces = np.flatnonzero((geometry[:, 4] > 0.0) & (geometry[:, 3] <= _TOUCHING * np.minimum(near[vertex], near[edge])))
     if not lone.any():
         return out
     # Vertices that end a face which touches: those that stand on it, and those near which another's stand.

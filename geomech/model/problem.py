@@ -184,7 +184,7 @@ class GrowthSettings:
     min_increment: float = 1e-4
     join_distance: float = 0.5  # in units of the increment: nearer than that to a crack or surface, a tip joins it …
     join_length: float | None = None  # … or m; loads at which cracks join and cut through then have a limit
-    max_passes: int = 200  # growth passes at one load
+    max_passes: int = 200  # growth passes of a load step; a static load then waits for tips that still run
     correct: bool = True  # predict a step, look how it would go on, and bend it (second order in the increment)
     initiation: str = ""
     initiation_distance: float = 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.integrate import quad
 
 from geomech import ddm
 from geomech.coupling import Coupling
+from geomech.coupling.balance import _softest
 from geomech.coupling.by_mean_stress import SOFT, SOFTEST, ByMeanStress
 from geomech.model import (
     CONTACT,
@@ -162,3 +164,19 @@ def test_growth_never_stiffens_a_limited_block():
         felt.append(limit.T @ body.compliance() @ limit)
         more = np.linalg.eigvals(np.linalg.solve(elastic, felt[-1] - felt[-2])).real
         assert more.min() > -1e-9 * SOFTEST and more.max() > 0.1
+
+
+def test_of_blocks_that_chase_their_cracks_the_soft_ones_give_way():
+    """What one drags along gives way only where no soft one chases; where more of them do, all that are soft: which
+    neighbours they drag along, rounding decides."""
+    bodies = {
+        b: ddm.Body([BAR], edge_crack(ratio, np.inf, 0), ROCK)
+        for b, ratio in ((3, 0.2), (5, 0.75), (6, 0.75), (7, 0.8), (8, 0.3))
+    }
+    compliance = np.tile(ROCK.compliance(), (9, 1, 1))
+    now = SimpleNamespace(
+        bodies=bodies, by_mean_stress=ByMeanStress(), system=SimpleNamespace(compliance=compliance)
+    )
+    assert _softest(now, {3, 5, 8}) == {5} and _softest(now, {5}) == {5}
+    assert _softest(now, {3, 5, 6}) == {5, 6, 7}
+    assert _softest(now, {3, 8}) == {3, 8} and _softest(now, set()) == set()

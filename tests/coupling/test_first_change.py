@@ -1,13 +1,16 @@
 """Contacts and crack faces that change their state: at which load, held against closed forms of statics and
 friction."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from geomech.coupling import cycles
 from geomech.coupling.event_steps import EventSteps
+from geomech.coupling.first_change import FirstChange
+from geomech.coupling.watched import Change, Watched
 from geomech.dda import NotConverged, near_pairs
 from geomech.model import (
     Blocks,
@@ -175,6 +178,44 @@ def test_a_rush_of_changes_is_taken_together():
     assert len(times) == 40 and (np.diff(times) >= 0).all()
     assert np.ptp(np.diff(times[:15])) < 2e-3 * np.diff(times[:15]).mean()
     assert times[0] == pytest.approx(alone, rel=1e-6) and len(set(times.tolist())) < 40 and number < 40
+
+
+@dataclass(frozen=True)
+class Sticks:
+    """States of a pass in which, from ``since`` s on, a face sticks: of which nothing is to be seen before."""
+
+    time: float
+    since: float
+    key = numbering = ()
+
+    def changes(self, now, before):
+        sticks = self.time >= self.since > before.time
+        return [Change("stick", False, np.zeros(0, int), False, (0.0, 0.0), "sticks")] if sticks else []
+
+    def same_faces(self, other):
+        return True
+
+
+def test_in_a_rush_none_is_looked_for_nearer_than_changes_are_taken_together(monkeypatch):
+    """A change without a forecast is enclosed by halves; soon after others, no nearer to the last of them than they are
+    taken together."""
+    changes = FirstChange(("faces",))
+    monkeypatch.setattr(Watched, "of", lambda now, found, kinds: found)
+    now = SimpleNamespace(state=SimpleNamespace(time=1.0))
+    looked = []
+
+    def solve(time):
+        looked.append(time)
+        return Sticks(time, 1.0 + 1e-7)
+
+    def found_when(near):
+        looked.clear()
+        changes._seen, changes._last, changes._near = Sticks(1.0, 1.0 + 1e-7), 1.0, near
+        return changes.first(now, Sticks(2.0, 1.0 + 1e-7), solve, lambda time: time, 10.0).time
+
+    assert found_when(0.0) < 1.01
+    assert found_when(0.3) == pytest.approx(1.3) and min(looked) == pytest.approx(1.3)
+    assert found_when(3.0) == 2.0 and not looked
 
 
 def test_loads_of_tips_do_not_depend_on_what_else_is_watched():

@@ -15,6 +15,7 @@ from geomech.model import (
     DdmSettings,
     GrowthSettings,
     History,
+    InSituStress,
     JointLaw,
     Loads,
     Material,
@@ -81,6 +82,17 @@ def test_a_run_ends_where_there_is_none_and_names_what_moves(when):
     assert event.kind == "collapse"
     assert "'upper', 'lower' move" in event.detail or "'lower', 'upper' move" in event.detail
     assert len(seen) == (1 if when == "start" else 2)
+
+
+def test_a_run_ends_where_nothing_holds_the_blocks_under_the_in_situ_stress():
+    """As one that is to begin at rest: with the blocks that go, not with an error."""
+    stress = InSituStress.geostatic(2.02, 2500 * 9.81, 0.5)
+    problem = replace(column(History.constant([2.0, -9.81]), friction=0.1), in_situ=stress)
+    (only,) = cycles(problem)
+    (event,) = only.events
+    assert event.kind == "collapse" and event.detail.startswith("under the in-situ stress there is no equilibrium")
+    assert "'upper', 'lower' move" in event.detail or "'lower', 'upper' move" in event.detail
+    assert len(list(cycles(replace(problem, loads=Loads(gravity=WEIGHT))))) > 1
 
 
 def test_motion_that_is_given_is_given_once():

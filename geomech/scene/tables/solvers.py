@@ -152,7 +152,11 @@ class GrowthTable(Table):
         description="where a tip comes nearer to another crack than so many increments, all tips of its block take shorter ones, so many "
         "to what is left; 16 lets loads at which cracks join depend hardly on the increment (0: they do not)",
     )
-    max_passes: Annotated[int, Field(ge=1)] = Field(200, description="growth passes at one load")
+    max_passes: Annotated[int, Field(ge=1)] = Field(
+        200,
+        description="growth passes of a load step; at rest the load then waits for tips that still run, from where the step "
+        "has led, for up to 200 in all",
+    )
     correct: bool = Field(
         True, description="predict each step, then bend it towards where it would go on: paths of second order"
     )
