@@ -2,7 +2,7 @@
 
 Blocks slide and rotate along joints (discontinuous deformation analysis, `geomech.dda`), cracks grow through the rock
 bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` lets each drive the
-other. `load_scene`, `cycles`, `run`, `resume` and `factor_of_safety` are the whole pipeline; each solver also stands
+other. `load_scene`, `cycles`, `run`, `resume`, `factor_of_safety` and `safety_report` are the whole pipeline; each solver also stands
 alone.
 """
 
@@ -25,6 +25,7 @@ _PUBLIC = {
     "run": "geomech.pipeline",
     "resume": "geomech.resumption",
     "factor_of_safety": "geomech.pipeline",
+    "safety_report": "geomech.pipeline",
 }
 
 __all__ = ["__version__"] + list(_PUBLIC)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
@@ -203,16 +203,45 @@ def cracked_and_free(problem: Problem) -> list[str]:
     return [cracks.names[k] for k in sorted(set(cracks.crack[free].tolist()))]
 
 
-def factor_of_safety(scene, load_time: float | None = None, *, without_cracks: bool = False, **wishes):
+def factor_of_safety(
+    scene,
+    load_time: float | None = None,
+    *,
+    without_cracks: bool = False,
+    along: Sequence[str] | None = None,
+    divide: Mapping[str, float] | None = None,
+    **wishes,
+):
     """`geomech.dda.FactorOfSafety` of the blocks of ``scene``, by strength reduction under the loads of ``load_time`` s
-    (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: reduce, tolerance, watch …
+    (default: the scene's end). ``wishes`` as for `geomech.dda.factor_of_safety`: tolerance, watch …
+
+    ``along`` names the joint laws, or joints as they were drawn, whose strength is reduced (default: all). ``divide``
+    are partial factors on "cohesion", "friction" (tan φ) and "tension" by which all joints are divided before, as
+    design codes want it: the factor comes on top of them.
 
     Blocks are whole. ``without_cracks``: cracks inside blocks that can move are left out, so that what rock bridges
     hold counts as if they never broke: the answer is then a bound from above. Raises `CracksInBlocks` where there are
     such cracks and it is not said, SceneError on bad input, `geomech.dda.NothingToReduce` where there is no strength to
-    reduce, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
+    reduce or a name is not known, `geomech.dda.NotConverged` where the blocks do not stand whatever their joints hold.
     """
+    return safety_report(
+        scene, load_time, without_cracks=without_cracks, along=along, divide=divide, **wishes
+    ).found  # fmt: skip
+
+
+def safety_report(
+    scene,
+    load_time: float | None = None,
+    *,
+    without_cracks: bool = False,
+    along: Sequence[str] | None = None,
+    divide: Mapping[str, float] | None = None,
+    **wishes,
+):
+    """`geomech.report.of_safety.SafetyReport` of the same: its ``text()``, ``as_dict()`` and ``draw(path)``; the factor
+    itself is ``found``."""
     from . import dda
+    from .report.of_safety import SafetyReport
 
     problem = _loaded(scene).problem()
     cracks = cracked_and_free(problem)
@@ -223,9 +252,16 @@ def factor_of_safety(scene, load_time: float | None = None, *, without_cracks: b
             "hold there would count as if it could not break. `geomech run` breaks them: let the loads grow, or the "
             "strength of [joints] and the toughness of [materials] be divided by the factor that is to be proven"
         )
-    return dda.factor_of_safety(
+    factors = dda.PartialFactors.of(divide)
+    problem, reduced = dda.design_problem(problem, factors, along)
+    wishes.setdefault("reduce", reduced)
+    found = dda.factor_of_safety(
         problem.blocks, problem.materials, problem.joints, problem.loads, problem.dda, joint_index=problem.joint_index,
         load_time=problem.run.end_time if load_time is None else load_time, **wishes,
+    )  # fmt: skip
+    return SafetyReport(
+        problem, found, wishes["reduce"], factors, None if along is None else list(along), tuple(cracks),
+        **({"tolerance": wishes["tolerance"]} if "tolerance" in wishes else {}),
     )  # fmt: skip
 
 

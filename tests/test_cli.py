@@ -413,6 +413,41 @@ def test_safety_prints_trials_and_mechanism(tmp_path, capsys):
     assert main(["safety", str(scene), "--set", "joints.default.friction_angle_deg=0.0"]) == BAD_INPUT
 
 
+def test_safety_reports_what_an_engineer_signs(tmp_path, capsys):
+    scene, answer, picture = tmp_path / "slope.toml", tmp_path / "new" / "safety.json", tmp_path / "new" / "way.png"
+    scene.write_text(SLOPE)
+    asked = ["safety", str(scene), "--quiet", "--along", "default", "--divide", "cohesion=1.25", "friction=1.25"]
+    assert main([*asked, "--json", str(answer), "--picture", str(picture)]) == DONE
+    out, _ = capsys.readouterr()
+    factor = math.tan(math.radians(35)) / 0.5 / 1.25
+    assert f"factor of safety {factor:.4f} (equilibrium at 1.1" in out and "none at 1.1" in out
+    assert "cohesion by 1.25, tan φ by 1.25, tensile strength by 1; the design strength suffices" in out
+    assert "mechanism: sliding" in out and "towards -153°: slides" in out and "100%" in out
+    assert "blocks have moved by" in out and str(picture) in out
+    told = json.loads(answer.read_text())["scene"]
+    assert told["factor_of_safety"] == pytest.approx(factor, rel=1e-6) and told["mechanism"] == "sliding"
+    assert told["partial_factors"] == {"cohesion": 1.25, "friction": 1.25, "tension": 1.0}
+    assert told["joints"][0]["mobilised"] == pytest.approx(1.0, abs=3e-3) and told["along"] == ["default"]
+    assert told["moving"]["slab"]["kind"] == "slides" and told["search"]["largest_displacement_m"] > 0
+    assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("asked", "why"),
+    [
+        (["--divide", "frction=1.2"], "--divide: no strength 'frction' to divide; there are cohesion"),
+        (["--divide", "cohesion"], "--divide: a partial factor is given as cohesion=1.25"),
+        (["--along", "default", "bed"], "no joint 'bed' to reduce"),
+        (["--along", "bed"], "'default'"),
+    ],
+)
+def test_safety_refuses_what_it_does_not_know_by_name(asked, why, tmp_path, capsys):
+    scene = tmp_path / "slope.toml"
+    scene.write_text(SLOPE)
+    assert main(["safety", str(scene), "--quiet", *asked]) == BAD_INPUT
+    assert why in capsys.readouterr().err
+
+
 def with_crack(points: str) -> str:
     """The slope with a crack through its rock."""
     cracked = SLOPE.replace("[materials.rock]", f'cracks = [{{ name = "flaw", points = {points} }}]\n[materials.rock]')

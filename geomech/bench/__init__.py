@@ -22,6 +22,7 @@ TOPICS = {
     "many": "geomech.bench.many_cracks",
     "motion": "geomech.bench.motion_cost",
     "output": "geomech.bench.output_cost",
+    "safety": "geomech.bench.slope_factors",
     "schemes": "geomech.bench.block_schemes",
     "skips": "geomech.bench.skips",
     "sliding": "geomech.bench.sliding_slopes",

@@ -88,13 +88,14 @@ def drawn(text: str) -> Scene:
 
 
 def moved(scene: Scene, by: Isometry) -> Scene:
-    """``scene`` taken by an isometry: outlines, joints, monitors, gravity, water, base motion and in-situ stress.
+    """``scene`` taken by an isometry: outlines, joints, named edges, monitors, gravity, water, bolts, base motion and
+    in-situ stress.
 
     Raises ValueError where water, whose pressure grows with the depth along y, would be turned, and for tables that
     these scenes do not have.
     """
-    unknown = set(scene.get("loads", {})) - {"gravity_m_s2", "gravity_ramp_s", "water", "base", "in_situ"}
-    unknown |= set(scene["geometry"]) & {"model", "cracks", "edges", "traces", "joint_sets", "origin"}
+    unknown = set(scene.get("loads", {})) - {"gravity_m_s2", "gravity_ramp_s", "water", "bolts", "base", "in_situ"}
+    unknown |= set(scene["geometry"]) & {"model", "cracks", "traces", "joint_sets", "origin"}
     if unknown:
         raise ValueError(f"no isometry of {', '.join(sorted(unknown))} is known here")
     if not can_be_moved(scene, by):
@@ -105,8 +106,12 @@ def moved(scene: Scene, by: Isometry) -> Scene:
         zone["polygon"] = by.points(zone["polygon"])
     for joint in geometry.get("joints", ()):
         joint["points"] = by.points(joint["points"])
+    for edge in geometry.get("edges", ()):
+        edge["line"] = by.points(edge["line"])
     for monitor in out.get("monitors", ()):
         monitor["at"] = by.points(monitor["at"])
+    for bolt in loads.get("bolts", ()):
+        bolt.update((end, by.points(bolt[end])) for end in ("start", "end"))
     if "gravity_m_s2" in loads:
         loads["gravity_m_s2"] = by.vector(loads["gravity_m_s2"])
     if "base" in loads:

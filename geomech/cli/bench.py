@@ -28,8 +28,9 @@ def declare(verbs: Verbs) -> None:
     )
     bench.add_argument(
         "--seeds", metavar="FIRST-LAST",
-        help="of slopes and sliding: run these, one on each core, and leave rows and a picture in outputs/bench_slopes "
-             "or outputs/bench_sliding; seeds that have been run before, by the same program, are not run again",
+        help="of safety, slopes and sliding: run these, one on each core, and leave rows (and a picture) in "
+             "outputs/bench_safety, outputs/bench_slopes or outputs/bench_sliding; seeds that have been run before, by "
+             "the same program, are not run again",
     )  # fmt: skip
     bench.add_argument(
         "--invariance", action="store_true",
@@ -83,6 +84,10 @@ def _bench(options: argparse.Namespace) -> int:
             from ..bench.sliding_slopes import measure_many as measure_sliding
 
             found[name] = measure_sliding(seeds)
+        elif name == "safety" and seeds:
+            from ..bench.slope_factors import measure_many as measure_factors
+
+            found[name] = measure_factors(seeds)
         elif name in ("dda", "motion"):
             found[name] = topic(name)(options.quick, options.blocks)
         elif name == "debris":
@@ -107,8 +112,8 @@ def _seeds(options: argparse.Namespace) -> range:
     """The seeds that are asked for; none: the benchmark's own."""
     if options.seeds is None:
         return range(0)
-    if not {"slopes", "sliding"} & set(options.topics):
-        raise BadInput("--seeds belongs to slopes and sliding: geomech bench slopes --seeds 0-299")
+    if not {"safety", "slopes", "sliding"} & set(options.topics):
+        raise BadInput("--seeds belongs to safety, slopes and sliding: geomech bench slopes --seeds 0-299")
     first, _, last = options.seeds.partition("-")
     if not (first.isdecimal() and (last or first).isdecimal() and int(first) <= int(last or first)):
         raise BadInput(f"--seeds takes two numbers that ascend, as 0-299, not {options.seeds!r}")

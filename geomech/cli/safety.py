@@ -14,7 +14,9 @@ from .verb import DONE, BadInput, Verbs, add_verb, check_writable
 def declare(verbs: Verbs) -> None:
     safety = add_verb(
         verbs, "safety", _safety, "find by what factor the strength of joints may be divided before the blocks go",
-        "geomech safety slope.toml\ngeomech safety slope.toml --reduce bedding --tolerance 1e-3 --out safety.json",
+        "geomech safety slope.toml\n"
+        "geomech safety slope.toml --along bedding fault --json safety.json --picture mechanism.png\n"
+        "geomech safety slope.toml --divide cohesion=1.25 friction=1.25 tension=1.0",
     )  # fmt: skip
     safety.description += (
         " tan φ, cohesion and tensile strength of the joints are divided by F until no static equilibrium is left. "
@@ -23,8 +25,14 @@ def declare(verbs: Verbs) -> None:
     )
     scene_arguments(safety)
     safety.add_argument(
-        "--reduce", action="append", metavar="JOINT", help="weaken this joint only (may be repeated; default: all)"
-    )
+        "--along", "--reduce", nargs="+", action="extend", metavar="JOINT",
+        help="weaken these joints only: laws of [joints], or joints as they are drawn (default: all)",
+    )  # fmt: skip
+    safety.add_argument(
+        "--divide", nargs="+", action="extend", metavar="STRENGTH=X",
+        help="partial factors of a design code on cohesion, friction (tan φ) and tension (tensile strength) of all "
+             "joints, as cohesion=1.25: divided before, the factor comes on top of them",
+    )  # fmt: skip
     safety.add_argument(
         "--tolerance", type=float, default=2e-3, metavar="X", help="relative width of the bracket (2e-3)"
     )
@@ -34,46 +42,56 @@ def declare(verbs: Verbs) -> None:
         help="leave cracks inside blocks out, as if rock bridges never broke: the factor is then a bound from above",
     )  # fmt: skip
     safety.add_argument(
-        "--out", type=Path, metavar="FILE", help="write the trials and the answer to a JSON file as well"
+        "--json", "--out", type=Path, metavar="FILE", dest="out",
+        help="write all that is printed, and every trial, to a JSON file as well",
+    )  # fmt: skip
+    safety.add_argument(
+        "--picture", type=Path, metavar="FILE", help="draw the mechanism (PNG, PDF or SVG by the file's name)"
     )
     safety.add_argument("--quiet", action="store_true", help="say nothing of the trials while they are made")
 
 
 def _safety(options: argparse.Namespace) -> int:
     check_writable("--out", options.out)
-    from ..dda import NothingToReduce
+    check_writable("--picture", options.picture)
+    from ..dda import NothingToReduce, PartialFactors
     from ..output.summary import write_json
-    from ..pipeline import CracksInBlocks, cracked_and_free, factor_of_safety
+    from ..pipeline import CracksInBlocks, safety_report
     from ..scene import load_scene
 
+    try:
+        divide = PartialFactors.of(options.divide)
+    except NothingToReduce as error:
+        raise BadInput(f"--divide: {error}") from error
     if not options.quiet:
         tell_compiling()
     scenes = scenes_asked(load_scene(options.scene, options.overrides, None), options)
     say_warnings(scenes.values())
     told = {}
     for name, scene in scenes.items():
-        problem = scene.problem()
-        left_out = cracked_and_free(problem)
 
         def tell(trial) -> None:
             say(f"  F = {trial.factor:.4f}: {trial.reason}")
 
         try:
-            found = factor_of_safety(
-                scene, options.at, reduce=options.reduce, tolerance=options.tolerance,
+            report = safety_report(
+                scene, options.at, along=options.along, divide=divide, tolerance=options.tolerance,
                 watch=None if options.quiet else tell, without_cracks=options.without_cracks,
             )  # fmt: skip
         except CracksInBlocks as error:
             raise BadInput(f"{error}; --without-cracks gives a bound from above") from error
         except NothingToReduce as error:
             raise BadInput(str(error)) from error
-        title = "factor of the blocks without their cracks" if left_out else "factor of safety"
-        print(f"{problem.title or options.scene}" + (f", {name}" if name else "") + f"\n{found.table(title)}")
-        answer = told[name or "scene"] = found.as_dict(problem.blocks)
-        if left_out:
-            print(f"  {_caution(left_out)}")
+        title = "factor of the blocks without their cracks" if report.cracks else "factor of safety"
+        print(f"{report.problem.title or options.scene}" + (f", {name}" if name else "") + f"\n{report.text(title)}")
+        answer = told[name or "scene"] = report.as_dict()
+        if report.cracks:
+            print(f"  {_caution(report.cracks)}")
             answer["factor_without_cracks"], answer["factor_of_safety"] = answer["factor_of_safety"], None
-            answer["cracks_left_out"], answer["caution"] = left_out, _caution(left_out)
+            answer["cracks_left_out"], answer["caution"] = list(report.cracks), _caution(report.cracks)
+        if options.picture:
+            place = options.picture
+            print(f"  {report.draw(place.with_stem(f'{place.stem}_{name}') if name else place, title)}")
         sys.stdout.flush()
     if options.out:
         options.out.parent.mkdir(parents=True, exist_ok=True)
@@ -81,7 +99,7 @@ def _safety(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _caution(left_out: list[str]) -> str:
+def _caution(left_out: tuple[str, ...]) -> str:
     from ..model import counted
 
     return (

@@ -35,6 +35,7 @@ class Mechanism:
 
     def __init__(self) -> None:
         self.ratios: list[float] = []
+        self.ways: list[float] = []
         self.told = False
 
     def check(self, result: dda.StepResult, blocks: Blocks) -> tuple[int, str] | None:
@@ -42,13 +43,16 @@ class Mechanism:
         been out of balance for `STEPS` load steps and what is out of balance does not fade."""
         ratio = float(result.statistics["unbalanced_ratio"])
         if not ratio > HELD:
-            self.ratios, self.told = [], False
+            self.ratios, self.ways, self.told = [], [], False
             return None
         self.ratios = [*self.ratios[-STEPS:], ratio]
+        self.ways = [*self.ways[-STEPS:], float(np.hypot(*(result.state.vertices - blocks.vertices).T).max())]
         if self.told or len(self.ratios) <= STEPS or ratio < (1.0 - FADES) * self.ratios[0]:
             return None
         speed = np.hypot(*result.state.velocity[:, :2].T)
         speed[np.asarray(blocks.fixed, bool)] = 0.0
+        if self._stretches(result, blocks, int(np.argmax(speed))):
+            return None
         if ratio > FLYING and not _has_gone(int(np.argmax(speed)), result, blocks):
             return None
         self.told = True
@@ -60,6 +64,16 @@ class Mechanism:
             f"nothing holds {named}{f' and {others} more' if others > 0 else ''}: {100 * ratio:.2g} % of the forces on "
             "a block are left over, step after step"
         )
+
+
+    def _stretches(self, result: dda.StepResult, blocks: Blocks, block: int) -> bool:
+        """Whether a bolt that is being stretched will hold the ``block``: what it has gained so far, on the way so far,
+        will balance the rest before the block has gone `GONE` of its size."""
+        bolts = result.state.bolts
+        if not (bolts["installed"] & ~bolts["broken"]).any():
+            return False
+        gained, way = self.ratios[0] - self.ratios[-1], self.ways[-1] - self.ways[0]
+        return gained > 0 and way * self.ratios[-1] <= gained * GONE * float(np.sqrt(blocks.areas()[block]))
 
 
 def _has_gone(block: int, result: dda.StepResult, blocks: Blocks) -> bool:

@@ -9,12 +9,14 @@
 """
 
 from .basis import displacement_matrix
+from .design_strength import PartialFactors, design_problem
 from .elastic_range import ElasticRange
 from .energy import EnergyBudget, StepEnergy
 from .equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
 from .force_rows import EDGE_FORCE, POINT_FORCE
 from .in_situ import InSituState, NoInSituEquilibrium, in_situ_state
 from .loads import AppliedForces
+from .mobilised import MobilisedJoint, mobilised_joints
 from .moments import block_moments, mass_matrix
 from .running import run
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
@@ -37,9 +39,11 @@ __all__ = [
     "Equilibrium",
     "FactorOfSafety",
     "InSituState",
+    "MobilisedJoint",
     "NoInSituEquilibrium",
     "NotConverged",
     "NothingToReduce",
+    "PartialFactors",
     "StepEnergy",
     "StepLength",
     "StepResult",
@@ -48,10 +52,12 @@ __all__ = [
     "Work",
     "block_moments",
     "contact_resultants",
+    "design_problem",
     "displacement_matrix",
     "equilibrium",
     "factor_of_safety",
     "in_situ_state",
     "mass_matrix",
+    "mobilised_joints",
     "run",
 ]

@@ -11,6 +11,11 @@ the face: then the crack from its edge ends before the other, and what is left h
 pull. Sheared, the face holds Σ |Sᵢ| ≤ c ℓ + tan φ Σ Nᵢ wherever along it Σ Nᵢ acts, for what one end does not hold the
 other does. The corners one by one would hold three times the moment, and half the cohesion where one end slips before
 the other.
+
+What has no tensile strength opens without breaking anything: it may close again, with its cohesion, while states are
+sought, and has lost that only if it is open in the end. Bonds break one after the other as a load that grows evenly
+from the step's start would break them: where f(t) = f₀ + t (f₁ − f₀) is by how much a face is loaded beyond its
+strength, the one that comes first to f = 0.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import kept
+from ..compiled import kept, part
 from ..model import OPEN, SLIP, STICK
 
 #: Bonds of a CONTACT row: whole, and cracked from its edge, so that it holds only while it is pressed.
@@ -46,6 +51,12 @@ class BondedFaces:
     rows: np.ndarray
     arm: np.ndarray
     length: np.ndarray
+
+    @classmethod
+    def none(cls) -> BondedFaces:
+        """No faces."""
+        nothing = np.zeros(0)
+        return cls(np.zeros(1, np.int64), np.zeros(0, np.int64), nothing, nothing)
 
     @classmethod
     def of(
@@ -110,6 +121,72 @@ def _on_one_line(first, last, swapped, geometry):
     return face, along
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _when(before, after, strength):
+    """At which part of the step something is loaded to its ``strength`` (N) that is beyond it by ``before`` as the step
+    begins and ``after`` at its end; below zero where it is beyond it already."""
+    if before > 0.0:
+        return -before / (before + strength)
+    return -before / max(after - before, 1e-300)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def first_to_break(
+    start, rows, arm, length, forces, normal0, shear0, state, bonded, new_bonded, peak, hold, cohesion, tension
+):  # fmt: skip
+    """(n,) at which part of the step each bond that ``new_bonded`` calls broken has come to its strength; inf for others.
+    Arguments as for `check_faces`; without faces ``length`` is empty."""
+    n = state.shape[0]
+    out, done = np.full(n, np.inf), np.zeros(n, np.bool_)
+    for f in range(length.shape[0]):
+        some, intact = False, True
+        for k in range(start[f], start[f + 1]):
+            intact &= (bonded[rows[k]] == WHOLE or bonded[rows[k]] == CRACKED) and state[rows[k]] == STICK
+            some |= new_bonded[rows[k]] != bonded[rows[k]]
+        if not (intact and some):
+            continue
+        parts, slides = _times_of_face(
+            f, start, rows, arm, length, forces, normal0, shear0, bonded, peak, hold, cohesion, tension
+        )
+        for k in range(start[f], start[f + 1]):
+            out[rows[k]], done[rows[k]] = min(parts, slides), True
+    for c in range(n):
+        if done[c] or new_bonded[c] == bonded[c]:
+            continue
+        pull = tension[c] if bonded[c] == WHOLE else 0.0
+        if -forces[c, 0] > pull:
+            out[c] = _when(-normal0[c] - pull, -forces[c, 0] - pull, pull)
+        firm = hold[c] + cohesion[c]
+        was = abs(shear0[c]) - max(0.0, peak[c] * normal0[c] + firm)
+        now = abs(forces[c, 1]) - max(0.0, peak[c] * forces[c, 0] + firm)
+        if now > 0.0:
+            out[c] = min(out[c], _when(was, now, max(0.0, peak[c] * normal0[c] + firm)))
+    return out
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _times_of_face(f, start, rows, arm, length, forces, normal0, shear0, bonded, peak, hold, cohesion, tension):
+    """At which parts of the step the whole face ``f`` comes to its strength in tension and in shear; inf where it does
+    not."""
+    pull = moment = pull0 = moment0 = strength = drawn = drawn0 = capacity = capacity0 = 0.0
+    for k in range(start[f], start[f + 1]):
+        c = rows[k]
+        pull, pull0 = pull - forces[c, 0], pull0 - normal0[c]
+        moment, moment0 = moment - forces[c, 0] * arm[k], moment0 - normal0[c] * arm[k]
+        drawn, drawn0 = drawn + abs(forces[c, 1]), drawn0 + abs(shear0[c])
+        capacity += peak[c] * forces[c, 0] + hold[c] + cohesion[c]
+        capacity0 += peak[c] * normal0[c] + hold[c] + cohesion[c]
+        strength += tension[c] if bonded[c] == WHOLE else 0.0
+    fibre, fibre0 = pull + 6.0 * abs(moment) / length[f], pull0 + 6.0 * abs(moment0) / length[f]
+    capacity, capacity0 = max(0.0, capacity), max(0.0, capacity0)
+    parts = slides = np.inf
+    if strength > 0.0 and fibre > strength:
+        parts = _when(fibre0 - strength, fibre - strength, strength)
+    if drawn > capacity:
+        slides = _when(drawn0 - capacity0, drawn - capacity, capacity0)
+    return parts, slides
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def check_faces(
     start,
@@ -117,6 +194,8 @@ def check_faces(
     arm,
     length,
     forces,
+    normal0,
+    shear0,
     state,
     bonded,
     normal,
@@ -133,10 +212,10 @@ def check_faces(
     new_bonded,
     violation,
 ):
-    """Put right, in place, what `check_states` calls for contacts whose whole face is bonded; other arguments as
-    there."""
+    """Put right, in place, what `check_states` calls for contacts whose whole face is bonded; ``normal0`` and ``shear0``
+    (n,) N as the step begins, other arguments as there."""
     for f in range(length.shape[0]):
-        intact, out, pulls = True, False, False
+        intact, out, pulls, opened = True, False, False, False
         pull = moment = strength = drawn = sheared = capacity = firm = least = 0.0
         for k in range(start[f], start[f + 1]):
             c = rows[k]
@@ -153,8 +232,9 @@ def check_faces(
             least = max(least, normal[c] * slack[c])
             sheared = max(sheared, 1e-3 * shear[c] * slack[c])
             pulls = pulls or -force > normal[c] * slack[c]
+            opened = opened or state[c] == OPEN
             out = out or state[c] != STICK
-        if not intact:
+        if not intact or (opened and strength == 0.0):
             continue
         if out:
             # A way of iterating that knows nothing of faces has let go of what they hold.
@@ -169,6 +249,19 @@ def check_faces(
         parts = strength > 0.0 and fibre > 1e-9 * strength + 6.0 * least
         capacity = max(0.0, capacity)
         slides = drawn - capacity > 1e-9 * capacity + sheared
+        when = 1.0
+        if slides:
+            in_tension, in_shear = _times_of_face(
+                f, start, rows, arm, length, forces, normal0, shear0, bonded, peak, hold, cohesion, tension
+            )
+            parts = parts and in_tension <= in_shear
+            when = min(max(in_shear, 0.0), 1.0)
+            opens = False
+            for k in range(start[f], start[f + 1]):
+                c = rows[k]
+                opens = opens or normal0[c] + when * (forces[c, 0] - normal0[c]) <= 0.0
+            # Before its corners would open it may slide, and then they need not.
+            pulls = pulls and (strength > 0.0 or opens)
         for k in range(start[f], start[f + 1]):
             c = rows[k]
             if strength == 0.0 and pulls:
@@ -184,7 +277,10 @@ def check_faces(
                 violation[c] = drawn - capacity
                 new_bonded[c] = 2 if keeps[c] else 0
             if new_bonded[c] == 0 or new_bonded[c] == 2:
-                if forces[c, 0] < 0.0:
-                    new_state[c], new_bonded[c] = OPEN, 0
-                elif slides and (keeps[c] or abs(forces[c, 1]) > friction[c] * forces[c, 0]):
+                if parts:
+                    when = 1.0
+                pressed = normal0[c] + when * (forces[c, 0] - normal0[c])
+                if pressed < 0.0:
+                    new_state[c], new_bonded[c] = OPEN, (0 if parts else new_bonded[c])
+                elif slides and (keeps[c] or abs(forces[c, 1]) > friction[c] * pressed):
                     new_state[c], new_direction[c] = SLIP, np.sign(forces[c, 1])

@@ -147,7 +147,7 @@ class CentralPath:
         self._rise = np.zeros(len(some))
         slides = found.state[some] == SLIP
         friction = np.where(slides, springs.friction[some], springs.peak[some])
-        firm = np.where(slides, springs.sliding[some], springs.hold[some] + slipped[some] * springs.cohesion[some])
+        firm = np.where(slides, springs.sliding[some], springs.hold[some] + np.where(slipped, springs.cohesion, 0.0)[some])
         self._rough = (friction > 0.0) | (firm > 0.0)
         self._mu, self._base = np.where(self._rough, friction, 1.0), np.where(self._rough, firm, 0.0)
 

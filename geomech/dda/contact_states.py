@@ -112,7 +112,8 @@ def check_states(
             continue
         pull = tension[c] if bonded[c] == 1 else 0.0
         if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c]:
-            new_state[c], new_bonded[c] = OPEN, 0
+            # What holds no pull opens without breaking: it may close again before the states are found.
+            new_state[c], new_bonded[c] = OPEN, (0 if pull > 0.0 else bonded[c])
             violation[c] = normal[c] * abs(gap)
         elif state[c] == STICK:
             strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))

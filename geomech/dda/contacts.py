@@ -20,6 +20,7 @@ from .far_sides import from_outside
 from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
+from .toes import SHARP, ToeCorners, stand_off
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -94,6 +95,11 @@ class ContactFinder:
         self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
         #: (n_vertices,) m: the lengths over which corners are rounded.
         self.rounding = np.minimum(self._rounding, self._longest)
+        #: Whether toes hold: `SHARP`, `ROUNDED` or `FREE` (`toes`).
+        self.toes = SHARP
+        self._corners = ToeCorners(
+            self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
+        )
         self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
         self.widths = widths(blocks.vertices, self._next, self._start, self._area)
         self.take_out(None)
@@ -174,6 +180,9 @@ class ContactFinder:
         up = up[old["tilt"][parent[up]] != 0.0] if len(up) else up
         remembered["lift"][up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
         vertex, edge, corner = (column.copy() for column in table[:, :3].T)
+        if self.toes != SHARP:
+            off = stand_off(vertex, edge, corner, geometry, vertices, self._corners, self.toes)
+            remembered["lift"] = np.where(off >= 0.0, -off, remembered["lift"])
         keep = np.ones(len(vertex), bool)
         if nodes is not None:
             for name in ("normal", "shear") if len(old) else ():
@@ -457,6 +466,11 @@ class ContactFinder:
         start = vertices[edge]
         along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
         return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
+
+    def toes_among(self, found: ContactSet, vertices: np.ndarray) -> np.ndarray:
+        """(n,) m by which toes among the contacts ``found`` stand off; below zero for other contacts."""
+        parts = found.vertex, found.edge, found.corner, found.geometry
+        return stand_off(*parts, vertices, self._corners, self.toes)
 
     def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""

@@ -99,6 +99,8 @@ class CurvedJoints:
         out = lift * direction[at] < 0
         share = np.where(out, lift / shear, 0.0)
         start = start + share * (found.shear[at] - direction[at] * sliding)
+        # … and on the way back the motion along the edge, of which the unknowns have not what is given.
+        start = start - np.where(lift * direction[at] > 0, lift * found.stretch[at], 0.0)
         stiff = stiff / (1.0 - stiff * share * direction[at] * friction)
 
         new = {

@@ -4,7 +4,8 @@ A static step, which carries no velocity, solves (2M/dt² + K) d = F: of what is
 part 2M d/dt². Small dt moves blocks gently until contacts have found one another, large dt is Newton's method for
 statics. dt therefore starts at some transits of sound through a block and grows from step to step (pseudo-transient
 continuation: Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is as small as asked for. Where
-nothing holds the blocks it never is, and they move on: a collapse.
+nothing holds the blocks it never is, and they move on: a collapse. So is what comes to rest only after it has moved
+farther than strains, joints and bolts explain (`displacement_limit`): a block that slides until it lands on a floor.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model import OPEN, Loads, State
+from .displacement_limit import DisplacementLimit
 from .moments import block_moments
 from .step import CrackResponse, NotConverged, StepResult
 from .system import BlockSystem
@@ -58,6 +60,8 @@ class Equilibrium:
     collapsed   True: there is no equilibrium within reach; ``moving`` says which blocks go, the fastest first
     reason      one sentence
     history     RELAXATION_STEP rows, one a step
+    moved       (n_blocks,) m by which the farthest vertex of each block has moved; of blocks that were drawn apart from
+                all others since they have come to rest on one
     result      the final StepResult: contact forces and what else acted (None if no step was made)
     """
 
@@ -67,6 +71,7 @@ class Equilibrium:
     moving: tuple[int, ...]
     reason: str
     history: np.ndarray
+    moved: np.ndarray
     result: StepResult | None
 
 
@@ -81,13 +86,16 @@ def equilibrium(
     reach: float | None = None,
     crack: CrackResponse | None = None,
     watch: Callable[[StepResult, np.void], None] | None = None,
+    limit: DisplacementLimit | None = None,
 ) -> Equilibrium:
     """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default:
     state.time).
 
-    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. A block that has gone
-    ``reach`` m and is out of balance still is taken to have collapsed; by default that is a tenth of the blocks'
-    extent, or a twentieth of the block's own size once the unbalanced force has stopped falling. ``watch`` sees every
+    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. Blocks that move farther than
+    ``limit`` allows (by default, one that begins here) have collapsed, and are followed to where they come to rest if
+    that is not far. A block that has gone ``reach`` m and is out of balance still is taken to have collapsed, too; by
+    default that is a tenth of the blocks' extent, or a twentieth of the block's own size once the unbalanced force has
+    stopped falling; with a ``reach`` of the caller's there is no other limit. ``watch`` sees every
     step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in
     the answer.
     """
@@ -99,7 +107,8 @@ def equilibrium(
     begin = state = replace(state, velocity=np.zeros_like(state.velocity), acceleration=None)
     free = np.flatnonzero(~blocks.fixed)
     if not len(free):
-        return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), None)
+        nothing = np.zeros(blocks.n_blocks)
+        return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), nothing, None)
     judged = reach is None
     size = np.sqrt(blocks.areas())
     flights = 0
@@ -108,25 +117,28 @@ def equilibrium(
     history: list[np.void] = []
     result = None
     travelled = np.zeros(blocks.n_blocks)
+    limit = limit or DisplacementLimit(static, begin, loads, time)
+    gone: tuple[int, ...] = ()
 
     def answer(converged: bool, collapsed: bool, reason: str) -> Equilibrium:
-        moving: tuple[int, ...] = ()
-        if not converged and result is not None:
+        moving = gone
+        if not converged and not gone and result is not None:
             speed = np.hypot(*result.state.velocity[:, :2].T)
             order = np.argsort(-speed, kind="stable")
             moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
+        if not converged and moving:
             named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
             reason += f"; {named}{' and others' if len(moving) > 5 else ''} move{'s' if len(moving) == 1 else ''}"
         rest = replace(state, time=begin.time, velocity=np.zeros_like(state.velocity))
         rows = np.array(history, RELAXATION_STEP) if history else np.empty(0, RELAXATION_STEP)
         log.info("static equilibrium: %s (%d steps)", reason, len(rows))
-        return Equilibrium(rest, converged, collapsed, moving, reason, rows, result)
+        return Equilibrium(rest, converged, collapsed, moving, reason, rows, limit.moved(state.vertices), result)
 
     for _ in range(max_steps):
         try:
             result = static.step(state, loads, dt, crack, time, hasty=True)
         except NotConverged as failure:
-            return answer(False, False, str(failure))
+            return answer(False, bool(gone), str(failure))
         # Pseudo-time is no time: what the loads do at their times waits.
         state = replace(result.state, time=begin.time)
         statistics = result.statistics
@@ -146,6 +158,12 @@ def equilibrium(
         history.append(row)
         if watch is not None:
             watch(result, row)
+        limit.follow(result)
+        if judged and not gone:
+            gone = tuple(limit.beyond(state).tolist())
+        if unbalanced <= tolerance and gone:
+            far = limit.moved(state.vertices)[list(gone)].max()
+            return answer(False, True, f"no equilibrium where the blocks are: they come to rest {far:.3g} m farther")
         if unbalanced <= tolerance:
             return answer(True, False, f"unbalanced force {unbalanced:.2g} of the mean force")
         travelled += moved
@@ -163,6 +181,8 @@ def equilibrium(
                 )  # fmt: skip
         moves_far = statistics["limit_share"] > _NEARLY
         dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
+    if gone:
+        return answer(False, True, f"no equilibrium: blocks have moved {limit.moved(state.vertices).max():.3g} m and go on")
     return answer(False, False, f"unbalanced force {history[-1]['unbalanced']:.2g} after {max_steps} steps")
 
 

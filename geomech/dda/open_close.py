@@ -15,7 +15,9 @@ lines within an iteration, and the iteration goes on until lines and laws agree 
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 
@@ -32,6 +34,8 @@ from .lagged_friction import LaggedFriction
 from .patches import settled_in_patch
 from .rounded_laws import RoundedLaws
 from .step_equations import Answer, Equations, Settled, States, Unsettled
+
+log = logging.getLogger(__name__)
 
 #: Which of the contacts that are wrong are switched: all, those of each block that are half as wrong as its worst, its
 #: worst, the first.
@@ -92,6 +96,9 @@ _PATIENCE, _CHANGE, _CLOSER, _SAME = 4, 2e-2, 0.2, 1e-7
 _CONVEX_CHANGE, _NEARER = 5e-3, 0.5
 #: Iterations to go from such states to the end.
 _FINISH = 8
+#: Bonds of many contacts that are given back have this part of the iterations to settle: few do where loads come by and
+#: by, hundreds where the weight of a glued slope is put on at once.
+_BACK = 2
 
 
 def hurries(patient: bool, statics: bool, n: int) -> bool:
@@ -253,8 +260,48 @@ def settle(
     take hundreds: a shorter step takes less, of `MANY` in motion at the first sign. ``patches``: few contacts that stay
     wrong are settled by themselves (`patches`).
 
+    Bonds break where all else is right, and those first that a load growing from the step's start breaks first. Where
+    there are many contacts this takes long: those that open lose their bonds at once then, all that are overloaded by
+    half as much as the worst go together, and what is closed in the end gets its bond back (`_given_back`).
+
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
+    problem = pattern, matrix, right
+    step = vectors, springs, gap, slack, max_iterations, curved, statics, patient, patches, expected
+    few = len(found) <= _FEW
+    settled = _settled(problem, found, step, few)
+    return settled if few else _given_back(problem, found, step, settled)
+
+
+def _given_back(problem: tuple, found: ContactSet, step: tuple, settled: Settled) -> Settled:
+    """The step ``settled`` with the bonds that it has taken from contacts which are closed in the end; as it is where
+    that does not settle soon. Arguments as for `_settled`."""
+    began = found.bonded if found.tried is None else found.tried[2]
+    iterations = settled.iterations
+    back = np.zeros(len(found), bool)
+    while True:
+        lost = (began > 0) & (settled.bonded == 0) & (settled.state != OPEN) & ~back
+        if not lost.any():
+            return replace(settled, iterations=iterations)
+        back |= lost
+        tried = (
+            np.where(lost, STICK, settled.state), np.where(lost, 0.0, settled.direction),
+            np.where(lost, began, settled.bonded),
+        )  # fmt: skip
+        most = step[4] // _BACK
+        try:
+            settled = _settled(problem, replace(found, tried=tried), (*step[:4], most, *step[5:7], False, *step[8:]), True)
+        except Unsettled as failure:
+            log.debug("%d bonds that gave way on the way to the states are not given back: %s", lost.sum(), failure)
+            return replace(settled, iterations=iterations + most)
+        iterations += settled.iterations
+
+
+def _settled(problem: tuple, found: ContactSet, step: tuple, in_order: bool) -> Settled:
+    """As `settle`, of the ``problem`` (pattern, matrix, right) and the ``step`` (its other arguments); bonds break
+    ``in_order``, or many at once."""
+    pattern, matrix, right = problem
+    vectors, springs, gap, slack, max_iterations, curved, statics, patient, patches, expected = step
     equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics, expected)
     states = States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
     normal_force, slip = found.normal, np.zeros(len(found))
@@ -286,14 +333,19 @@ def settle(
         if not wrong.any():
             continue
         number = int(wrong.sum())
-        bonds = wrong & (states.bonded > 0)
+        if not in_order:
+            answer = replace(answer, called=answer.called.without_open_bonds())
+        bonds = wrong & (states.bonded != answer.called.bonded)
         if bonds.sum() == number:
-            # Bonds are lost for good: none breaks before all else is right, and the most strained break first.
-            wrong = bonds & _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 0.5)
+            # None breaks before all else is right, and those that give way first break first.
+            if in_order:
+                wrong = equations.first_bonds(states, answer, bonds)
+            else:
+                wrong = bonds & _worst_of_their_blocks(answer.violation, found.block, found.other, pattern.order, 0.5)
             states, caution, fewest, tries = states.switched(wrong, answer.called), _ALL, np.inf, 0
             # What was tried knew of bonds that are gone, and what is left has time of its own: there are fewer bonds
             # each time.
-            slower, max_iterations = None, max(max_iterations, iteration + most)
+            slower, max_iterations = None, max(max_iterations, iteration + (most if few or not in_order else _FINISH))
             continue
         wrong &= ~bonds
         closing = wrong & (states.state == OPEN) & (answer.called.state == STICK)
@@ -313,9 +365,10 @@ def settle(
             lately, joint = [], 0
         else:
             lately = [*lately[-_LATELY:], wrong]
-            if (stuck or joint) and joint < _TOGETHER:
+            loose = np.any(lately, axis=0) & (states.bonded == 0)
+            if (stuck or joint) and joint < _TOGETHER and loose.any():
                 joint += 1
-                proposal, spent = equations.together(np.any(lately, axis=0), states, answer, left)
+                proposal, spent = equations.together(loose, states.switched(wrong & ~loose, called), answer, left)
                 left -= spent
                 if proposal is not None and proposal.key not in seen:
                     states = proposal
@@ -345,10 +398,11 @@ def settle(
         elif tired or (stuck and not (few and path is None)):
             proposal = None
             if slower is None:
-                if path is None or not np.array_equal(path.bonded, states.bonded):
+                bonded = states.without_open_bonds().bonded
+                if path is None or not np.array_equal(path.bonded, bonded):
                     path = CentralPath(
-                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, states.bonded, normal_force,
-                        equations.room, expected,
+                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, bonded,
+                        normal_force, equations.room, expected,
                     )
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import SLIP
+from ..model import OPEN, SLIP
 from . import assembly
 from .block_solver import RESIDUAL
-from .bonded_faces import check_faces
+from .bonded_faces import BondedFaces, check_faces, first_to_break
 from .contact_set import ContactSet
 from .contact_springs import Springs
 from .contact_states import check_states, contact_forces
@@ -20,6 +20,8 @@ from .joint_states import clusters, settled_together, with_neighbours
 _JOINED = 80
 #: What solutions with residuals below this part of the forces tell wrong states is not asked for more digits.
 _ROUGHLY = 1e-8
+#: Bonds that come to their strengths within this part of the same load break at once.
+_AT_ONCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +71,10 @@ class States:
     @property
     def key(self) -> bytes:
         return self.state.tobytes() + self.direction.tobytes() + self.bonded.tobytes()
+
+    def without_open_bonds(self) -> States:
+        """These states, without the bonds that are open."""
+        return States(self.state, self.direction, np.where(self.state == OPEN, 0, self.bonded))
 
     def switched(self, wrong: np.ndarray, to: States) -> States:
         """These states, and where ``wrong`` those of ``to``."""
@@ -210,24 +216,46 @@ class Equations:
         )  # fmt: skip
         if (faces := found.faces) is not None:
             check_faces(
-                faces.start, faces.rows, faces.arm, faces.length, forces, state, bonded, known.normal, known.shear,
-                known.friction,
+                faces.start, faces.rows, faces.arm, faces.length, forces, found.normal, found.shear, state, bonded,
+                known.normal, known.shear, known.friction,
                 known.peak, known.hold, known.cohesion, known.tension, known.keeps, self.slack, *called, violation,
             )  # fmt: skip
         return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
 
+    def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:
+        """(n,) True for those of the bonds ``which`` (n,) bool that break first on either of their blocks' faces, as a
+        load that grows evenly over the step would break them."""
+        found, springs = self.found, answer.springs
+        faces = BondedFaces.none() if found.faces is None else found.faces
+        when = first_to_break(
+            faces.start, faces.rows, faces.arm, faces.length, answer.forces, found.normal, found.shear, states.state,
+            states.bonded, answer.called.bonded, springs.peak, springs.hold, springs.cohesion, springs.tension,
+        )  # fmt: skip
+        when[~which] = np.inf
+        first = np.full(len(self.pattern.order), np.inf)
+        for blocks in (found.block, found.other):
+            np.minimum.at(first, blocks, when)
+        first[self.pattern.order < 0] = np.inf
+        least = np.minimum(first[found.block], first[found.other])
+        return which & (when <= least + _AT_ONCE * np.abs(least))
+
     def settled(self, states: States, answer: Answer, iterations: int) -> Settled:
-        """The ``answer`` of consistent ``states``."""
+        """The ``answer`` of consistent ``states``; bonds that hold no pull are lost where they are open by more than gaps
+        are known to: a face that opens by a micrometre because of how springs share its load, and closes as that
+        grows, is whole."""
         forces, springs = answer.forces, answer.springs
+        known = np.maximum(self.slack, self.found.precision)
+        open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > known)
         lifted = np.zeros(len(forces))
         slip = plastic_slip(forces, states.state, self.found.shear, springs)
         if self.curved is not None:
-            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, forces[:, 3])
+            along = forces[:, 3] + self.found.stretch
+            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, along)
         return Settled(
             unknowns=answer.unknowns.reshape(-1, 6),
             state=states.state,
             direction=states.direction,
-            bonded=states.bonded,
+            bonded=np.where(open_bonds, 0, states.bonded),
             normal_force=forces[:, 0],
             shear_force=forces[:, 1],
             gap=forces[:, 2] + springs.lift * forces[:, 3] - lifted - (answer.gap - self.found.gap),

@@ -40,6 +40,8 @@ _FARTHER = 6
 _REDIRECTED = 3
 #: … by more than this angle (cosine).
 _OTHER_WAY = 0.95
+#: Half the diagonal of the domain: no limit for what blocks that hold together move.
+_ANYWHERE = 1.0
 #: Multipliers are not asked to close gaps below this many times that round-off.
 _FINEST = 10.0
 
@@ -166,7 +168,17 @@ class BlockSystem:
     def in_statics(self) -> BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
         settings = replace(self.settings, dynamic_factor=0.0)
-        return BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings, self.work)
+        out = BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings, self.work)
+        out.finder.toes = self.finder.toes
+        return out
+
+    def with_joints(self, joints: Sequence[JointLaw]) -> BlockSystem:
+        """The same blocks with other laws in the places of those that its joints have, in steps as long as they are asked
+        for."""
+        settings = replace(self.settings, max_displacement_ratio=_ANYWHERE)
+        out = BlockSystem(self.blocks, self.materials, joints, self._joint_index, settings, self.work)
+        out.finder.toes = self.finder.toes
+        return out
 
     def removed(self, loads: Loads, time: float) -> np.ndarray | None:
         """(n_blocks,) True for blocks that ``loads`` have taken out by ``time``; None before any is."""
@@ -371,7 +383,9 @@ class BlockSystem:
 
     def _near(self, state, vertices, carried, moments, dt, gravity) -> Windows:
         """Where a step of ``dt`` looks for contacts."""
-        lift = float(np.abs(state.contacts["lift"]).max(initial=0.0))
+        rows = state.contacts
+        # What has yet to come nearer presses nowhere.
+        lift = float(np.abs(rows["lift"][(rows["state"] != OPEN) | (rows["lift"] > 0.0)]).max(initial=0.0))
         return self.limits.windows(vertices, carried, moments, dt, gravity, lift)
 
     def _standing(self, state: State, vertices: np.ndarray) -> Windows:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from geomech import dda
 from geomech.coupling import cycles
+from geomech.coupling.mechanism import Mechanism
 from geomech.model import (
+    GROUND,
     Blocks,
+    Bolt,
     Cracks,
     DdaSettings,
     History,
@@ -19,6 +24,7 @@ from geomech.model import (
     Material,
     Problem,
     RunSettings,
+    State,
 )
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -95,3 +101,24 @@ def test_what_falls_may_still_land(floor, told):
     problem = replace(problem, blocks=blocks, run=RunSettings(end_time=1.5, stop_at=("mechanism",)))
     found = [event for cycle in cycles(problem) for event in cycle.events]
     assert [event.kind for event in found] == ["mechanism"] * told
+
+
+@pytest.mark.parametrize("time_step", [1e-2, 1e-3])
+@pytest.mark.parametrize(("stiffness", "yield_force", "holds"), [(1e6, math.inf, True), (1e3, math.inf, False)])
+def test_a_bolt_that_is_being_stretched_holds_whatever_the_step(time_step, stiffness, yield_force, holds):
+    """What a soft bolt has gained over some steps tells how far its block will go: short steps stretch it by little."""
+    slope = math.radians(40)
+    turn = np.array([[math.cos(slope), math.sin(slope)], [-math.sin(slope), math.cos(slope)]])
+    polygons = [np.array([[-6, -3], [8, -3], [8, 0], [-6, 0]]), np.array([[0, 0], [2, 0], [2, 1], [0, 1]])]
+    blocks = Blocks.from_polygons([p @ turn for p in polygons], fixed=[True, False])
+    bolt = Bolt(1, (0.4447, 1.0258), GROUND, (3.967, 0.7177), stiffness, yield_force=yield_force)
+    loads = Loads(gravity=History.constant([0.0, -9.81]), bolts=(bolt,))
+    system = dda.BlockSystem(
+        blocks, [Material("rock", 20e9, 0.25, density=2600.0)], [JointLaw("plane", math.radians(30))]
+    )
+    state, mechanism, told = State.at_rest(blocks), Mechanism(), None
+    for _ in range(12):
+        result = system.step(state, loads, time_step)
+        state = result.state
+        told = told or mechanism.check(result, blocks)
+    assert (told is None) == holds

@@ -238,7 +238,11 @@ class BoltTable(Table):
         None, description="length about a joint over which a grouted bar strains, m"
     )
     pretension_n_per_m: NotNegative = Field(0.0, description="force at installation, N/m")
-    yield_force_n_per_m: Positive | None = Field(None, description="force at which it yields, N/m (unset: it does not)")
+    yield_force_n_per_m: Positive | None = Field(
+        None,
+        description="force at which it yields, N/m (unset: it does not, and `geomech safety` counts what it takes while "
+        "blocks stay where they are)",
+    )
     breaking_strain: Positive | None = Field(None, description="strain at which it breaks (unset: it does not)")
     shear_stiffness_n_per_m: NotNegative = Field(0.0, description="stiffness across its axis (dowel), N/m")
     shear_strength_n_per_m: Positive | None = Field(

@@ -73,7 +73,9 @@ class JointTable(Table):
         0.0, description="friction angle, degrees: that of the peak, with jrc the residual one"
     )
     cohesion_pa: NotNegative = Field(
-        0.0, description="cohesion, Pa, until the joint slips or parts: its faces hold c l + N tan φ"
+        0.0,
+        description="cohesion, Pa, until the joint slips or parts: its faces hold c l + N tan φ (`geomech safety` keeps it "
+        "on faces that slip before others do, unless a residual strength is given)",
     )
     tensile_strength_pa: NotNegative = Field(
         0.0,

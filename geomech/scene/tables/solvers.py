@@ -37,7 +37,8 @@ class DdaTable(Table):
     equilibrium: Literal["", "start", "loads"] = Field(
         "",
         description='when static equilibrium is sought, whatever the time step: "" never, "start" before the run begins, '
-        '"loads" at every load of a static run too; a run ends where there is none',
+        '"loads" at every load of a static run too; a run ends where there is none, or only where blocks have moved by more '
+        "than a two-thousandth of their size beside what elasticity explains",
     )
     unbalanced_tolerance: Positive = Field(
         1e-6, description="equilibrium: largest unbalanced force on a block, over the mean force on blocks"

@@ -1,0 +1,262 @@
+"""Factors of safety where blocks would move to find their equilibrium, toes stick in corners, bonds break one after the
+other and anchors have to be stretched: against limit equilibrium, mirrored and turned."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from block_problems import GRAVITY, WEIGHT, rectangle, turned
+
+from geomech import dda
+from geomech.model import (
+    GROUND,
+    BlockMotion,
+    Blocks,
+    Bolt,
+    DdaSettings,
+    EdgeTraction,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    State,
+)
+from geomech.reference import rock_slopes
+
+ROCK = Material("rock", 20e9, 0.25, density=2600.0)
+GEOMETRY = Path(__file__).parents[2] / "geometry"
+
+
+def drawn(polygons, turn: float = 0.0, mirror: bool = False) -> tuple[Blocks, Loads]:
+    """The first of the ``polygons`` fixed, all of them turned (rad) with the weight, or mirrored."""
+    c, s = math.cos(turn), math.sin(turn)
+    moved = []
+    for polygon in polygons:
+        points = np.asarray(polygon, float)
+        points = points[::-1] * [-1.0, 1.0] if mirror else points
+        moved.append(points @ np.array([[c, s], [-s, c]]))
+    blocks = Blocks.from_polygons(moved, fixed=[True] + [False] * (len(polygons) - 1))
+    return blocks, Loads(gravity=History.constant([s * GRAVITY, -c * GRAVITY]))
+
+
+# One plane at 35° that daylights ``drop`` above a floor.
+DIP = math.radians(35)
+
+
+def above_a_floor(drop: float, **way) -> tuple[Blocks, Loads]:
+    crest, floor = 50.0 / math.tan(DIP), [(0.0, -drop)] if drop else []
+    base = [(-30, -drop), (-30, -15), (90, -15), (90, 50), (crest, 50), (0, 0), *floor]
+    return drawn([base, [(0, 0), (crest, 50), (36.87, 50), (22.43, 25), (14.43, 25)]], **way)
+
+
+@pytest.mark.parametrize(
+    ("drop", "way"),
+    [(0.0, {}), (0.0, {"mirror": True}), (0.01, {"turn": 0.3}), (0.1, {}), (0.5, {}), (0.7, {"mirror": True}), (3.0, {})],
+)
+def test_a_floor_below_the_plane_holds_nothing(drop, way):
+    blocks, loads = above_a_floor(drop, **way)
+    found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("plane", math.radians(30))], loads)
+    expected = math.tan(math.radians(30)) / math.tan(DIP)
+    print(f"drop {drop} m: {found.factor:.5f}, should be {expected:.5f}; {found.warnings}")
+    assert found.factor == pytest.approx(expected, rel=1e-6)
+    # Its toe touches the floor where it is drawn so: rounded, it holds nothing, and what its tip would hold is told.
+    assert len(found.toes) == (drop == 0.0) and not found.toes_hold
+    if not drop:
+        assert found.other_factor > 2.0 and "toe of 'block 1'" in found.warnings[0]
+
+
+def test_sharp_toes_hold_where_corners_are_not_rounded_and_are_named():
+    blocks, loads = above_a_floor(0.0)
+    law, settings = JointLaw("plane", math.radians(30)), DdaSettings(corner_rounding=0.0)
+    found = dda.factor_of_safety(blocks, [ROCK], [law], loads, settings)
+    assert found.toes_hold and found.factor > 2.0
+    assert found.other_factor == pytest.approx(math.tan(math.radians(30)) / math.tan(DIP), rel=1e-6)
+    assert "x = 0, y = 0 m and holds" in found.warnings[0] and "without it the factor is 0.8245" in found.warnings[0]
+    assert found.as_dict(blocks)["factor_without_toes"] == found.other_factor
+
+
+def test_what_lands_on_a_floor_is_no_equilibrium():
+    blocks, loads = above_a_floor(0.5)
+    system = dda.BlockSystem(blocks, [ROCK], [JointLaw("plane", math.radians(30))])
+    found = dda.equilibrium(system, State.at_rest(blocks), loads)
+    assert found.collapsed and not found.converged and found.moving == (1,)
+    assert found.moved[1] == pytest.approx(0.5 / math.sin(DIP), abs=1e-3)
+    assert "come to rest 0.872 m farther" in found.reason and "'block 1'" in found.reason
+    # A block that is drawn above what it comes to lie on first falls: that is no sliding.
+    held = dda.BlockSystem(blocks, [ROCK], [JointLaw("plane", math.radians(40))])
+    assert dda.equilibrium(held, State.at_rest(blocks), loads).converged
+
+
+def test_soft_rock_may_settle_by_what_elasticity_explains():
+    # Thirty metres of rock of 20 MPa: the upper face sinks by ρ g H²/2E', a thousandth of H and more.
+    soft = Material("soft", 20e6, 0.0, density=2600.0)
+    blocks = Blocks.from_polygons([rectangle(-20, -5, 20, 0), rectangle(-5, 0, 5, 30)], fixed=[True, False])
+    found = dda.equilibrium(dda.BlockSystem(blocks, [soft], [JointLaw("joint", 0.5)]), State.at_rest(blocks), WEIGHT)
+    assert found.converged and found.moved[1] > 0.01 * 30
+
+
+def test_the_planar_slope_of_the_gallery_agrees_with_its_comment():
+    pytest.importorskip("gmsh")
+    from geomech import factor_of_safety
+
+    found = factor_of_safety(GEOMETRY / "planar_slope.toml")
+    assert found.factor == pytest.approx(math.tan(math.radians(37)) / math.tan(DIP), rel=1e-3)
+    assert any("toe of 'rock 1' touches 'base'" in line for line in found.warnings)
+
+
+@pytest.mark.parametrize("way", [{}, {"mirror": True}, {"turn": 0.4}])
+@pytest.mark.parametrize(("steep_deg", "flat_deg", "cohesion"), [(57, 24, 0.0), (50, 10, 10e3)])
+def test_sharp_toes_in_the_corner_of_a_bilinear_plane(steep_deg, flat_deg, cohesion, way):
+    """Jaeger's active and passive block with sharp toes: within 1e-3 of limit equilibrium, 1.2 times as much with tips
+    that hold."""
+    steep, flat = math.radians(steep_deg), math.radians(flat_deg)
+    kink = np.array([16.0, 16.0 * math.tan(flat)])
+    top = kink[1] + 13.0
+    back = np.array([kink[0] + 13.0 / math.tan(steep), top])
+    base = [(-30, -18), (60, -18), (60, top), back, kink, (0, 0), (0, -8), (-30, -8)]
+    passive, active = [(0, 0), kink, (kink[0], top), (5.5, top)], [kink, back, (kink[0], top)]
+    blocks, loads = drawn([base, passive, active], **way)
+    friction = math.radians(31)
+    found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", friction, cohesion)], loads)
+    weight = 2600.0 * GRAVITY * blocks.areas()[1:]
+    lengths = np.hypot(*kink), np.hypot(*(back - kink)), 13.0
+
+    def driving(factor: float) -> float:
+        """N by which the active block's push is more than the passive one's hold (sign of the factor's excess)."""
+        tangent, c = math.tan(friction) / factor, cohesion / factor
+        # Unknown: forces normal to the steep plane, to the flat one, and between the blocks.
+        s, f = (math.sin(steep), math.cos(steep)), (math.sin(flat), math.cos(flat))
+        rows = np.array([
+            [-s[0] + tangent * s[1], 0.0, 1.0],
+            [s[1] + tangent * s[0], 0.0, tangent],
+            [0.0, f[1] + tangent * f[0], -tangent],
+        ])  # fmt: skip
+        right = np.array([
+            -c * lengths[1] * s[1],
+            weight[1] - c * lengths[1] * s[0] - c * lengths[2],
+            weight[0] - c * lengths[0] * f[0] + c * lengths[2],
+        ])  # fmt: skip
+        _, n_flat, push = np.linalg.solve(rows, right)
+        return push - n_flat * (-f[0] + tangent * f[1]) - c * lengths[0] * f[1]
+
+    low, high = 0.5, 5.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if driving(middle) < 0 else (low, middle)
+    print(f"{found.factor:.5f}, limit equilibrium {low:.5f}, with sharp tips {found.other_factor}")
+    assert found.factor == pytest.approx(low, rel=2e-3)
+    if not cohesion:
+        assert low == pytest.approx(
+            math.tan(friction) / math.tan(rock_slopes.two_block_friction((weight[1], steep), (weight[0], flat))), rel=1e-6
+        )
+        assert found.other_factor > 1.1 * low
+    assert {toe.block for toe in found.toes} == {2}
+
+
+@pytest.mark.parametrize("way", [{}, {"mirror": True}, {"turn": -0.3}])
+def test_a_plane_keeps_its_cohesion_when_the_tension_crack_lets_go(way):
+    """c ℓ of all of the plane, although its law is that of the crack, which opens and shares a corner with it."""
+    foot, friction, cohesion = np.array([19.45, 15.28]), math.radians(36.4), 24.6e3
+    base = [(-30, -23), (50, -23), (50, 21.3), (foot[0], 21.3), foot, (0, 0), (0, -13), (-30, -13)]
+    blocks, loads = drawn([base, [(0, 0), foot, (foot[0], 21.3), (8.41, 21.3)]], **way)
+    law = JointLaw("joint", friction, cohesion)
+    expected = rock_slopes.plane_failure_factor(
+        2600.0 * GRAVITY * blocks.areas()[1], math.atan2(foot[1], foot[0]), float(np.hypot(*foot)), cohesion, friction
+    )
+    found = dda.factor_of_safety(blocks, [ROCK], [law], loads)
+    print(f"{found.factor:.5f}, limit equilibrium {expected:.5f}")
+    assert found.factor == pytest.approx(expected, rel=1e-3)
+
+
+def shear_box(step: float, tension: float, turns: bool, modulus: float, steps: int) -> list[float]:
+    """Pa on a face of 1 m that is pressed by 1 MPa and pushed ``step`` m a time; its cohesion is kept as it slips."""
+    law = JointLaw("joint", math.radians(35), 200e3, tension, residual_cohesion=200e3)
+    blocks = Blocks.from_polygons(
+        [np.array([[-1, -0.5], [2, -0.5], [2, 0], [-1, 0]]), np.array([[0, 0], [1, 0], [1, 0.5], [0, 0.5]])],
+        fixed=[True, False], edge_names=[[[""] * 4], [["", "", "top", ""]]],
+    )  # fmt: skip
+    system = dda.BlockSystem(
+        blocks, [Material("rock", modulus, 0.25, density=1.0)], [law], settings=DdaSettings(max_displacement_ratio=0.5)
+    )
+    press = Loads(edge_tractions=(EdgeTraction("top", History.constant([0.0, -1e6])),))
+    held = ("u0",) if turns else ("u0", "r0")
+    rate = [step / 1e3, 0.0][: len(held)]
+    pushed = replace(press, block_motions=(BlockMotion(1, History.ramp(rate), held),))
+    state, out = system.step(State.at_rest(blocks), press, 1e3).state, []
+    for k in range(steps):
+        result = system.step(replace(state, time=1e3 * k), pushed, 1e3)
+        state = result.state
+        out.append(abs(float(result.contacts["shear_force"].sum())))
+    return out
+
+
+@pytest.mark.parametrize(
+    ("step", "tension", "turns", "modulus", "steps"),
+    [
+        (2e-7, 0.0, True, 20e9, 120), (1e-6, 0.0, False, 20e9, 40), (1e-5, 100e3, True, 20e9, 12),
+        (2e-4, 0.0, True, 20e9, 4), (2e-4, 0.0, False, 20e9, 4), (1e-3, 100e3, True, 20e9, 4), (1e-3, 0.0, True, 1e9, 4),
+    ],
+)  # fmt: skip
+def test_a_shear_box_ends_at_its_strength_whatever_the_step(step, tension, turns, modulus, steps):
+    expected = 200e3 + 1e6 * math.tan(math.radians(35))
+    found = shear_box(step, tension, turns, modulus, steps)
+    print(f"{step:g} m a step: {found[-1] / 1e3:.2f} kPa, should be {expected / 1e3:.2f}")
+    assert found[-1] == pytest.approx(expected, rel=1e-3) and max(found) <= expected * 1.001
+
+
+@pytest.mark.parametrize("stiffness", [1e5, 3e5, 1e8])
+def test_a_soft_anchor_counts_with_its_yield_force_and_its_displacement_is_told(stiffness):
+    """F = N tan φ / T of a block on a plane at 40° with the anchor at its yield force, within 1 %."""
+    slope, friction, force = math.radians(40), math.radians(30), 15e3
+    blocks = Blocks.from_polygons(
+        [turned(rectangle(-6, -3, 8, 0), slope), turned(rectangle(0, 0, 2, 1), slope)], fixed=[True, False]
+    )
+    start = np.array([0.4447, 1.0258])
+    end = np.array([3.967, 0.7177])
+    bolt = Bolt(1, tuple(start), GROUND, tuple(end), stiffness, pretension=10e3, yield_force=force)
+    weight = 2600.0 * GRAVITY * 2.0
+    pull = force * (end - start) / np.hypot(*(end - start)) + [0.0, -weight]
+    along, out = np.array([math.cos(slope), math.sin(slope)]), np.array([-math.sin(slope), math.cos(slope)])
+    expected = (pull @ out) * math.tan(friction) / (pull @ along)
+    found = dda.factor_of_safety(
+        blocks, [ROCK], [JointLaw("plane", friction)], Loads(gravity=WEIGHT.gravity, bolts=(bolt,))
+    )
+    anchor = found.anchors[0]
+    print(f"{stiffness:g} N/m: {found.factor:.4f}, should be {expected:.4f}; {anchor}, {found.warnings}")
+    assert found.factor == pytest.approx(expected, rel=1e-2)
+    assert anchor.stretch == pytest.approx(5e3 / stiffness, rel=2e-2) and anchor.moved > anchor.stretch
+    assert bool(found.warnings) == (stiffness < 1e8)
+    assert f"stretched by {1e3 * anchor.stretch:.3g} mm" in found.table()
+
+
+def test_an_anchor_that_never_yields_counts_with_what_it_takes_while_blocks_stay():
+    slope = math.radians(40)
+    blocks = Blocks.from_polygons(
+        [turned(rectangle(-6, -3, 8, 0), slope), turned(rectangle(0, 0, 2, 1), slope)], fixed=[True, False]
+    )
+    bolt = Bolt(1, (0.4447, 1.0258), GROUND, (3.967, 0.7177), 1e6, pretension=10e3, yield_force=math.inf)
+    found = dda.factor_of_safety(
+        blocks, [ROCK], [JointLaw("plane", math.radians(30))], Loads(gravity=WEIGHT.gravity, bolts=(bolt,))
+    )
+    # Of √2 m a two-thousandth, at 45° to the bolt.
+    assert found.anchors[0].force == pytest.approx(10e3 + 1e6 * 0.7e-3 * math.cos(math.radians(45)), rel=1e-2)
+    assert "no yield force" in found.warnings[0]
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_a_toppling_row_does_not_remember_the_friction_that_it_began_with(mirror):
+    slope, heights = math.radians(20), (0.8, 2.0, 3.5, 4.2, 4.0, 3.0)
+    n = len(heights)
+    columns = [turned(rectangle(k, 0, k + 1, h), slope) for k, h in enumerate(heights)]
+    foot = [(n + 6, 0), *((k, 0) for k in range(n, -1, -1)), (-3, 0), (-3, -10), (n + 6, -10)][::-1]
+    blocks, loads = drawn([turned(np.array(foot, float)[::-1], slope), *columns], mirror=mirror)
+    limits = []
+    for tangent in (0.45, 0.6, 1.2, 2.5):
+        found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", math.atan(tangent))], loads)
+        limits.append(tangent / found.factor)
+    print("limit tan φ", limits)
+    assert max(limits) < 1.005 * min(limits)
