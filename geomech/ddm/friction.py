@@ -13,7 +13,8 @@ it. All nodes that break one change state at once, which is Newton's method for 
 Curnier 1991) and needs a handful of solves however many cracks interact. Should it run in a circle, the shear limits
 are frozen (Tresca's friction, which nodes solve one at a time if need be) and brought up to date in turn
 (Panagiotopoulos 1975), and Newton's method begins again from there. What is returned obeys all inequalities to the
-tolerance, or NotConverged says by how much not.
+tolerance, or `Missed` says which nodes do not (in blades of rock that elements do not resolve, no state may fit) or by how
+much friction is missed, or NotConverged says that it is too much.
 
 `rest` is where the last load left the faces: the answer is one step, implicit in time, of a process with memory.
 """
@@ -21,6 +22,7 @@ tolerance, or NotConverged says by how much not.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,8 +42,22 @@ TOLERANCE = 1e-10
 _PATIENCE, _PASSES = 12, 2000
 #: Limits are frozen at most so often; they are up to date within this part of the largest stress.
 _FREEZES, _FROZEN_TOLERANCE = 60, 1e-6
+#: Nodes change one at a time at most so often, for each of them.
+_ONE_BY_ONE = 3
+#: Where that does not come to an end, limits that are up to date within this part of the largest stress are let stand,
+#: and told of.
+NEARLY = 1e-2
 #: Factors for so many states are kept.
 _KEPT = 8
+
+
+class Missed(NamedTuple):
+    """``undecided`` (n_nodes,) bool, nodes that no state satisfies; by how much laws are missed, ``violation`` of the
+    largest stress; and the ``node`` where friction is missed most, −1 where it is not."""
+
+    undecided: np.ndarray
+    violation: float
+    node: int
 
 
 class FaceEquations:
@@ -162,7 +178,11 @@ class _Contact:
         # Without load there is nothing to measure by but what slip has left behind.
         left = 1e-8 * float(np.abs(memory.rest).max(initial=0.0)) / self.length
         self.stress = max(float(np.abs(right).max()), left, NO_STRESS)
-        self.solves = 0
+        self.solves = self._before = 0
+        #: (n_nodes,) those that no state satisfies.
+        self.undecided = np.zeros(len(memory.broken), bool)
+        #: By how much friction is missed, of the largest stress, and at which node at most.
+        self.violation, self.missed = 0.0, -1
 
     @property
     def _now(self) -> FaceMemory:
@@ -185,7 +205,7 @@ class _Contact:
 
     def _respond(self, states: FaceStates, limit: np.ndarray | None):
         self.solves += 1
-        if self.solves > _PASSES:
+        if self.solves - self._before > _PASSES:
             raise NotConverged(f"crack faces did not settle in {_PASSES} solves{self.report}", self.node)
         return self.equations.solve(self.right, states, self._now, limit)
 
@@ -238,12 +258,16 @@ class _Contact:
         """(states, w, λ) when all inequalities hold; None when it turns in a circle. ``single``: from then on one node
         at a time, which ends for frozen limits (Murty 1974)."""
         best, patience, one = len(states.closed) + 1, _PATIENCE, False
+        been: list[FaceStates] = []
         while True:
             w, reaction = self._respond(states, limit)
             new, changed, worst = self._next(states, w, reaction, limit)
+            changed &= ~self.undecided
             n = int(changed.sum())
             self.report = f"; {n} nodes are in violation, by {worst:.1e} of the largest stress"
             if n == 0:
+                if self.undecided.any():
+                    self.violation = worst
                 return states, w, reaction
             self.node = int(np.flatnonzero(changed)[-1])
             if n < best:
@@ -255,6 +279,10 @@ class _Contact:
                     return None
                 one = True
             if one:
+                been.append(states)
+                if self._turns(been):
+                    been.clear()
+                    continue
                 keep = np.zeros(len(changed), bool)
                 keep[np.flatnonzero(changed)[-1]] = True
                 new = FaceStates(
@@ -264,31 +292,56 @@ class _Contact:
                 )
             states = new
 
+    def _turns(self, been: list[FaceStates]) -> bool:
+        """Whether nodes that change one at a time have come back to states where they have ``been``, or have taken so many
+        steps that they hardly ever end: those that went to and fro are undecided from then on. (Where a blade of rock is
+        thinner than its elements are long no state of its nodes may fit.)"""
+        last = been[-1]
+        first = next((k for k, state in enumerate(been[:-1]) if state.key == last.key), None)
+        if first is None:
+            if len(been) < _ONE_BY_ONE * len(last.closed):
+                return False
+            first = max(0, len(been) - len(last.closed) // 4)
+        for state in been[first:]:
+            self.undecided |= (state.closed != last.closed) | (state.way != last.way)
+        return True
+
     def settle(self, states: FaceStates):
         """(states, w, λ) with cement intact as it now is."""
-        found = self.newton(states)
-        if found is not None:
-            return found
-        limit = np.zeros(len(states.closed))
-        for freeze in range(1, _FREEZES + 1):
-            states, _, reaction = self.newton(states, limit, single=True)
-            now = self.laws.limit(reaction[self.laws.across], self.broken)
-            # Near enough, Newton's method finishes what would take many more rounds.
-            if (
-                freeze % 4 == 0
-                or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress
-            ):
-                found = self.newton(states)
-                if found is not None:
-                    return found
-            limit = now
-        raise NotConverged(f"crack faces did not settle under friction{self.report}", self.node)
+        self.violation, self.missed, self._before = 0.0, -1, self.solves
+        nearest = np.inf, -1, None
+        try:
+            found = self.newton(states)
+            if found is not None:
+                return found
+            limit = np.zeros(len(states.closed))
+            for freeze in range(1, _FREEZES + 1):
+                frozen = self.newton(states, limit, single=True)
+                states, _, reaction = frozen
+                now = self.laws.limit(reaction[self.laws.across], self.broken)
+                off = np.where(np.isfinite(now) & states.closed, np.abs(now - limit), 0.0) / self.stress
+                if off.max(initial=0.0) < nearest[0]:
+                    nearest = float(off.max(initial=0.0)), int(off.argmax()), frozen
+                # Near enough, Newton's method finishes what would take many more rounds.
+                if freeze % 4 == 0 or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress:
+                    found = self.newton(states)
+                    if found is not None:
+                        return found
+                limit = now
+            failure = NotConverged(f"crack faces did not settle under friction{self.report}", self.node)
+        except NotConverged as error:
+            failure = error
+        if nearest[0] > NEARLY:
+            raise failure
+        self.violation, self.missed, frozen = nearest
+        return frozen
 
 
 def settle_rough(
     equations: FaceEquations, right: np.ndarray, memory: FaceMemory, guess: FaceStates | None = None
-) -> tuple[np.ndarray, np.ndarray, FaceMemory, int]:
-    """Slip and opening (times 2μ), λ = right − S w, what the faces remember afterwards and the number of solves.
+) -> tuple[np.ndarray, np.ndarray, FaceMemory, int, Missed]:
+    """Slip and opening (times 2μ), λ = right − S w, what the faces remember afterwards, the number of solves, and what
+    does not hold to the tolerance.
 
     ``right`` (n,) traction that fluid in the cracks exerts less that of the loads on closed faces; ``memory`` of the
     load before; ``guess`` the states to begin with, rather than those of one crack by itself. Raises NotConverged.
@@ -331,7 +384,7 @@ def settle_rough(
     new = float(weights[breaks] @ bond[breaks]), float(weights @ np.where(breaks, 0.0, slips))
     released = Released(*(a + b for a, b in zip(memory.released, (*new, float(weights[breaks] @ ahead[breaks])))))
     now = FaceMemory(laws.elements, rest, contact.broken, work, states, pressure, shear, released)
-    return w, reaction, now, contact.solves
+    return w, reaction, now, contact.solves, Missed(contact.undecided, contact.violation, contact.missed)
 
 
 def _breaking(
