@@ -504,7 +504,7 @@ def _killed_and_resumed(path: Path, tmp_path: Path, kills: int, seed: int) -> No
     scene = load_scene(path)
     run(scene, tmp_path / "whole", standard_observers(scene, quiet=True))
     random, out = np.random.default_rng(seed), tmp_path / "out"
-    begin = ["run", str(path), "--out", str(out)]
+    begin = ["run", str(path), "--out", str(out), "--overwrite"]
     command, furthest = begin, 0
     for _ in range(kills):
         if not _killed(out, command, random):

@@ -94,9 +94,10 @@ def test_bonds_break_only_where_they_must():
 class _PathOf:
     """A central path that leaves so many contacts undecided, one after the other."""
 
-    blocked, missed, epsilon = False, 0.0, 1.0
+    blocked, missed = False, 0.0
 
-    def __init__(self, undecided, arrived):
+    def __init__(self, undecided, arrived, epsilon=0.1):
+        self.epsilon = epsilon
         self._left, self._arrived = list(undecided), arrived
         self.ended = self.arrived = False
 
@@ -120,6 +121,13 @@ def test_a_path_that_arrives_proposes_its_states_though_some_contacts_hardly_tou
     states, spent = open_close._proposed(_PathOf(undecided, arrived), bonded, set(), 60, False)
     assert (states is not None) == (taken is not None)
     assert spent == (taken or 3)
+
+
+def test_a_path_whose_forces_and_gaps_are_still_large_proposes_nothing():
+    """Of blocks that fly apart contacts are decided, too: where ε has not come down these are no states to try."""
+    bonded = np.zeros(10_000, np.int64)
+    states, _ = open_close._proposed(_PathOf([400, 12, 1], True, epsilon=800.0), bonded, set(), 60, False)
+    assert states is None
 
 
 def test_a_wall_at_rest_is_asked_for_nothing_but_its_round_off():

@@ -57,6 +57,7 @@ SETTINGS = {
     "normal_penalty": (0.0, -1.0, NAN, INF, "1e9"),
     "shear_penalty": (0.0, -1.0, NAN, INF),
     "contact": ("lagrange",),
+    "springs": ("soft",),
     "penetration_tolerance": (0.0, -1.0, 2.0, NAN),
     "corner_rounding": (-0.01, 0.3, NAN),
     "max_open_close_iterations": (0, -1, 2.5, NAN),
