@@ -7,10 +7,15 @@ import pytest
 from geomech.bench.stability import thin_maps
 from geomech.bench.stability_grid import REFUSED, RIGHT, WRONG
 
-MAPS = list(thin_maps(True))
+#: Maps that take minutes.
+LONG = ("flying in a ring, rigid", "rings in rings", "thrown on a spike, rigid")
+MAPS = [
+    pytest.param(grid, id=grid.title, marks=[pytest.mark.slow] if grid.title in LONG else [])
+    for grid in thin_maps(True)
+]
 
 
-@pytest.mark.parametrize("grid", MAPS, ids=[grid.title for grid in MAPS])
+@pytest.mark.parametrize("grid", MAPS)
 def test_none_is_wrong_in_silence_and_slow_ones_are_right(grid):
     """Right: nothing lies in anything by half a wall, nothing has come out, and overlaps have brought in less than 1 % of
     all energy. At 1000 m/s the springs of a wall of 1 mm give by more than that: then a warning says so. What is drawn is
