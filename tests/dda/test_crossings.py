@@ -107,7 +107,7 @@ def test_a_square_lands_on_a_thin_wall(wall, ratio):
             assert overlap < 1e-6 and kinetic < 1.0
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 1e-2, 1e-1])
+@pytest.mark.parametrize("ratio", [pytest.param(1e-3, marks=pytest.mark.slow), 1e-2, 1e-1])
 @pytest.mark.parametrize("rigid", [False, True])
 def test_a_ring_holds_what_flies_in_it(rigid, ratio):
     """Walls of 1 mm to 10 cm at 30 m/s: below 1, nothing is deeper than half a wall, out, or driven by overlaps."""

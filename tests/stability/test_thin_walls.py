@@ -7,8 +7,8 @@ import pytest
 from geomech.bench.stability import thin_maps
 from geomech.bench.stability_grid import REFUSED, RIGHT, WRONG
 
-#: Maps that take minutes.
-LONG = ("flying in a ring, rigid", "rings in rings", "thrown on a spike, rigid")
+#: Maps that take long.
+LONG = ("flying in a ring, rigid", "rings in rings", "thrown on a spike, rigid", "sticks on sticks")
 MAPS = [
     pytest.param(grid, id=grid.title, marks=[pytest.mark.slow] if grid.title in LONG else [])
     for grid in thin_maps(True)
