@@ -50,9 +50,9 @@ _AGAIN, _LARGER = 4, 10.0
 _PASSED_ON = 3
 #: Where the step is as short as that because of so small a part of the contacts (or so few), those alone are centred
 #: again about the motion that the others allow, with so much larger an ε, at most so many times: those that stop it
-#: before so much of the way (and not larger than at the start). (Friction on two neighbours' corners may leave no way along the path. On a slope of 1 000
-#: blocks that slides, steps for which all contacts were centred again, in vain, took 250 iterations and now take 40;
-#: with ε 100 times larger one in three still does.)
+#: before so much of the way, and with none larger than at the start. (Friction on two neighbours' corners may leave no
+#: way along the path. On a slope of 1 000 blocks that slides, steps for which all contacts were centred again, in vain,
+#: took 250 iterations and now take 40; with ε 100 times larger one in three still does.)
 _ALONE, _ALONE_FEW, _ALONE_FAR, _ALONE_LARGER, _ALONE_AGAIN = 0.005, 8, 0.3, 1000.0, 40
 #: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere, …
 _END, _STUCK = 1e-14, 1e-3

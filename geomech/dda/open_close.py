@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 
@@ -254,8 +254,8 @@ def settle(
 ) -> Settled:
     """Iterate from the states of ``found`` to consistent ones, of a step in motion or in ``statics``; ``matrix``
     (n, 6, 6) and ``right`` (n, 6) are the blocks' own part, ``springs`` and ``gap`` those of this step (dashpots
-    included), ``slack`` (n_contacts,) m the gaps that decide nothing. ``curved`` joints bend them from iteration to iteration. An iteration is a solution of the step's equations,
-    those along the central path included. ``expected`` (6 n,) is the motion that velocities alone would make, None where
+    included), ``slack`` (n_contacts,) m the gaps that decide nothing. ``curved`` joints bend them from iteration to
+    iteration. An iteration is a solution of the step's equations, those along the central path included. ``expected`` (6 n,) is the motion that velocities alone would make, None where
     there are none. Unless ``patient``, systems too large for a dense matrix are not asked for by laws and rounds that
     take hundreds: a shorter step takes less, of `MANY` in motion at the first sign. ``patches``: few contacts that stay
     wrong are settled by themselves (`patches`).
@@ -266,17 +266,28 @@ def settle(
 
     Raises `Unsettled` when ``max_iterations`` do not suffice.
     """
-    problem = pattern, matrix, right
-    step = vectors, springs, gap, slack, max_iterations, curved, statics, patient, patches, expected
-    few = len(found) <= _FEW
-    settled = _settled(problem, found, step, few)
-    return settled if few else _given_back(problem, found, step, settled)
+    equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics, expected)
+    effort = _Effort(max_iterations, patient, patches, in_order=len(found) <= _FEW)
+    settled = _settled(equations, effort)
+    return settled if effort.in_order else _given_back(equations, effort, settled)
 
 
-def _given_back(problem: tuple, found: ContactSet, step: tuple, settled: Settled) -> Settled:
+@dataclass(frozen=True)
+class _Effort:
+    """What the states may take: arguments as for `settle`; bonds break ``in_order``, or many at once."""
+
+    max_iterations: int
+    patient: bool
+    patches: bool
+    in_order: bool
+
+
+def _given_back(equations: Equations, effort: _Effort, settled: Settled) -> Settled:
     """The step ``settled`` with the bonds that it has taken from contacts which are closed in the end; as it is where
-    that does not settle soon. Arguments as for `_settled`."""
+    that does not settle soon."""
+    found = equations.found
     began = found.bonded if found.tried is None else found.tried[2]
+    effort = replace(effort, max_iterations=effort.max_iterations // _BACK, patient=False, in_order=True)
     iterations = settled.iterations
     back = np.zeros(len(found), bool)
     while True:
@@ -288,21 +299,19 @@ def _given_back(problem: tuple, found: ContactSet, step: tuple, settled: Settled
             np.where(lost, STICK, settled.state), np.where(lost, 0.0, settled.direction),
             np.where(lost, began, settled.bonded),
         )  # fmt: skip
-        most = step[4] // _BACK
         try:
-            settled = _settled(problem, replace(found, tried=tried), (*step[:4], most, *step[5:7], False, *step[8:]), True)
+            settled = _settled(replace(equations, found=replace(found, tried=tried)), effort)
         except Unsettled as failure:
             log.debug("%d bonds that gave way on the way to the states are not given back: %s", lost.sum(), failure)
-            return replace(settled, iterations=iterations + most)
+            return replace(settled, iterations=iterations + effort.max_iterations)
         iterations += settled.iterations
 
 
-def _settled(problem: tuple, found: ContactSet, step: tuple, in_order: bool) -> Settled:
-    """As `settle`, of the ``problem`` (pattern, matrix, right) and the ``step`` (its other arguments); bonds break
-    ``in_order``, or many at once."""
-    pattern, matrix, right = problem
-    vectors, springs, gap, slack, max_iterations, curved, statics, patient, patches, expected = step
-    equations = Equations(pattern, matrix, right, found, vectors, springs, gap, slack, curved, statics, expected)
+def _settled(equations: Equations, effort: _Effort) -> Settled:
+    """As `settle`, in one go."""
+    pattern, found, springs = equations.pattern, equations.found, equations.springs
+    statics, max_iterations, in_order = equations.statics, effort.max_iterations, effort.in_order
+    patient, patches = effort.patient, effort.patches
     states = States(*((found.state, found.direction, found.bonded) if found.tried is None else found.tried))
     normal_force, slip = found.normal, np.zeros(len(found))
     seen: set[bytes] = set()
@@ -401,9 +410,9 @@ def _settled(problem: tuple, found: ContactSet, step: tuple, in_order: bool) -> 
                 bonded = states.without_open_bonds().bonded
                 if path is None or not np.array_equal(path.bonded, bonded):
                     path = CentralPath(
-                        pattern, matrix, right, found, vectors, answer.springs, answer.gap, bonded,
-                        normal_force, equations.room, expected,
-                    )
+                        pattern, equations.matrix, equations.right, found, equations.vectors, answer.springs,
+                        answer.gap, bonded, normal_force, equations.room, equations.expected,
+                    )  # fmt: skip
                 # The last sixth of the iterations is kept for the careful ways.
                 budget = (5 * max_iterations) // 6 - iteration
                 proposal, spent = _proposed(path, states.bonded, offered, budget, small, hurried)

@@ -116,8 +116,11 @@ class BlockSystem:
         rigid = np.array([m.rigid for m in self.materials])[of]
         joint_index = joint_index or (lambda edge_name, other_name: 0)
         self._joint_index = joint_index
-        mass = self.density * blocks.areas()
-        self.finder = ContactFinder(blocks, self.joints, joint_index, self.settings, modulus, rigid, mass, self.work)
+        areas = blocks.areas()
+        self.mass = self.density * areas
+        self.finder = ContactFinder(
+            blocks, self.joints, joint_index, self.settings, modulus, rigid, self.mass, self.work
+        )
         self._take_out(None, None)
         rigid = rigid & ~self.fixed
         self.rigid = np.flatnonzero(rigid)
@@ -130,11 +133,9 @@ class BlockSystem:
         self.no_offset = np.zeros((blocks.n_blocks, 3))
 
         vertices = blocks.vertices
-        areas = blocks.areas()
         if (areas <= 0).any():
             raise ValueError(f"{blocks.names[int(areas.argmin())]}: the block has no area")
         self._refuse_massless()
-        self.mass = self.density * areas
         self.half_diagonal = 0.5 * float(np.hypot(*np.ptp(vertices, axis=0)))
         self.rounding, self.rounding_told = rounding_of(vertices), False
         self.limits = StepLimits(

@@ -155,13 +155,6 @@ def _rough(
         raise NotConverged(f"{failure}{_whereabouts(body, failure.node)}", failure.node) from None
     if missed.undecided.any():
         _judge(body, Settled(memory.states.closed, solves, missed.undecided, missed.violation))
-    elif missed.node >= 0:
-        _log.warning(
-            "crack faces found no friction that holds everywhere%s; they are left with a violation of %.1e of the largest "
-            "stress",
-            _whereabouts(body, missed.node),
-            missed.violation,
-        )
     closed = np.zeros(len(right), bool)
     closed[laws.across] = memory.states.closed
     return FaceAnswer(w, applied - reaction, closed, solves, memory, began)

@@ -13,8 +13,8 @@ it. All nodes that break one change state at once, which is Newton's method for 
 Curnier 1991) and needs a handful of solves however many cracks interact. Should it run in a circle, the shear limits
 are frozen (Tresca's friction, which nodes solve one at a time if need be) and brought up to date in turn
 (Panagiotopoulos 1975), and Newton's method begins again from there. What is returned obeys all inequalities to the
-tolerance, or `Missed` says which nodes do not (in blades of rock that elements do not resolve, no state may fit) or by how
-much friction is missed, or NotConverged says that it is too much.
+tolerance, or `Missed` says which nodes do not (in blades of rock that elements do not resolve, no state may fit), or
+NotConverged that there are too many.
 
 `rest` is where the last load left the faces: the answer is one step, implicit in time, of a process with memory.
 """
@@ -44,20 +44,16 @@ _PATIENCE, _PASSES = 12, 2000
 _FREEZES, _FROZEN_TOLERANCE = 60, 1e-6
 #: Nodes change one at a time at most so often, for each of them.
 _ONE_BY_ONE = 3
-#: Where that does not come to an end, limits that are up to date within this part of the largest stress are let stand,
-#: and told of.
-NEARLY = 1e-2
 #: Factors for so many states are kept.
 _KEPT = 8
 
 
 class Missed(NamedTuple):
-    """``undecided`` (n_nodes,) bool, nodes that no state satisfies; by how much laws are missed, ``violation`` of the
-    largest stress; and the ``node`` where friction is missed most, −1 where it is not."""
+    """``undecided`` (n_nodes,) bool, nodes that no state satisfies, and by how much laws are missed, ``violation`` of the
+    largest stress."""
 
     undecided: np.ndarray
     violation: float
-    node: int
 
 
 class FaceEquations:
@@ -178,11 +174,11 @@ class _Contact:
         # Without load there is nothing to measure by but what slip has left behind.
         left = 1e-8 * float(np.abs(memory.rest).max(initial=0.0)) / self.length
         self.stress = max(float(np.abs(right).max()), left, NO_STRESS)
-        self.solves = self._before = 0
+        self.solves = 0
         #: (n_nodes,) those that no state satisfies.
         self.undecided = np.zeros(len(memory.broken), bool)
-        #: By how much friction is missed, of the largest stress, and at which node at most.
-        self.violation, self.missed = 0.0, -1
+        #: By how much their laws are missed, of the largest stress.
+        self.violation = 0.0
 
     @property
     def _now(self) -> FaceMemory:
@@ -205,7 +201,7 @@ class _Contact:
 
     def _respond(self, states: FaceStates, limit: np.ndarray | None):
         self.solves += 1
-        if self.solves - self._before > _PASSES:
+        if self.solves > _PASSES:
             raise NotConverged(f"crack faces did not settle in {_PASSES} solves{self.report}", self.node)
         return self.equations.solve(self.right, states, self._now, limit)
 
@@ -308,33 +304,24 @@ class _Contact:
 
     def settle(self, states: FaceStates):
         """(states, w, λ) with cement intact as it now is."""
-        self.violation, self.missed, self._before = 0.0, -1, self.solves
-        nearest = np.inf, -1, None
-        try:
-            found = self.newton(states)
-            if found is not None:
-                return found
-            limit = np.zeros(len(states.closed))
-            for freeze in range(1, _FREEZES + 1):
-                frozen = self.newton(states, limit, single=True)
-                states, _, reaction = frozen
-                now = self.laws.limit(reaction[self.laws.across], self.broken)
-                off = np.where(np.isfinite(now) & states.closed, np.abs(now - limit), 0.0) / self.stress
-                if off.max(initial=0.0) < nearest[0]:
-                    nearest = float(off.max(initial=0.0)), int(off.argmax()), frozen
-                # Near enough, Newton's method finishes what would take many more rounds.
-                if freeze % 4 == 0 or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress:
-                    found = self.newton(states)
-                    if found is not None:
-                        return found
-                limit = now
-            failure = NotConverged(f"crack faces did not settle under friction{self.report}", self.node)
-        except NotConverged as error:
-            failure = error
-        if nearest[0] > NEARLY:
-            raise failure
-        self.violation, self.missed, frozen = nearest
-        return frozen
+        self.violation = 0.0
+        found = self.newton(states)
+        if found is not None:
+            return found
+        limit = np.zeros(len(states.closed))
+        for freeze in range(1, _FREEZES + 1):
+            states, _, reaction = self.newton(states, limit, single=True)
+            now = self.laws.limit(reaction[self.laws.across], self.broken)
+            # Near enough, Newton's method finishes what would take many more rounds.
+            if (
+                freeze % 4 == 0
+                or np.abs(now - limit)[np.isfinite(now)].max(initial=0.0) < _FROZEN_TOLERANCE * self.stress
+            ):
+                found = self.newton(states)
+                if found is not None:
+                    return found
+            limit = now
+        raise NotConverged(f"crack faces did not settle under friction{self.report}", self.node)
 
 
 def settle_rough(
@@ -384,7 +371,7 @@ def settle_rough(
     new = float(weights[breaks] @ bond[breaks]), float(weights @ np.where(breaks, 0.0, slips))
     released = Released(*(a + b for a, b in zip(memory.released, (*new, float(weights[breaks] @ ahead[breaks])))))
     now = FaceMemory(laws.elements, rest, contact.broken, work, states, pressure, shear, released)
-    return w, reaction, now, contact.solves, Missed(contact.undecided, contact.violation, contact.missed)
+    return w, reaction, now, contact.solves, Missed(contact.undecided, contact.violation)
 
 
 def _breaking(
