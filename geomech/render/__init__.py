@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .sketch import sketch
+
 if TYPE_CHECKING:
     from geomech.output import Run
 
-__all__ = ["draw"]
+__all__ = ["draw", "sketch"]
 
 
 def draw(

@@ -1,0 +1,90 @@
+"""Settings of the manual: `python -m sphinx -W -b html docs outputs/manual`, in the project's folder.
+
+Pages that repeat what the program itself knows (scene keys, command line, equations, verification) are written into
+``docs/generated`` by the modules of ``docs/generate`` before anything is read. The tutorials are run by sphinx-gallery.
+"""
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent)]
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import geomech  # noqa: E402
+from generate import pages  # noqa: E402
+from generate.pictures import RunPictures  # noqa: E402
+
+project = "geomech"
+author = "The authors of geomech"
+project_copyright = "The authors of geomech, GPL-3.0-or-later"
+version = release = geomech.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+    "sphinx-mathjax-offline",
+]
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath", "fieldlist"]
+myst_heading_anchors = 3
+exclude_patterns = ["generate/**", "tutorials/**", "gallery/**/*.ipynb", "gallery/**/*.py", "**/README.txt"]
+# Topics beside the chapters may have been written or not: `howto/index` lists what there is.
+suppress_warnings = ["toc.empty_glob", "config.cache"]
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+autodoc_class_signature = "mixed"
+
+html_theme = "pydata_sphinx_theme"
+html_title = "geomech"
+html_show_sourcelink = False
+html_copy_source = False
+# Excerpts are fetched from other pages, which a browser refuses where pages are files.
+html_show_search_summary = False
+html_static_path = ["static"]
+html_css_files = ["manual.css"]
+html_logo = "static/logo.svg"
+html_favicon = "static/logo.svg"
+html_theme_options = {
+    "logo": {"text": "geomech"},
+    "navbar_align": "left",
+    "navbar_end": ["theme-switcher"],
+    "navbar_persistent": ["search-button"],
+    "header_links_before_dropdown": 7,
+    "show_toc_level": 2,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "pygments_light_style": "tango",
+    "pygments_dark_style": "github-dark",
+}
+html_sidebars = {"index": [], "search": []}
+html_context = {"default_mode": "auto"}
+copybutton_prompt_text = "$ "
+
+sphinx_gallery_conf = {
+    "examples_dirs": "tutorials",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"/plot_",
+    "within_subsection_order": "FileNameSortKey",
+    "image_scrapers": (RunPictures(), "matplotlib"),
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 1e9,
+    "plot_gallery": True,
+    "abort_on_example_error": True,
+    "thumbnail_size": (480, 320),
+}
+
+
+def setup(app):
+    # Kernels are kept where they always are; runs of tutorials go to a folder that goes with the build.
+    tempfile.tempdir = None
+    app.connect("config-inited", lambda app, config: pages.write_all(HERE / "generated"))
