@@ -13,9 +13,10 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import geomech  # noqa: E402
 from generate import pages  # noqa: E402
 from generate.pictures import RunPictures  # noqa: E402
+
+import geomech  # noqa: E402
 
 project = "geomech"
 author = "The authors of geomech"

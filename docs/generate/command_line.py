@@ -35,7 +35,9 @@ def _verb(name: str, verb: argparse.ArgumentParser) -> Iterator[str]:
         value = action.metavar or (action.dest.upper() if action.option_strings and action.nargs != 0 else "")
         if isinstance(action, argparse.BooleanOptionalAction):
             value = ""
-        taken = f" `{' '.join(value) if isinstance(value, tuple) else value}`" if value and action.option_strings else ""
+        taken = (
+            f" `{' '.join(value) if isinstance(value, tuple) else value}`" if value and action.option_strings else ""
+        )
         several = " …" if action.nargs in ("+", "*") else ""
         yield f"{written}{taken}{several}\n:   {_text((action.help or '') % vars(action))}\n"
 

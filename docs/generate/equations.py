@@ -53,7 +53,7 @@ def docstring(row: Row) -> str:
 
 
 def place(row: Row) -> str:
-    """"file:line" of the function."""
+    """ "file:line" of the function."""
     what = found(row)
     what = what.fget if isinstance(what, property) else what
     lines = inspect.getsourcelines(what)[1]

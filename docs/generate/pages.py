@@ -21,7 +21,11 @@ def write_all(folder: Path) -> None:
         "equations.md": equations.page(),
         **verification.pages(),
     }
-    pages |= {name: (ROOT / source).read_text(encoding="utf-8") for source, name in PROJECT.items() if (ROOT / source).is_file()}
+    pages |= {
+        name: (ROOT / source).read_text(encoding="utf-8")
+        for source, name in PROJECT.items()
+        if (ROOT / source).is_file()
+    }
     for old in folder.glob("*.md"):
         if old.name not in pages:
             old.unlink()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from pydantic_core import PydanticUndefined
+
 from geomech.scene.keys import expected_of, kind_of, written
 from geomech.scene.tables import SceneTables
-from pydantic_core import PydanticUndefined
 
 OPENING = """# Keys of a scene
 
@@ -60,6 +61,8 @@ def _literal(text: str) -> str:
 def _escaped(text: str) -> str:
     """Signs that Markdown would read, outside code."""
     parts = text.split("`")
-    outside = [part.replace("*", r"\*").replace("[", r"\[").replace("<", r"\<").replace("$", r"\$") for part in parts[::2]]
+    outside = [
+        part.replace("*", r"\*").replace("[", r"\[").replace("<", r"\<").replace("$", r"\$") for part in parts[::2]
+    ]
     both = [outside[k // 2] if k % 2 == 0 else f"`{parts[k]}`" for k in range(len(parts))]
     return "".join(both)

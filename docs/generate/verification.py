@@ -68,7 +68,11 @@ def _accuracy() -> str:
 def _orders() -> str:
     lines = [ORDERS]
     for topic, title, text in (
-        ("ddm", "Cracks", "`geomech bench ddm` (in quick form here). K against closed forms, published values and second methods."),
+        (
+            "ddm",
+            "Cracks",
+            "`geomech bench ddm` (in quick form here). K against closed forms, published values and second methods.",
+        ),
         ("schemes", "Blocks", "`geomech bench schemes`. Springs against multipliers, three time schemes."),
     ):
         lines += [f"## {title}\n", text + "\n"]
