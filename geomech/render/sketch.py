@@ -92,9 +92,5 @@ def _carried(cracks: Cracks, cycle: Any, magnify: float) -> np.ndarray:
     nodes = cracks.nodes.copy()
     for block in np.unique(cracks.block):
         own = np.unique(cracks.segments[cracks.block == block])
-        first, last = cycle.blocks.vertex_start[block : block + 2]
-        before, after = cycle.blocks.vertices[first:last], cycle.state.vertices[first:last]
-        # Blocks move by a first-order field: three corners would do, all of them round off less.
-        field = np.linalg.lstsq(np.column_stack([np.ones(last - first), before]), after - before, rcond=None)[0]
-        nodes[own] += magnify * np.column_stack([np.ones(len(own)), cracks.nodes[own]]) @ field
+        nodes[own] += magnify * (cycle.motion.current(block, cracks.nodes[own]) - cracks.nodes[own])
     return nodes

@@ -1,0 +1,105 @@
+"""
+Runs from Python, results in pandas
+===================================
+
+A set of runs from one scene, driven from Python, and their tables in data frames.
+"""
+
+# %%
+# A scene as text, and what varies
+# --------------------------------
+# ``load_scene(path, overrides)`` takes what ``--set`` takes. Here: the friction of a plane at 30°, in steps, for a block that slides in real time.
+
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+import geomech
+from geomech.output import Run
+from geomech.scene import load_scene
+
+work = Path(tempfile.mkdtemp(prefix="geomech-tutorial-"))
+(work / "block.toml").write_text("""
+title = "A block on a plane"
+[[geometry.zones]]
+name = "plane"
+polygon = [[-12, -6.9282], [6, 3.4641], [6, -8], [-12, -8]]
+[[geometry.zones]]
+name = "block"
+polygon = [[2, 1.1547], [4, 2.3094], [3, 4.0415], [1, 2.8868]]
+[materials.rock]
+youngs_modulus_pa = 20e9
+poissons_ratio = 0.25
+density_kg_m3 = 2600
+[zones.plane]
+fixed = true
+[joints.default]
+friction_angle_deg = 20
+[loads]
+gravity_m_s2 = [0, -9.81]
+[dda]
+dynamic_factor = 1.0
+time_step_s = 0.005
+equilibrium = "start"
+[[monitors]]
+name = "block"
+at = [2.5, 2.6]
+zone = "block"
+[run]
+end_time_s = 0.5
+""")
+
+rows = []
+for friction in (0, 10, 20, 28, 32):
+    # At 32° it stands; "start" would find no equilibrium for the others, and a run says so.
+    wishes = [f"joints.default.friction_angle_deg={friction}", "output.interior=false"]
+    wishes += [] if friction > 30 else ['dda.equilibrium=""']
+    summary = geomech.run(load_scene(work / "block.toml", wishes), work / f"friction_{friction}", observers=None)
+    rows.append({"friction": friction, "end": summary["end"]})
+
+# %%
+# Histories as data frames
+# ------------------------
+# Every CSV of a run folder has one header line and SI units: ``pandas.read_csv`` reads it as it is.
+
+frames = {friction: pd.read_csv(work / f"friction_{friction}" / "history.csv") for friction in (0, 10, 20, 28, 32)}
+print(frames[20][["time", "block_ux", "block_uy", "open_close_iterations", "kinetic_energy"]].tail(3).to_string(index=False))
+
+table = pd.DataFrame(rows).set_index("friction")
+table["way_m"] = [np.hypot(f["block_ux"].iloc[-1], f["block_uy"].iloc[-1]) for f in frames.values()]
+angle = np.radians(30)
+table["closed_form_m"] = [
+    max(0.0, 0.5 * 9.81 * (np.sin(angle) - np.cos(angle) * np.tan(np.radians(f))) * 0.5**2) for f in table.index
+]
+print(table.to_string())
+
+figure, axes = plt.subplots(figsize=(6, 3.6), layout="constrained")
+for friction, frame in frames.items():
+    axes.plot(frame["time"], np.hypot(frame["block_ux"], frame["block_uy"]), label=f"{friction}°")
+axes.set(xlabel="s", ylabel="down the plane, m")
+axes.legend(frameon=False, title="friction")
+
+# %%
+# ``Run``: more than tables
+# -------------------------
+# ``geomech.output.Run`` reads a folder as NumPy arrays, and the grids of any cycle as PyVista's.
+
+run = Run(work / "friction_20")
+print(run.title, "·", run.summary["end"], "·", len(run.history), "cycles")
+grid = run.grid("blocks", cycle=50)
+print(grid.array_names)
+contacts = pd.DataFrame(np.asarray(run.grid("contacts", 50).point_data["normal_force"]), columns=["normal force, N/m"])
+print(contacts.to_string())
+
+# %%
+# Without files
+# -------------
+# ``geomech.cycles(scene)`` yields each cycle as it comes: arrays of blocks, contacts, tips. An observer is any object with ``on_cycle``; see
+# ``geomech.output.Observer``. Nothing is written that no observer writes.
+
+for cycle in geomech.cycles(load_scene(work / "block.toml", ['dda.equilibrium=""'])):
+    pass
+print(cycle.statistics.keys())

@@ -1,0 +1,109 @@
+"""
+Choose the step, springs, increment and order
+=============================================
+
+Every setting buys accuracy with time. This page measures both on two small scenes, so that you can do the same on yours: run at half the step, and look at what changes.
+"""
+
+# %%
+# The time step of a slope that slides
+# ------------------------------------
+# The scene of the :doc:`first run </start/first_run>`, 0.4 s of it. The work of gravity is a good measure: it is one number for how far all that moves has come down. Its
+# reference is the finest step.
+
+import time as clock
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import geomech
+from geomech import ddm
+from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
+from geomech.scene import load_scene
+
+here = Path.cwd()  # the project's folder, or one below it
+project = next(folder for folder in (here, *here.parents) if (folder / "docs").is_dir())
+slope = project / "docs" / "start" / "my_slope.toml"
+
+
+def fall(*wishes: str) -> tuple[float, float]:
+    """What the weight has done in 0.4 s, J/m, and the processor time of the run, s."""
+    scene = load_scene(slope, ["run.end_time_s=0.4", *wishes])
+    began = clock.process_time()
+    for cycle in geomech.cycles(scene):
+        pass
+    spent = clock.process_time() - began
+    blocks = cycle.blocks
+    weight = 2600 * 9.81 * blocks.areas * ~blocks.fixed
+    return float(weight @ (cycle.motion.reference_centre - cycle.motion.centre)[:, 1]), spent
+
+
+fall("dda.time_step_s=0.04")  # compiles what is to be compiled
+reference, _ = fall("dda.time_step_s=0.002")
+figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+for springs in ("stiff", "resolved"):
+    found = []
+    for dt in (0.02, 0.01, 0.005):
+        work, spent = fall(f"dda.time_step_s={dt}", f"dda.springs={springs}")
+        found.append((spent, abs(work / reference - 1)))
+        print(f"{springs:9} dt = {1e3 * dt:4.0f} ms: {spent:5.2f} s, work of gravity off by {found[-1][1]:.2%}")
+    left.loglog(*np.array(found).T, "o-", label=f"{springs} springs, 20 / 10 / 5 ms")
+left.set(xlabel="processor time, s", ylabel="error of the work of gravity", title="a slope that slides")
+left.legend(frameon=False)
+
+# %%
+# The order of crack elements
+# ---------------------------
+# A slanted crack in a plate; the reference is order 10. Each order costs little and brings most of a digit.
+
+rock = Material("rock", 17e9, 0.21, k_ic=2e6)
+plate = np.array([[-0.03, -0.06], [0.03, -0.06], [0.03, 0.06], [-0.03, 0.06]])
+crack = Cracks.from_polylines([np.array([[-5e-3, -5e-3], [5e-3, 5e-3]])], aperture=np.inf)
+load = ddm.BodyLoad(sides={0: (0.0, 1e7), 2: (0.0, -1e7)})
+
+
+def factors(order: int) -> tuple[np.ndarray, float]:
+    began = clock.process_time()
+    tips = ddm.Body([plate], crack, rock, DdmSettings(order=order)).solve(load).tips
+    return np.array([tips["k_i"], tips["k_ii"]]), clock.process_time() - began
+
+
+factors(4)
+exact, _ = factors(10)
+found = []
+for order in (2, 3, 4, 5, 6, 8):
+    k, spent = factors(order)
+    found.append((1e3 * spent, np.abs(k - exact).max() / np.abs(exact).max()))
+    print(f"order {order}: {found[-1][0]:5.1f} ms, K off by {found[-1][1]:.1e}")
+right.loglog(*np.array(found).T, "s-", color="C2")
+right.set(xlabel="processor time, ms", ylabel="error of K", title="order 2 … 8 of elements")
+
+# %%
+# Or say which error you want: ``ddm.target_error`` in the scene, ``ddm.solve_to`` in Python.
+
+solution = ddm.solve_to([plate], crack, rock, load, 1e-7)
+print(f"asked for 1e-7: order {solution.body.settings.order}, estimated error {np.abs(solution.tip_errors).max() / np.abs(solution.tips['k_ii']).max():.1e}")
+
+# %%
+# The increment of growth
+# -----------------------
+# Wing cracks of that crack, to a length of 12 mm, by increments of 4 to 1 mm. What is compared is where the tip comes to.
+
+ends, figure = {}, plt.figure(figsize=(5, 3.6), layout="constrained")
+axes = figure.subplots()
+for increment in (4e-3, 2e-3, 1e-3):
+    steps = ddm.propagate(
+        [plate], crack, rock, load, GrowthSettings(increment=increment), DdmSettings(), control="toughness", max_steps=round(12e-3 / increment)
+    )
+    *_, last = steps
+    nodes = last.cracks.nodes[last.cracks.segments]
+    for a, b in nodes:
+        axes.plot(*(1e3 * np.array([a, b])).T, color={4e-3: "C3", 2e-3: "C0", 1e-3: "k"}[increment], lw=1.2)
+    ends[increment] = last.tips["point"][np.argmax(last.tips["point"][:, 1])]
+    print(f"increment {1e3 * increment:.0f} mm: tip at {np.round(1e3 * ends[increment], 3)} mm, load factor {last.load_factor:.3f}")
+axes.set_aspect("equal")
+axes.set(xlabel="mm", ylabel="mm", title="paths by increments of 4, 2 and 1 mm")
+
+# %%
+# Rules of thumb stand in :doc:`/howto/settings`; error against time of many problems, for this solver and others, in :doc:`/verification/speed`.
