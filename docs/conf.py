@@ -68,6 +68,8 @@ html_sidebars = {"index": [], "search": []}
 html_context = {"default_mode": "auto"}
 copybutton_prompt_text = "$ "
 
+# `-D plot_gallery=False` builds without running the tutorials; text, as what a command line gives.
+plot_gallery = "True"
 sphinx_gallery_conf = {
     "examples_dirs": "tutorials",
     "gallery_dirs": "gallery",
@@ -79,7 +81,6 @@ sphinx_gallery_conf = {
     "show_memory": False,
     "show_signature": False,
     "min_reported_time": 1e9,
-    "plot_gallery": True,
     "abort_on_example_error": True,
     "thumbnail_size": (480, 320),
 }

@@ -152,7 +152,7 @@ def attempt(old: str, new: str, geo=("", "")) -> None:
         found = load_scene(folder / "my_slope.toml")
         faults = found.warnings
     except SceneError as error:
-        faults = error.faults
+        faults = error.errors
     for fault in faults:
         print(f"{fault.message}\n   → {fault.way_out}".replace(str(folder) + "/", ""))
 

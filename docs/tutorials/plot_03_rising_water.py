@@ -10,7 +10,7 @@ it pass one? Then the water rises while the run goes on, and the block goes.
 # The scene
 # ---------
 # Water presses in all joints below its table, ``[loads.water]``. Here the table is level in the crack; the plane drains at the toe.
-# A table above the ground would be a lake; ``follows_ground`` cuts it off there.
+# The plane goes on below the toe, so that nothing bars the way there. A table above the ground would be a lake; ``follows_ground`` cuts it off there.
 
 import tempfile
 from pathlib import Path
@@ -32,7 +32,7 @@ name = "block"
 polygon = [[0, 0], [20, 10], [20, 22], [6, 22]]
 [[geometry.zones]]
 name = "base"
-polygon = [[0, 0], [-10, 0], [-10, -4], [34, -4], [34, 22], [20, 22], [20, 10]]
+polygon = [[0, 0], [-10, -5], [-10, -9], [34, -9], [34, 22], [20, 22], [20, 10]]
 
 [[geometry.edges]]
 name = "joint:plane"

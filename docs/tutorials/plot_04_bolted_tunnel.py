@@ -2,7 +2,7 @@
 Bolts and an excavated tunnel
 =============================
 
-Rock with two joint sets is at rest under its weight. A tunnel is dug into it while the run goes on. Without support a key block
+Rock with three joint sets is at rest under its weight. A tunnel is dug into it while the run goes on. Without support a key block
 comes out of the roof; with bolts it stays.
 """
 
@@ -25,7 +25,7 @@ from geomech.scene import load_scene
 work = Path(tempfile.mkdtemp(prefix="geomech-tutorial-"))
 
 SCENE = """
-title = "A tunnel under two joint sets"
+title = "A tunnel in jointed rock"
 
 [geometry]
 seed = 5
@@ -45,13 +45,19 @@ polygon = [[-1, -1], [21, -1], [21, 14], [20, 14], [20, 0], [0, 0], [0, 14], [-1
 
 [[geometry.joint_sets]]
 name = "left"
-angle_deg = 62
-spacing_m = 2.6
+angle_deg = 72
+spacing_m = 2.2
 zones = ["rock"]
 [[geometry.joint_sets]]
 name = "right"
-angle_deg = 122
-spacing_m = 2.6
+angle_deg = 110
+spacing_m = 2.2
+zones = ["rock"]
+
+[[geometry.joint_sets]]
+name = "flat"
+angle_deg = 4
+spacing_m = 2.4
 zones = ["rock"]
 
 [materials.rock]
@@ -63,7 +69,7 @@ density_kg_m3 = 2600
 fixed = true
 
 [joints.default]
-friction_angle_deg = 28
+friction_angle_deg = 20
 
 [loads]
 gravity_m_s2 = [0, -9.81]
@@ -74,11 +80,11 @@ zones = ["core"]
 [dda]
 dynamic_factor = 1.0
 time_step_s = 0.005
-equilibrium = "start"
 springs = "resolved"
+equilibrium = "start"
 
 [run]
-end_time_s = 0.6
+end_time_s = 0.4
 """
 (work / "tunnel.toml").write_text(SCENE)
 
@@ -115,6 +121,9 @@ for axes, name in zip(both, ("tunnel", "bolted")):
         axes.plot([x0, x1], [y0, y1], color="#0072b2", lw=2)
 
 # %%
+# Before the tunnel is dug nothing moves, and energies are next to nothing: a warning of the energy balance at 0.03 s, as a part of what little has been turned over by then, need
+# not worry. ``budget_residual`` in ``history.csv`` says it in J/m.
+#
 # What the bolts carry
 # --------------------
 # A run folder has them in ``history.csv``, a column a bolt and joint. From Python they are rows of the state:

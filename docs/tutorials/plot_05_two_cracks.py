@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import geomech
-from geomech.reference import two_cracks as published
+from geomech.reference.specimens import two_cracks as published
 from geomech.render import sketch
 from geomech.scene import load_scene
 

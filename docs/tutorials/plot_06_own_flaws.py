@@ -111,7 +111,7 @@ increment_m = 1.5e-3
 [run]
 stepping = "events"
 events = ["tips"]
-end_time_s = 60
+end_time_s = 90
 stop_at = ["coalescence", "split"]
 
 [gauge]

@@ -124,19 +124,17 @@ print(f"the block slides {1e3 * block[-1]:.1f} mm, Newmark's {1e3 * newmark[-1]:
 JOINTS = """
 [[geometry.joint_sets]]
 name = "steep"
-angle_deg = 105
-spacing_m = 3.0
+angle_deg = 110
+spacing_m = 3.5
 zones = ["mass"]
 [[geometry.joint_sets]]
 name = "flat"
-angle_deg = 17
-spacing_m = 2.5
+angle_deg = 20
+spacing_m = 2.6
 zones = ["mass"]
 """
 (work / "mass.toml").write_text(
-    SCENE.replace("title", '[geometry]\nseed = 2\ndead_ends = "trim"\nsmallest_block_m2 = 0.3\n' + JOINTS + "#").replace(
-        "[geometry]\nseed", "[geometry]\nseed"
-    )
+    SCENE.replace("[[geometry.zones]]", '[geometry]\nseed = 2\ndead_ends = "trim"\nsmallest_block_m2 = 1.0\n[[geometry.zones]]', 1) + JOINTS
 )
 time2, blocks, last = slide(load_scene(work / "mass.toml"))
 

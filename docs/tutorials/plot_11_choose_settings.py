@@ -35,7 +35,7 @@ def fall(*wishes: str) -> tuple[float, float]:
         pass
     spent = clock.process_time() - began
     blocks = cycle.blocks
-    weight = 2600 * 9.81 * blocks.areas * ~blocks.fixed
+    weight = 2600 * 9.81 * blocks.areas() * ~blocks.fixed
     return float(weight @ (cycle.motion.reference_centre - cycle.motion.centre)[:, 1]), spent
 
 
