@@ -4,6 +4,7 @@ Pages that repeat what the program itself knows (scene keys, command line, equat
 ``docs/generated`` by the modules of ``docs/generate`` before anything is read. The tutorials are run by sphinx-gallery.
 """
 
+import logging
 import os
 import sys
 import tempfile
@@ -14,6 +15,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent)]
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from generate import pages  # noqa: E402
+from generate.docstrings import as_rst  # noqa: E402
 from generate.pictures import RunPictures  # noqa: E402
 
 import geomech  # noqa: E402
@@ -35,7 +37,8 @@ myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "
 myst_heading_anchors = 3
 exclude_patterns = ["generate/**", "tutorials/**", "gallery/**/*.ipynb", "gallery/**/*.py", "**/README.txt"]
 # Topics beside the chapters may have been written or not: `howto/index` lists what there is.
-suppress_warnings = ["toc.empty_glob", "config.cache"]
+suppress_warnings = ["config.cache"]
+logging.getLogger("sphinx.sphinx.directives.other").addFilter(lambda record: "glob pattern" not in str(record.msg))
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
@@ -89,4 +92,5 @@ sphinx_gallery_conf = {
 def setup(app):
     # Kernels are kept where they always are; runs of tutorials go to a folder that goes with the build.
     tempfile.tempdir = None
+    app.connect("autodoc-process-docstring", lambda app, what, name, it, options, lines: lines.__setitem__(slice(None), as_rst(lines)))
     app.connect("config-inited", lambda app, config: pages.write_all(HERE / "generated"))
