@@ -14,11 +14,12 @@ from ..model import Blocks, Cracks, Problem
 from .assembly.drawn_marks import with_marks
 from .build import build_problem
 from .checks.action_checks import check_actions
+from .checks.check import Check
 from .checks.cross_checks import check
 from .checks.plausibility import check_plausible
 from .checks.supported_loads import check_loads
 from .drawing import Drawing, draw
-from .errors import Check, Fault, SceneError, one_a_cause
+from .errors import Fault, SceneError, one_a_cause
 from .keys import describe_keys
 from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
