@@ -11,6 +11,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..model import Blocks, Cracks, Problem
+from ..shapes.mesh_exchange import SUFFIXES as OTHER_MESHES
 from .assembly.drawn_marks import with_marks
 from .build import build_problem
 from .checks.action_checks import check_actions
@@ -34,7 +35,7 @@ from .world import moved
 SCENE_FILE = "scene.toml"
 
 #: What a scene's geometry.model may be, and is taken for a scene at times.
-MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf")
+MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf", *OTHER_MESHES)
 
 #: A scene nests tables and arrays some six deep; what is nested deeper than this is a mistake, or meant to exhaust.
 DEEPEST = 40
