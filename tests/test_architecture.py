@@ -39,6 +39,7 @@ EDGE = {
     "bench",
     "cli",
     "doctor",
+    "examples",
     "installing",
     "interruption",
     "pipeline",
