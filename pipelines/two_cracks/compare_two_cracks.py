@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from geomech.model import Cracks, Cycle, Problem
-from geomech.model.cracks import whole_network
+from geomech.model import whole_network
 from geomech.reference.specimens import two_cracks as published
 from geomech.report.study_part import Part
 
