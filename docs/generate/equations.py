@@ -14,9 +14,8 @@ ROOT = Path(__file__).parents[2]
 
 OPENING = """# Index of equations
 
-From an equation to the function that computes it and to the paper or book it comes from. The first word of a row links
-nothing away: the file is a path in the project, the line is where the function begins in this version. A test imports every
-function and looks in its docstring, or that of its module, for the words that mark the equation.
+From an equation to the function that computes it, its file and line in this version, and the paper or book it comes from. The page is made from
+`docs/equations.toml`. A test imports every function and looks in its docstring, or that of its module, for words that mark the equation.
 """
 
 

@@ -77,7 +77,7 @@ def _orders() -> str:
     ):
         lines += [f"## {title}\n", text + "\n"]
         for name, curve in _curves(_stored()[topic]["error"]).items():
-            lines += [f"**{name}**\n", *_table(curve), ""]
+            lines += [f"**{name}**\n", *_table(name, curve), ""]
     return "\n".join(lines) + "\n"
 
 
@@ -93,13 +93,31 @@ def _curves(errors: Mapping[str, float]) -> dict[str, list[tuple[float, float]]]
     return {name: curve for name, curve in curves.items() if len(curve) > 1}
 
 
-def _table(curve: list[tuple[float, float]]) -> Iterator[str]:
-    yield "| " + " | ".join(["at", *(f"{x:g}" for x, _ in curve)]) + " |"
+#: Words in the name of a curve → what its figures are over, and whether an order is observed in it.
+ABSCISSAE = (
+    ("p = ", "order p", True),
+    ("asked for", "digits asked for", False),
+    ("time step", "time step, s", True),
+    ("penalty", "penalty, E", True),
+    ("increments", "increments", True),
+    ("depths", "size of the block, depths", True),
+    ("tolerance", "tolerance", False),
+)
+
+
+def _table(name: str, curve: list[tuple[float, float]]) -> Iterator[str]:
+    what, ordered = next(((what, ordered) for word, what, ordered in ABSCISSAE if word in name), ("at", False))
+    yield "| " + " | ".join([what, *(f"{x:g}" for x, _ in curve)]) + " |"
     yield "|" + "---|" * (len(curve) + 1)
     yield "| " + " | ".join(["error", *(_short(error) for _, error in curve)]) + " |"
-    slopes = [abs(math.log(b / a) / math.log(y / x)) for (x, a), (y, b) in pairwise(curve)]
-    yield "| " + " | ".join(["observed order", "", *(f"{slope:.1f}" for slope in slopes)]) + " |"
+    if ordered:
+        slopes = [abs(math.log(b / a) / math.log(y / x)) for (x, a), (y, b) in pairwise(curve)]
+        yield "| " + " | ".join(["observed order", "", *(f"{slope:.1f}" for slope in slopes)]) + " |"
 
 
 def _short(value: float) -> str:
-    return "0" if value == 0 else f"{value:.1e}" if value < 1e-2 else f"{100 * value:.2g} %"
+    if value == 0 or value >= 1e-2:
+        return f"{100 * value:.2g} %" if value else "0"
+    digits, _, power = f"{value:.1e}".partition("e")
+    # A hyphen at which no line is broken.
+    return f"{digits}e\u2011{abs(int(power))}"

@@ -81,7 +81,8 @@ stop_at = ["split"]
 """
 (work / "bridge.toml").write_text(SCENE)
 scene = load_scene(work / "bridge.toml")
-sketch(scene).set_title("red: cracks; between the two pieces of the plane stands the bridge")
+axes = sketch(scene)
+axes.set(ylim=(-12, 33), title="red: cracks; the gap is the bridge")
 
 # %%
 # Run
@@ -129,7 +130,7 @@ left.axhline(2.4, color="0.6", ls="--", label="K_IIc")
 left.set(xlabel="gravity, g", ylabel="MPa √m")
 left.legend(frameon=False)
 sketch(cycle, right)
-right.set_title("two blocks now")
+right.set(ylim=(-12, 33), title="two blocks now")
 
 # %%
 # ``pipelines/planar_slope`` does this for bridges of 0.15 to 1.2 m and one that may only tear. ``pipelines/step_path_slope`` has ten

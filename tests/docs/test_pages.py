@@ -71,3 +71,14 @@ def test_scenes_in_pages_are_toml():
     for page in PAGES:
         for block in re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
             tomllib.loads(block)
+
+
+def test_messages_are_those_of_the_program():
+    """What stands between the dots of a message is text of the sources."""
+    source = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "geomech").rglob("*.py"))
+    # Strings that are written over several lines are one.
+    source = re.sub(r'"\s*\n\s*f?"', "", source)
+    terms = re.findall(r"^(`.+)\n:   ", (DOCS / "reference" / "messages.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(terms) > 20
+    fragments = [part.strip() for term in terms for text in re.findall(r"`([^`]+)`", term) for part in text.split("…")]
+    assert [part for part in fragments if part and part not in source] == []
