@@ -78,12 +78,12 @@ end_time_s = 3.0
 # The table is a line from the toe to the level in the crack. ``geomech safety water.toml --set …`` does this on the command line.
 
 
-def table(level: float) -> str:
-    return f"loads.water.points=[[0, 0], [20, {10 + level}], [34, {10 + level}]]"
+def table(level: float) -> dict:
+    return {"loads.water.points": [[0, 0], [20, 10 + level], [34, 10 + level]]}
 
 
 levels = np.array([0.0, 4.0, 8.0, 11.0])
-found = [geomech.factor_of_safety(load_scene(work / "water.toml", [table(level)])).factor for level in levels]
+found = [geomech.factor_of_safety(load_scene(work / "water.toml", table(level))).factor for level in levels]
 
 # %%
 # Against limit equilibrium (Hoek & Bray 1981, chapter 7): the water's thrust :math:`V = \tfrac12\gamma_w z^2` in the crack and the uplift
@@ -111,12 +111,12 @@ axes.legend(frameon=False)
 
 rising = load_scene(
     work / "water.toml",
-    [
-        "joints.plane.cohesion_pa=0",
-        "joints.plane.friction_angle_deg=29",
-        "loads.water.level_times_s=[0, 2]",
-        "loads.water.levels_m=[0, 10]",
-    ],
+    {
+        "joints.plane.cohesion_pa": 0.0,
+        "joints.plane.friction_angle_deg": 29.0,
+        "loads.water.level_times_s": [0.0, 2.0],
+        "loads.water.levels_m": [0.0, 10.0],
+    },
 )
 path = []
 for cycle in geomech.cycles(rising):

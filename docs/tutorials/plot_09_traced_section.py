@@ -48,7 +48,7 @@ print(len(blocks["features"]), "features;", blocks["features"][0]["properties"])
 # ---
 # A second of motion under its weight, with water and anchors.
 
-for cycle in geomech.cycles(load_scene(project / "geometry" / "traced_slope.toml", ["run.end_time_s=0.3"])):
+for cycle in geomech.cycles(load_scene(project / "geometry" / "traced_slope.toml", {"run.end_time_s": 0.3})):
     pass
 moved = np.linalg.norm(cycle.motion.centre - cycle.motion.reference_centre, axis=1)
 axes = sketch(cycle, values=1e3 * moved, label="moved, mm")

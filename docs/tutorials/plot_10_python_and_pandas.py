@@ -8,7 +8,7 @@ A set of runs from one scene, driven from Python, and their tables in data frame
 # %%
 # A scene as text, and what varies
 # --------------------------------
-# ``load_scene(path, overrides)`` takes what ``--set`` takes. Here: the friction of a plane at 30°, in steps, for a block that slides in real time.
+# ``load_scene(path, changes)`` takes the keys of ``--set`` with Python values. Here: the friction of a plane at 30°, in steps, for a block that slides in real time.
 
 import tempfile
 from pathlib import Path
@@ -18,7 +18,6 @@ import numpy as np
 import pandas as pd
 
 import geomech
-from geomech.output import Run
 from geomech.scene import load_scene
 
 work = Path(tempfile.mkdtemp(prefix="geomech-tutorial-"))
@@ -55,17 +54,17 @@ end_time_s = 0.5
 rows = []
 for friction in (0, 10, 20, 28, 32):
     # At 32° it stands; "start" would find no equilibrium for the others, and a run says so.
-    wishes = [f"joints.default.friction_angle_deg={friction}", "output.interior=false"]
-    wishes += [] if friction > 30 else ['dda.equilibrium=""']
-    summary = geomech.run(load_scene(work / "block.toml", wishes), work / f"friction_{friction}", observers=None)
+    changes = {"joints.default.friction_angle_deg": friction, "dda.equilibrium": "start" if friction > 30 else ""}
+    summary = geomech.run(load_scene(work / "block.toml", changes), work / f"friction_{friction}")
     rows.append({"friction": friction, "end": summary["end"]})
 
 # %%
 # Histories as data frames
 # ------------------------
-# Every CSV of a run folder has one header line and SI units: ``pandas.read_csv`` reads it as it is.
+# ``geomech.open_run`` gives the tables of a run folder: ``history``, ``tips``, ``events``, ``joints``. (Every CSV has one header line and SI units, so that ``pandas.read_csv`` and
+# any spreadsheet read it too.)
 
-frames = {friction: pd.read_csv(work / f"friction_{friction}" / "history.csv") for friction in (0, 10, 20, 28, 32)}
+frames = {friction: geomech.open_run(work / f"friction_{friction}").history for friction in (0, 10, 20, 28, 32)}
 print(frames[20][["time", "block_ux", "block_uy", "open_close_iterations", "kinetic_energy"]].tail(3).to_string(index=False))
 
 table = pd.DataFrame(rows).set_index("friction")
@@ -83,16 +82,17 @@ axes.set(xlabel="s", ylabel="down the plane, m")
 axes.legend(frameon=False, title="friction")
 
 # %%
-# ``Run``: more than tables
-# -------------------------
-# ``geomech.output.Run`` reads a folder as NumPy arrays, and the grids of any cycle as PyVista's.
+# More than tables
+# ----------------
+# The same object has the summary, the scene as it was run, and the series as PyVista meshes at any cycle or time. In a notebook it shows itself.
 
-run = Run(work / "friction_20")
-print(run.title, "·", run.summary["end"], "·", len(run.history), "cycles")
-grid = run.grid("blocks", cycle=50)
-print(grid.array_names)
-contacts = pd.DataFrame(np.asarray(run.grid("contacts", 50).point_data["normal_force"]), columns=["normal force, N/m"])
+run = geomech.open_run(work / "friction_20")
+print(run, "·", run.summary["end"], "·", run.series)
+mesh = run.mesh("blocks", time=0.25)
+print(mesh.array_names)
+contacts = pd.Series(run.mesh("contacts", time=0.25).point_data["normal_force"], name="normal force, N/m")
 print(contacts.to_string())
+print(run.joints.tail(1).T.to_string())
 
 # %%
 # Without files
@@ -100,6 +100,6 @@ print(contacts.to_string())
 # ``geomech.cycles(scene)`` yields each cycle as it comes: arrays of blocks, contacts, tips. An observer is any object with ``on_cycle``; see
 # ``geomech.output.Observer``. Nothing is written that no observer writes.
 
-for cycle in geomech.cycles(load_scene(work / "block.toml", ['dda.equilibrium=""'])):
+for cycle in geomech.cycles(load_scene(work / "block.toml", {"dda.equilibrium": ""})):
     pass
 print(cycle.statistics.keys())
