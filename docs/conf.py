@@ -14,11 +14,11 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from generate import pages  # noqa: E402
-from generate.docstrings import as_rst  # noqa: E402
-from generate.pictures import RunPictures  # noqa: E402
+from generate import pages
+from generate.docstrings import as_rst
+from generate.pictures import RunPictures
 
-import geomech  # noqa: E402
+import geomech
 
 project = "geomech"
 author = "The authors of geomech"
@@ -93,5 +93,8 @@ sphinx_gallery_conf = {
 def setup(app):
     # Kernels are kept where they always are; runs of tutorials go to a folder that goes with the build.
     tempfile.tempdir = None
-    app.connect("autodoc-process-docstring", lambda app, what, name, it, options, lines: lines.__setitem__(slice(None), as_rst(lines)))
+    app.connect(
+        "autodoc-process-docstring",
+        lambda app, what, name, it, options, lines: lines.__setitem__(slice(None), as_rst(lines)),
+    )
     app.connect("config-inited", lambda app, config: pages.write_all(HERE / "generated"))

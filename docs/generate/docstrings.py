@@ -1,4 +1,4 @@
-"""Docstrings of the project as reStructuredText: lists of attributes in columns become lists, indented equations stay as they
+"""Docstrings of the project as reStructuredText: attributes in columns become lists, indented equations stay as they
 are written."""
 
 from __future__ import annotations
@@ -57,5 +57,9 @@ def _listed(paragraph: list[str]) -> list[str]:
 def _plain(text: str) -> str:
     """Signs that stand for themselves: bars of sizes, stars of products."""
     if "``" in text or "`" in text:
-        return re.sub(r"(?<!\\)\|", r"\\|", text) if text.count("`") % 2 == 0 and "|`" not in text and "`|" not in text else text
+        return (
+            re.sub(r"(?<!\\)\|", r"\\|", text)
+            if text.count("`") % 2 == 0 and "|`" not in text and "`|" not in text
+            else text
+        )
     return re.sub(r"(?<!\\)([|*])", r"\\\1", text)

@@ -14,14 +14,16 @@ ROOT = Path(__file__).parents[2]
 
 OPENING = """# Index of equations
 
-From an equation to the function that computes it, its file and line in this version, and the paper or book it comes from. The page is made from
-`docs/equations.toml`. A test imports every function and looks in its docstring, or that of its module, for words that mark the equation.
+From an equation to the function that computes it, its file and line in this version, and the paper or book it comes
+from. The page is made from
+`docs/equations.toml`. A test imports every function and looks in its docstring, or that of its module, for words
+that mark the equation.
 """
 
 
 class Row(NamedTuple):
-    """One equation: ``what`` it is, as ``tex``, ``at`` "module:function", its ``source``, and the words in the docstring
-    that ``mark`` it."""
+    """One equation: ``what`` it is, as ``tex``, ``at`` "module:function", its ``source``, and the words in the
+    docstring that ``mark`` it."""
 
     what: str
     tex: str

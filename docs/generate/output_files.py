@@ -8,7 +8,8 @@ from geomech.output import fields
 
 OPENING = """# Output files
 
-Made from the tables that writers are held to (`geomech/output/fields.py`): a writer refuses an array that is not declared, so this is all there
+Made from the tables that writers are held to (`geomech/output/fields.py`): a writer refuses an array that is not
+declared, so this is all there
 is. What the files are for: [what comes out](../start/results.md).
 """
 
@@ -20,8 +21,9 @@ CSV = {
     "reactions.csv": fields.REACTIONS,
 }
 ROWS = {
-    "history.csv": "A row a cycle. After these columns come the statistics of the step (`dt`, `open_close_iterations`, energies, "
-    "`budget_residual`, `worst_penetration` …), displacements of monitors (`NAME_ux`, `NAME_uy`, m) and forces in bolts.",
+    "history.csv": "A row a cycle. After these columns come the statistics of the step (`dt`, `open_close_iterations`, "
+    "energies, `budget_residual`, `worst_penetration` …), displacements of monitors (`NAME_ux`, `NAME_uy`, m) and "
+    "forces in bolts.",
     "tips.csv": "A row a tip and cycle.",
     "events.csv": "A row an event.",
     "joints.csv": "A row a joint and cycle. A joint goes by the name of its edges, else by that of its law.",

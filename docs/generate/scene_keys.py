@@ -11,12 +11,16 @@ from geomech.scene.tables import SceneTables
 
 OPENING = """# Keys of a scene
 
-This page is made from the tables that check scenes, so it holds every key there is. `geomech check SCENE --keys` prints
-the same. A scene is a TOML file in SI units; angles are in degrees with the unit in the key's name. Paths are relative to
-the scene file. TOML has no null: a key that is absent is unset. An unknown key, a missing value or one out of range is
+This page is made from the tables that check scenes, so it holds every key there is. `geomech check SCENE --keys`
+prints
+the same. A scene is a TOML file in SI units; angles are in degrees with the unit in the key's name. Paths are
+relative to
+the scene file. TOML has no null: a key that is absent is unset. An unknown key, a missing value or one out of range
+is
 refused before anything runs, all at once, with its line and the way out.
 
-`[table]` holds keys. `[[table]]` may stand several times, once for each item. `NAME` is yours to choose. Any key may be
+`[table]` holds keys. `[[table]]` may stand several times, once for each item. `NAME` is yours to choose. Any key
+may be
 changed on the command line: `--set dda.time_step_s=0.01`, `--set materials.rock.density_kg_m3=2500`,
 `--set geometry.cracks.0.angle_deg=30` (items count from 0).
 """

@@ -21,27 +21,45 @@ geomech bench accuracy boundary coupling dda ddm schemes stability steps --quick
 geomech bench --quick --against tests/validation/bench_baseline.json      # what got worse since
 ```
 
-`tests/validation/test_bench_baseline.py` computes the figures again in every run of the tests and fails where one is worse, or better by so much that
-the stored one is stale. Errors are relative; 0 is exact to the last digit. What each is held against: [cracks](../verification/cracks.md),
+`tests/validation/test_bench_baseline.py` computes the figures again in every run of the tests and fails where one
+is worse, or better by so much that
+the stored one is stale. Errors are relative; 0 is exact to the last digit. What each is held against:
+[cracks](../verification/cracks.md),
 [blocks](../verification/blocks.md), [blocks and cracks](../verification/coupled.md).
 """
 
 TOPICS = {
-    "accuracy": ("Published values and closed forms", "case", "Default settings: order 4, four elements a crack, unless the row says otherwise."),
-    "boundary": (
-        "Ways from contact forces to tractions", "way",
-        "`contacts` spreads contact forces over faces (default), `springs` leaves them as point forces, `kelvin-springs` is the paper's route. "
-        "K against that of the specimen under an even load.",
+    "accuracy": (
+        "Published values and closed forms",
+        "case",
+        "Default settings: order 4, four elements a crack, unless the row says otherwise.",
     ),
-    "coupling": ("Passes of blocks and cracks", "case", "K against passes to round-off, by the tolerance at which passes end."),
+    "boundary": (
+        "Ways from contact forces to tractions",
+        "way",
+        "`contacts` spreads contact forces over faces (default), `springs` leaves them as point forces, `kelvin-springs` "
+        "is the paper's route. K against that of the specimen under an even load.",
+    ),
+    "coupling": (
+        "Passes of blocks and cracks",
+        "case",
+        "K against passes to round-off, by the tolerance at which passes end.",
+    ),
     "dda": ("Blocks", "case", "Rigid blocks and a column of elastic ones."),
-    "steps": ("Fixed steps against events", "case", "The two-crack specimen by steps of 16 s, against steps from event to event: loads of initiation and coalescence."),
-}  # fmt: skip
+    "steps": (
+        "Fixed steps against events",
+        "case",
+        "The two-crack specimen by steps of 16 s, against steps from event to event: loads of initiation and "
+        "coalescence.",
+    ),
+}
 
 ORDERS = """# Observed orders
 
-Errors by the order p of elements, by the time step, by what was asked for; from the same stored figures as [accuracy](accuracy.md). The observed order
-is the slope between neighbouring figures in logarithms: −d ln(error)/d ln(p) for elements, d ln(error)/d ln(Δt) for steps. Where a solution is smooth along the elements it grows with p,
+Errors by the order p of elements, by the time step, by what was asked for; from the same stored figures as
+[accuracy](accuracy.md). The observed order
+is the slope between neighbouring figures in logarithms: −d ln(error)/d ln(p) for elements, d ln(error)/d ln(Δt) for
+steps. Where a solution is smooth along the elements it grows with p,
 as that of an exponential does.
 """
 

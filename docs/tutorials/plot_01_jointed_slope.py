@@ -2,7 +2,8 @@
 A jointed slope, from an empty Gmsh file
 ========================================
 
-A slope 20 m high with two joint sets. We draw it in Gmsh from nothing: rock, floor, back, names. Then we make the mistakes
+A slope 20 m high with two joint sets. We draw it in Gmsh from nothing: rock, floor, back, names. Then we make the
+mistakes
 that most people make first, and see what the program says to each.
 """
 
@@ -13,10 +14,12 @@ that most people make first, and see what the program says to each.
 # ``DefineConstant`` stand in the side panel. The rules are few:
 #
 # - a *physical surface* is a zone of rock, by name;
-# - a *physical curve* called ``joint:…`` or ``crack:…`` cuts the rock; any other name marks edges, for loads or joint laws;
+# - a *physical curve* called ``joint:…`` or ``crack:…`` cuts the rock; any other name marks edges, for loads or joint
+#   laws;
 # - what is not in a physical group is not read.
 #
-# Two surfaces: ``rock``, which joints will cut, and ``base``, which holds it from below and from behind. The base goes on in
+# Two surfaces: ``rock``, which joints will cut, and ``base``, which holds it from below and from behind. The base
+# goes on in
 # front of the toe: blocks that come down need a floor to land on. To the left the slope is free.
 
 import tempfile
@@ -59,7 +62,8 @@ Physical Curve("face") = {4};
 # %%
 # The scene
 # ---------
-# Joint sets come by statistics: beds that dip 30° out of the slope, cross joints across them. Sets cut ``rock`` alone.
+# Joint sets come by statistics: beds that dip 30° out of the slope, cross joints across them. Sets cut ``rock``
+# alone.
 
 SCENE = """
 title = "My slope"
@@ -129,16 +133,23 @@ axes = sketch(cycle, values=moved, label="moved, m")
 axes.set_title(f"after {cycle.state.time:g} s")
 
 # %%
-# Is it right? A rigid slab on a plane at 30° with friction of 24° goes :math:`\tfrac12 g (\sin 30° - \cos 30° \tan 24°)\,t^2`.
+# Is it right? A rigid slab on a plane at 30° with friction of 24° goes
+# :math:`\tfrac12 g (\sin 30° - \cos 30° \tan 24°)\,t^2`.
 # The fastest block, once nothing stands in its way, moves like that:
 
-slab = 0.5 * 9.81 * (np.sin(np.radians(30)) - np.cos(np.radians(30)) * np.tan(np.radians(24))) * cycle.state.time**2
+slab = (
+    0.5
+    * 9.81
+    * (np.sin(np.radians(30)) - np.cos(np.radians(30)) * np.tan(np.radians(24)))
+    * cycle.state.time**2
+)
 print(f"fastest block {moved.max():.2f} m, slab on a plane {slab:.2f} m")
 
 # %%
 # The mistakes of the first day
 # -----------------------------
-# ``geomech check`` reads a scene and its drawing and says every error at once: where, what, and the way out. Nothing runs
+# ``geomech check`` reads a scene and its drawing and says every error at once: where, what, and the way out. Nothing
+# runs
 # before it is content. We make the errors one by one:
 
 
@@ -168,7 +179,8 @@ attempt("[zones.base]\nfixed = true\n", "")
 attempt("[zones.base]\nfixed = true\n", "", geo=('Physical Surface("base") = {2};', ""))
 
 # %%
-# **A name that is misspelt**, in the scene and for a joint. The edges that a set makes are called ``joint:`` and its name.
+# **A name that is misspelt**, in the scene and for a joint. The edges that a set makes are called ``joint:`` and its
+# name.
 
 attempt("[zones.base]", "[zones.bse]")
 attempt('edges = ["joint:beds"]', 'edges = ["beds"]')
@@ -195,7 +207,8 @@ attempt("[0, -9.81]", "[0, 9.81]")
 attempt("title", "title", geo=("Line(7) = {6, 7};", ""))
 
 # %%
-# **Joint sets cut the base too**, for no zone is named. That is no error, but hardly meant: blocks of the base are fixed
+# **Joint sets cut the base too**, for no zone is named. That is no error, but hardly meant: blocks of the base are
+# fixed
 # one by one, and cost time.
 
 cut_too = SCENE.replace('zones = ["rock"]', "")
@@ -205,12 +218,15 @@ print(problem.inventory, "→", load_scene(work / "cut_too.toml").problem().inve
 # %%
 # Mistakes that no check can see
 # ------------------------------
-# - **A wall where the slope should be free.** If ``base`` goes up in front of the face, nothing comes down. Draw it, look at
+# - **A wall where the slope should be free.** If ``base`` goes up in front of the face, nothing comes down. Draw it,
+#   look at
 #   the grey parts of ``geomech build``.
 # - **No floor in front of the toe.** Blocks that come down fall out of the picture, and on.
-# - **Sides that hold by friction.** Rock that lies against a fixed back leans on it with the default joint. Give these
+# - **Sides that hold by friction.** Rock that lies against a fixed back leans on it with the default joint. Give
+#   these
 #   edges a law of their own if they should be smooth: ``between = [["back", "…"]]``.
-# - **A joint set that is not what was meant**: angles count counter-clockwise from x. Beds at +30° dip to the left here, out of the
+# - **A joint set that is not what was meant**: angles count counter-clockwise from x. Beds at +30° dip to the left
+#   here, out of the
 #   slope; at −30° into it. ``build`` draws them with their names and prints what came out.
 #
 # Next: ``geomech safety my_slope.toml`` for the factor of safety, and :ref:`rock bridges

@@ -2,20 +2,23 @@
 Rock bridges that fail
 ======================
 
-A block lies on a plane that is a joint but for one bridge of whole rock. Its weight is raised, as in a centrifuge, until the
+A block lies on a plane that is a joint but for one bridge of whole rock. Its weight is raised, as in a centrifuge,
+until the
 bridge breaks. What is the load, and what does limit equilibrium say?
 """
 
 # %%
 # The scene
 # ---------
-# The plane is drawn as a *crack* with a joint's law on its faces, in two pieces: the gap between them is the bridge. Before it breaks,
+# The plane is drawn as a *crack* with a joint's law on its faces, in two pieces: the gap between them is the bridge.
+# Before it breaks,
 # slope and ground are one cracked block; afterwards there are two, of which the upper one slides. The model is
 # ``geometry/bridged_slope.geo``: a slope of 30 m by Hoek & Bray (1981) with a tension crack behind the brink.
 #
 # Three choices matter:
 #
-# - ``criterion = "f"``: the bridge is sheared, so it may break in shear, against its own toughness ``k_iic_pa_sqrt_m``;
+# - ``criterion = "f"``: the bridge is sheared, so it may break in shear, against its own toughness
+#   ``k_iic_pa_sqrt_m``;
 # - ``stepping = "events"``: the run ends its steps at the very load at which a tip reaches its toughness;
 # - gravity grows by one g a second, so that time is the multiple of gravity.
 
@@ -90,7 +93,9 @@ axes.set(ylim=(-12, 33), title="red: cracks; the gap is the bridge")
 
 history = []
 for cycle in geomech.cycles(scene):
-    history.append((cycle.state.time, cycle.tips["k_i"].max(initial=0), np.abs(cycle.tips["k_ii"]).max(initial=0)))
+    history.append(
+        (cycle.state.time, cycle.tips["k_i"].max(initial=0), np.abs(cycle.tips["k_ii"]).max(initial=0))
+    )
     for event in cycle.events:
         print(f"{event.time:.4f} g  {event.kind}: {event.detail}")
 failure = cycle.state.time
@@ -98,7 +103,8 @@ failure = cycle.state.time
 # %%
 # Limit equilibrium with a bridge
 # -------------------------------
-# A block of weight :math:`W` on a plane at angle :math:`d` slides when :math:`W\sin d` exceeds :math:`W\cos d\tan\varphi + c\,\ell` and what the
+# A block of weight :math:`W` on a plane at angle :math:`d` slides when :math:`W\sin d` exceeds
+# :math:`W\cos d\tan\varphi + c\,\ell` and what the
 # bridge holds. Two deep cracks with a ligament of width :math:`2b` between them, sheared by a force :math:`Q`, have
 # :math:`K_{II} = Q/\sqrt{\pi b}` (Tada, Paris & Irwin). So the bridge holds :math:`K_{IIc}\sqrt{\pi b}`.
 # ``geomech/reference/slopes/rock_bridges.py`` has this formula with its sources.
@@ -110,13 +116,18 @@ area = 0.5 * height * brink + crest * height - 0.5 * (brink + crest) ** 2 * np.t
 weight = 2600 * 9.81 * area
 bridge = 2.4e6 * np.sqrt(np.pi * 0.3)
 holds = 10e3 * (plane - 0.6) + bridge
-limit = holds / (weight * (np.sin(dip) - np.cos(dip) * np.tan(np.radians(25))))
-print(f"failure at {failure:.3f} g, limit equilibrium with the bridge {limit:.3f} g ({failure / limit - 1:+.1%})")
+drive = weight * (np.sin(dip) - np.cos(dip) * np.tan(np.radians(25)))
+limit = holds / drive
+print(
+    f"failure at {failure:.3f} g, limit equilibrium with the bridge {limit:.3f} g ({failure / limit - 1:+.1%})"
+)
 
 # %%
 # The same slope without the bridge would slide at
 
-print(f"{10e3 * plane / (weight * (np.sin(dip) - np.cos(dip) * np.tan(np.radians(25)))):.2f} g: the bridge of 0.6 m does the rest.")
+print(
+    f"{10e3 * plane / drive:.2f} g: the bridge of 0.6 m does the rest."
+)
 
 # %%
 # What drives the tips, and what is left
@@ -133,5 +144,6 @@ sketch(cycle, right)
 right.set(ylim=(-12, 33), title="two blocks now")
 
 # %%
-# ``pipelines/planar_slope`` does this for bridges of 0.15 to 1.2 m and one that may only tear. ``pipelines/step_path_slope`` has ten
+# ``pipelines/planar_slope`` does this for bridges of 0.15 to 1.2 m and one that may only tear.
+# ``pipelines/step_path_slope`` has ten
 # en-échelon joints, followed through the fall of the load with ``control = "toughness"``.

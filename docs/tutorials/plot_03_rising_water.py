@@ -2,15 +2,18 @@
 A rising water table
 ====================
 
-A block on a plane, a tension crack behind it, and water that rises in both. The factor of safety falls; at which level does
+A block on a plane, a tension crack behind it, and water that rises in both. The factor of safety falls; at which
+level does
 it pass one? Then the water rises while the run goes on, and the block goes.
 """
 
 # %%
 # The scene
 # ---------
-# Water presses in all joints below its table, ``[loads.water]``. Here the table is level in the crack; the plane drains at the toe.
-# The plane goes on below the toe, so that nothing bars the way there. A table above the ground would be a lake; ``follows_ground`` cuts it off there.
+# Water presses in all joints below its table, ``[loads.water]``. Here the table is level in the crack; the plane
+# drains at the toe.
+# The plane goes on below the toe, so that nothing bars the way there. A table above the ground would be a lake;
+# ``follows_ground`` cuts it off there.
 
 import tempfile
 from pathlib import Path
@@ -75,7 +78,8 @@ end_time_s = 3.0
 # %%
 # The factor by level
 # -------------------
-# The table is a line from the toe to the level in the crack. ``geomech safety water.toml --set …`` does this on the command line.
+# The table is a line from the toe to the level in the crack. ``geomech safety water.toml --set …`` does this on the
+# command line.
 
 
 def table(level: float) -> dict:
@@ -86,11 +90,21 @@ levels = np.array([0.0, 4.0, 8.0, 11.0])
 found = [geomech.factor_of_safety(load_scene(work / "water.toml", table(level))).factor for level in levels]
 
 # %%
-# Against limit equilibrium (Hoek & Bray 1981, chapter 7): the water's thrust :math:`V = \tfrac12\gamma_w z^2` in the crack and the uplift
-# :math:`U` on the plane. The table is a straight line here, so pressure along the plane is linear from the toe to :math:`\gamma_w z`.
+# Against limit equilibrium (Hoek & Bray 1981, chapter 7): the water's thrust :math:`V = \tfrac12\gamma_w z^2` in the
+# crack and the uplift
+# :math:`U` on the plane. The table is a straight line here, so pressure along the plane is linear from the toe to
+# :math:`\gamma_w z`.
 
 dip, length = np.arctan2(10, 20), np.hypot(20, 10)
-weight = 2600 * 9.81 * 0.5 * abs(np.dot([0, 20, 20, 6], np.roll([0, 10, 22, 22], -1)) - np.dot([0, 10, 22, 22], np.roll([0, 20, 20, 6], -1)))
+weight = (
+    2600
+    * 9.81
+    * 0.5
+    * abs(
+        np.dot([0, 20, 20, 6], np.roll([0, 10, 22, 22], -1))
+        - np.dot([0, 10, 22, 22], np.roll([0, 20, 20, 6], -1))
+    )
+)
 thrust, uplift = 0.5 * 9810 * levels**2, 0.5 * 9810 * levels * length
 normal = weight * np.cos(dip) - uplift - thrust * np.sin(dip)
 hoek = (20e3 * length + normal * np.tan(np.radians(32))) / (weight * np.sin(dip) + thrust * np.cos(dip))
@@ -107,7 +121,8 @@ axes.legend(frameon=False)
 # %%
 # It rises while the run goes on
 # ------------------------------
-# ``levels_m`` raises the whole table in time. The block begins at rest (``equilibrium = "start"``), and goes when its factor is one.
+# ``levels_m`` raises the whole table in time. The block begins at rest (``equilibrium = "start"``), and goes when its
+# factor is one.
 
 rising = load_scene(
     work / "water.toml",
@@ -130,5 +145,6 @@ sketch(cycle, right)
 right.set_title(f"t = {cycle.state.time:g} s")
 
 # %%
-# What to watch: pressure counts on every edge below the table, so a table drawn through the air in front of the face is a lake that presses *on* the
+# What to watch: pressure counts on every edge below the table, so a table drawn through the air in front of the face
+# is a lake that presses *on* the
 # slope and holds it. ``geomech check`` says so, and ``geomech build`` draws it.

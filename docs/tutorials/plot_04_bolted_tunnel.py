@@ -2,14 +2,16 @@
 Bolts and an excavated tunnel
 =============================
 
-Rock with three joint sets is at rest under its weight. A tunnel is dug into it while the run goes on. Without support a key block
+Rock with three joint sets is at rest under its weight. A tunnel is dug into it while the run goes on. Without support
+a key block
 comes out of the roof; with bolts it stays.
 """
 
 # %%
 # The scene
 # ---------
-# The tunnel's inside is a zone of its own, ``core``, that is taken out at 0.02 s: ``[[loads.excavations]]``. Bolts are lines; grouted ones work at every joint they
+# The tunnel's inside is a zone of its own, ``core``, that is taken out at 0.02 s: ``[[loads.excavations]]``. Bolts
+# are lines; grouted ones work at every joint they
 # cross. Both have a time from which they act, ``time_s`` and ``start_s``.
 
 import tempfile
@@ -121,7 +123,8 @@ for axes, name in zip(both, ("tunnel", "bolted")):
         axes.plot([x0, x1], [y0, y1], color="#0072b2", lw=2)
 
 # %%
-# Before the tunnel is dug nothing moves, and energies are next to nothing: a warning of the energy balance at 0.03 s, as a part of what little has been turned over by then, need
+# Before the tunnel is dug nothing moves, and energies are next to nothing: a warning of the energy balance at 0.03 s,
+# as a part of what little has been turned over by then, need
 # not worry. ``budget_residual`` in ``history.csv`` says it in J/m.
 #
 # What the bolts carry
@@ -129,8 +132,12 @@ for axes, name in zip(both, ("tunnel", "bolted")):
 # A run folder has them in ``history.csv``, a column a bolt and joint. From Python they are rows of the state:
 
 carried = cycle.state.bolts["force"] / 1e3
-print(f"{len(carried)} pieces of bolts between joints; the largest force is {carried.max():.1f} kN/m, of 160 that they yield at")
+print(
+    f"{len(carried)} pieces of bolts between joints carry up to {carried.max():.1f} kN/m; they yield at 160"
+)
 
 # %%
-# ``geometry/tunnel.geo`` is a horseshoe tunnel with a fault, whose roof bolts are drawn in the model as lines called ``bolt:roof``; the scene beside it
-# runs as it is. A liner is a zone of its own between rock and air. ``[loads.in_situ]`` begins with a stress and K0 instead of the weight alone.
+# ``geometry/tunnel.geo`` is a horseshoe tunnel with a fault, whose roof bolts are drawn in the model as lines called
+# ``bolt:roof``; the scene beside it
+# runs as it is. A liner is a zone of its own between rock and air. ``[loads.in_situ]`` begins with a stress and K0
+# instead of the weight alone.

@@ -2,7 +2,8 @@
 A specimen with flaws of one's own
 ==================================
 
-Three flaws where you want them, drawn in TOML without Gmsh. One is a slot, one is closed with friction, one is cemented.
+Three flaws where you want them, drawn in TOML without Gmsh. One is a slot, one is closed with friction, one is
+cemented.
 """
 
 # %%
@@ -13,7 +14,6 @@ import tempfile
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 import geomech
 from geomech.output import Observer, standard_observers
@@ -126,7 +126,8 @@ interior_every = 1000
 # %%
 # Run into a folder, as ``geomech run flaws.toml`` does, and read it back
 # ------------------------------------------------------------------------
-# Whoever watches a run is an observer. Those that write files come from ``standard_observers``; ours keeps the last cycle, to draw it.
+# Whoever watches a run is an observer. Those that write files come from ``standard_observers``; ours keeps the last
+# cycle, to draw it.
 
 
 class Last(Observer):
@@ -144,13 +145,20 @@ for _, event in run.events.head(6).iterrows():
     print(f"{event['load'] / 1e6:6.2f} MPa  {event['kind']}: {event['detail']}")
 
 # %%
-# ``tips.csv`` has a row a tip and cycle. The slot has a negative K_I, and grows wings all the same; the closed one has K_I = 0 until its wings open.
+# ``tips.csv`` has a row a tip and cycle. The slot has a negative K_I, and grows wings all the same; the closed one
+# has K_I = 0 until its wings open.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained", width_ratios=(1.3, 1))
 for crack, name in enumerate(("slot", "closed", "cemented")):
     for end in (0, 1):
         own = run.tips[(run.tips["crack_name"] == name) & (run.tips["end"] == end)]
-        left.plot(own["load"] / 1e6, own["K_eq"] / 1e6, label=f"{name}, end {end}", color=f"C{crack}", ls=("-", "--")[end])
+        left.plot(
+            own["load"] / 1e6,
+            own["K_eq"] / 1e6,
+            label=f"{name}, end {end}",
+            color=f"C{crack}",
+            ls=("-", "--")[end],
+        )
 left.set(xlabel="axial stress, MPa", ylabel="K_eq, MPa √m")
 left.legend(frameon=False)
 
@@ -170,4 +178,5 @@ strain = history["load"].iloc[-1] * (1 - 0.21**2) / 17e9
 print(f"strain at the end {history['strain'].iloc[-1]:.3e}; whole rock would have {strain:.3e}")
 
 # %%
-# To change it: ``--set geometry.cracks.1.angle_deg=60`` turns the second flaw (items count from 0); ``aperture = 0.0002`` is a crack that closes when its faces have moved by 0.2 mm.
+# To change it: ``--set geometry.cracks.1.angle_deg=60`` turns the second flaw (items count from 0);
+# ``aperture = 0.0002`` is a crack that closes when its faces have moved by 0.2 mm.

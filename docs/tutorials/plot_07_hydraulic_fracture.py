@@ -2,12 +2,14 @@
 A hydraulic fracture beside a fault
 ===================================
 
-A crack is pumped up in rock under in-situ stress. A fault, closed and rough, lies beside it. Does the fracture slip the fault,
+A crack is pumped up in rock under in-situ stress. A fault, closed and rough, lies beside it. Does the fracture slip
+the fault,
 and does the fault turn the fracture?
 """
 
 # %%
-# The crack solver alone: infinite plane, stress far away, fluid in one crack, friction on the other. No scene is needed.
+# The crack solver alone: infinite plane, stress far away, fluid in one crack, friction on the other. No scene is
+# needed.
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -23,7 +25,8 @@ laws = [JointLaw("fracture", friction_angle=np.radians(30)), JointLaw("fault", f
 settings, growth = DdmSettings(order=4), GrowthSettings(increment=0.4)
 
 # %%
-# In-situ stress: 10 MPa from above, 22 MPa from the side (tension is positive). The fracture opens against the smaller one once the fluid passes
+# In-situ stress: 10 MPa from above, 22 MPa from the side (tension is positive). The fracture opens against the
+# smaller one once the fluid passes
 # 10 MPa. The fault at 45° bears nearly what its friction holds: it is at rest, but not by much.
 
 stress = np.array([-22e6, -10e6, 0.0])
@@ -31,7 +34,8 @@ along = (fault[1] - fault[0]) / np.linalg.norm(fault[1] - fault[0])
 across = np.array([-along[1], along[0]])
 tensor = np.array([[stress[0], stress[2]], [stress[2], stress[1]]])
 normal, shear = across @ tensor @ across, along @ tensor @ across
-print(f"on the fault: {normal / 1e6:.2f} MPa across, {shear / 1e6:.2f} MPa along; friction holds {-normal / 1e6 * np.tan(np.radians(21)):.2f}")
+holds = -normal * np.tan(np.radians(21))
+print(f"on the fault, MPa: {normal / 1e6:.2f} across, {shear / 1e6:.2f} along; friction holds {holds / 1e6:.2f}")
 
 # %%
 # Pumped, not grown
@@ -55,11 +59,16 @@ for pressure in (10.2, 10.6, 11.0):
 left.set(xlabel="along the fault, m", ylabel="slip, µm")
 left.legend(frameon=False, title="fluid")
 alone = (1e6 * pressure + stress[1]) * np.sqrt(np.pi * 2.0)
-print("K_I of the fracture's tips", np.round(solution.tips["k_i"][:2] / 1e6, 4), f"MPa √m; without the fault {alone / 1e6:.4f}")
+print(
+    "K_I of the fracture's tips",
+    np.round(solution.tips["k_i"][:2] / 1e6, 4),
+    f"MPa √m; without the fault {alone / 1e6:.4f}",
+)
 print("estimated errors", np.round(solution.tip_errors[:2, 0] / alone, 9), "of it")
 
 # %%
-# The stress beside the fracture shows why: the fluid presses the rock above and below, and in front of the tip it takes pressure off the fault.
+# The stress beside the fracture shows why: the fluid presses the rock above and below, and in front of the tip it
+# takes pressure off the fault.
 
 x, y = np.meshgrid(np.linspace(-4, 9, 130), np.linspace(-4, 5, 90))
 field = solution.stress(np.column_stack([x.ravel(), y.ravel()])).reshape(*x.shape, 3)
@@ -72,13 +81,16 @@ figure.colorbar(shades, ax=right, label="σyy, MPa")
 # %%
 # It grows
 # --------
-# ``control="toughness"`` finds, step by step, the pressure that just drives the fracture. A load that is a function of the factor lets the stress of the
+# ``control="toughness"`` finds, step by step, the pressure that just drives the fracture. A load that is a function
+# of the factor lets the stress of the
 # rock stand while the fluid's pressure changes.
 
 
 def grow(network: Cracks, **options) -> list:
     """The steps of growth of the fracture alone: the fault's tips are given no say by its friction."""
-    return list(ddm.propagate([], network, rock, load, growth, settings, control="toughness", max_steps=8, **options))
+    return list(
+        ddm.propagate([], network, rock, load, growth, settings, control="toughness", max_steps=8, **options)
+    )
 
 
 beside = grow(cracks, face_laws=laws)
@@ -103,4 +115,5 @@ for step in beside:
         print(event.kind, event.detail, np.round(event.point, 2))
 
 # %%
-# ``pipelines/pressurised_crack`` grows a fracture to a free surface; scenes take fluids too (``[[loads.fluids]]``), pumped into cracks by name, standing in what they connect with.
+# ``pipelines/pressurised_crack`` grows a fracture to a free surface; scenes take fluids too (``[[loads.fluids]]``),
+# pumped into cracks by name, standing in what they connect with.

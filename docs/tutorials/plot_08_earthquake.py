@@ -2,15 +2,18 @@
 An earthquake
 =============
 
-A block on a sliding plane is shaken by El Centro 1940. Newmark's sliding block is the answer to compare with; then the same plane carries a
+A block on a sliding plane is shaken by El Centro 1940. Newmark's sliding block is the answer to compare with; then
+the same plane carries a
 mass of blocks.
 """
 
 # %%
 # The scene
 # ---------
-# ``[loads.base]`` shakes the fixed blocks with a record: time and acceleration in a text file. ``frame = "base"`` lets the base stand and blocks feel
-# minus its acceleration, which is the same and easier to look at. Joints with a stiffness settle more quickly than penalty springs.
+# ``[loads.base]`` shakes the fixed blocks with a record: time and acceleration in a text file. ``frame = "base"``
+# lets the base stand and blocks feel
+# minus its acceleration, which is the same and easier to look at. Joints with a stiffness settle more quickly than
+# penalty springs.
 
 import tempfile
 from pathlib import Path
@@ -85,7 +88,8 @@ zone = "mass"
 # %%
 # Newmark's block
 # ---------------
-# It slides while the base's acceleration asks for more than friction holds, down the plane at 20° with 28° of friction: the plain integration below has the
+# It slides while the base's acceleration asks for more than friction holds, down the plane at 20° with 28° of
+# friction: the plain integration below has the
 # exact rule and no elasticity. The yield acceleration is :math:`g\tan(28° - 20°) = 0.14\,g`.
 
 shaking = History.from_file(record)
@@ -134,7 +138,12 @@ spacing_m = 2.6
 zones = ["mass"]
 """
 (work / "mass.toml").write_text(
-    SCENE.replace("[[geometry.zones]]", '[geometry]\nseed = 2\ndead_ends = "trim"\nsmallest_block_m2 = 1.0\n[[geometry.zones]]', 1) + JOINTS
+    SCENE.replace(
+        "[[geometry.zones]]",
+        '[geometry]\nseed = 2\ndead_ends = "trim"\nsmallest_block_m2 = 1.0\n[[geometry.zones]]',
+        1,
+    )
+    + JOINTS
 )
 time2, blocks, last = slide(load_scene(work / "mass.toml"))
 
@@ -151,5 +160,6 @@ sketch(last, right, magnify=5)
 right.set_title("displacements five times")
 
 # %%
-# ``pipelines/jointed_slope`` has a thousand blocks with a hundred cracks on such a plane. Edges that should let waves out take ``[[loads.viscous_boundaries]]``; records are
+# ``pipelines/jointed_slope`` has a thousand blocks with a hundred cracks on such a plane. Edges that should let waves
+# out take ``[[loads.viscous_boundaries]]``; records are
 # taken to rest by ``baseline = "linear"``.

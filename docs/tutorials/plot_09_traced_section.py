@@ -2,21 +2,22 @@
 A section traced in DXF or GeoJSON
 ==================================
 
-A road cut was mapped: joints as lines on layers, in world coordinates, with ends that miss and overshoot. We read it, look at what was
+A road cut was mapped: joints as lines on layers, in world coordinates, with ends that miss and overshoot. We read it,
+look at what was
 mended, run it, and write the blocks back for a GIS.
 """
 
 # %%
 # Layers say what lines are
 # -------------------------
-# ``geometry/traced_slope.toml`` names the layers of ``traced_slope.dxf``: zones, joints, bolts, the water table, measuring points. Arcs, splines, blocks and units of the
+# ``geometry/traced_slope.toml`` names the layers of ``traced_slope.dxf``: zones, joints, bolts, the water table,
+# measuring points. Arcs, splines, blocks and units of the
 # drawing are read. Coordinates are easting and height; the run counts from an origin near the rock.
 
 import json
 import tempfile
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 import geomech
@@ -102,5 +103,6 @@ for warning in cut.warnings:
 sketch(cut)
 
 # %%
-# Ends that miss by less than ``tolerance_m`` were meant to meet, and are told with their place. Look at the list before you trust the blocks: it is what
+# Ends that miss by less than ``tolerance_m`` were meant to meet, and are told with their place. Look at the list
+# before you trust the blocks: it is what
 # the person who digitised did not mean.

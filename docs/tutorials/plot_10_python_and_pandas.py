@@ -8,7 +8,8 @@ A set of runs from one scene, driven from Python, and their tables in data frame
 # %%
 # A scene as text, and what varies
 # --------------------------------
-# ``load_scene(path, changes)`` takes the keys of ``--set`` with Python values. Here: the friction of a plane at 30°, in steps, for a block that slides in real time.
+# ``load_scene(path, changes)`` takes the keys of ``--set`` with Python values. Here: the friction of a plane at 30°,
+# in steps, for a block that slides in real time.
 
 import tempfile
 from pathlib import Path
@@ -54,24 +55,35 @@ end_time_s = 0.5
 rows = []
 for friction in (0, 10, 20, 28, 32):
     # At 32° it stands; "start" would find no equilibrium for the others, and a run says so.
-    changes = {"joints.default.friction_angle_deg": friction, "dda.equilibrium": "start" if friction > 30 else ""}
+    changes = {
+        "joints.default.friction_angle_deg": friction,
+        "dda.equilibrium": "start" if friction > 30 else "",
+    }
     summary = geomech.run(load_scene(work / "block.toml", changes), work / f"friction_{friction}")
     rows.append({"friction": friction, "end": summary["end"]})
 
 # %%
 # Histories as data frames
 # ------------------------
-# ``geomech.open_run`` gives the tables of a run folder: ``history``, ``tips``, ``events``, ``joints``. (Every CSV has one header line and SI units, so that ``pandas.read_csv`` and
+# ``geomech.open_run`` gives the tables of a run folder: ``history``, ``tips``, ``events``, ``joints``. (Every CSV has
+# one header line and SI units, so that ``pandas.read_csv`` and
 # any spreadsheet read it too.)
 
-frames = {friction: geomech.open_run(work / f"friction_{friction}").history for friction in (0, 10, 20, 28, 32)}
-print(frames[20][["time", "block_ux", "block_uy", "open_close_iterations", "kinetic_energy"]].tail(3).to_string(index=False))
+frames = {
+    friction: geomech.open_run(work / f"friction_{friction}").history for friction in (0, 10, 20, 28, 32)
+}
+print(
+    frames[20][["time", "block_ux", "block_uy", "open_close_iterations", "kinetic_energy"]]
+    .tail(3)
+    .to_string(index=False)
+)
 
 table = pd.DataFrame(rows).set_index("friction")
 table["way_m"] = [np.hypot(f["block_ux"].iloc[-1], f["block_uy"].iloc[-1]) for f in frames.values()]
 angle = np.radians(30)
 table["closed_form_m"] = [
-    max(0.0, 0.5 * 9.81 * (np.sin(angle) - np.cos(angle) * np.tan(np.radians(f))) * 0.5**2) for f in table.index
+    max(0.0, 0.5 * 9.81 * (np.sin(angle) - np.cos(angle) * np.tan(np.radians(f))) * 0.5**2)
+    for f in table.index
 ]
 print(table.to_string())
 
@@ -84,7 +96,8 @@ axes.legend(frameon=False, title="friction")
 # %%
 # More than tables
 # ----------------
-# The same object has the summary, the scene as it was run, and the series as PyVista meshes at any cycle or time. In a notebook it shows itself.
+# The same object has the summary, the scene as it was run, and the series as PyVista meshes at any cycle or time. In
+# a notebook it shows itself.
 
 run = geomech.open_run(work / "friction_20")
 print(run, "·", run.summary["end"], "·", run.series)
@@ -97,7 +110,8 @@ print(run.joints.tail(1).T.to_string())
 # %%
 # Without files
 # -------------
-# ``geomech.cycles(scene)`` yields each cycle as it comes: arrays of blocks, contacts, tips. An observer is any object with ``on_cycle``; see
+# ``geomech.cycles(scene)`` yields each cycle as it comes: arrays of blocks, contacts, tips. An observer is any object
+# with ``on_cycle``; see
 # ``geomech.output.Observer``. Nothing is written that no observer writes.
 
 for cycle in geomech.cycles(load_scene(work / "block.toml", {"dda.equilibrium": ""})):

@@ -2,13 +2,15 @@
 Choose the step, springs, increment and order
 =============================================
 
-Every setting buys accuracy with time. This page measures both on two small scenes, so that you can do the same on yours: run at half the step, and look at what changes.
+Every setting buys accuracy with time. This page measures both on two small scenes, so that you can do the same on
+yours: run at half the step, and look at what changes.
 """
 
 # %%
 # The time step of a slope that slides
 # ------------------------------------
-# The scene of the :doc:`first run </start/first_run>`, 0.4 s of it. The work of gravity is a good measure: it is one number for how far all that moves has come down. Its
+# The scene of the :doc:`first run </start/first_run>`, 0.4 s of it. The work of gravity is a good measure: it is one
+# number for how far all that moves has come down. Its
 # reference is the finest step.
 
 import time as clock
@@ -47,7 +49,9 @@ for springs in ("stiff", "resolved"):
     for dt in (0.02, 0.01, 0.005):
         work, spent = fall(time_step_s=dt, springs=springs)
         found.append((spent, abs(work / reference - 1)))
-        print(f"{springs:9} dt = {1e3 * dt:4.0f} ms: {spent:5.2f} s, work of gravity off by {found[-1][1]:.2%}")
+        print(
+            f"{springs:9} dt = {1e3 * dt:4.0f} ms: {spent:5.2f} s, work of gravity off by {found[-1][1]:.2%}"
+        )
     left.loglog(*np.array(found).T, "o-", label=f"{springs} springs, 20 / 10 / 5 ms")
 left.set(xlabel="processor time, s", ylabel="error of the work of gravity", title="a slope that slides")
 left.legend(frameon=False)
@@ -83,27 +87,38 @@ right.set(xlabel="processor time, ms", ylabel="error of K", title="order 2 … 8
 # Or say which error you want: ``ddm.target_error`` in the scene, ``ddm.solve_to`` in Python.
 
 solution = ddm.solve_to([plate], crack, rock, load, 1e-7)
-print(f"asked for 1e-7: order {solution.body.settings.order}, estimated error {np.abs(solution.tip_errors).max() / np.abs(solution.tips['k_ii']).max():.1e}")
+left_over = np.abs(solution.tip_errors).max() / np.abs(solution.tips["k_ii"]).max()
+print(f"asked for 1e-7: order {solution.body.settings.order}, estimated error {left_over:.1e}")
 
 # %%
 # The increment of growth
 # -----------------------
-# Wing cracks of that crack, to a length of 12 mm, by increments of 4 to 1 mm. What is compared is where the tip comes to.
+# Wing cracks of that crack, to a length of 12 mm, by increments of 4 to 1 mm. What is compared is where the tip comes
+# to.
 
 ends, figure = {}, plt.figure(figsize=(5, 3.6), layout="constrained")
 axes = figure.subplots()
 for increment in (4e-3, 2e-3, 1e-3):
     steps = ddm.propagate(
-        [plate], crack, rock, load, GrowthSettings(increment=increment), DdmSettings(), control="toughness", max_steps=round(12e-3 / increment)
+        [plate],
+        crack,
+        rock,
+        load,
+        GrowthSettings(increment=increment),
+        DdmSettings(),
+        control="toughness",
+        max_steps=round(12e-3 / increment),
     )
     *_, last = steps
     nodes = last.cracks.nodes[last.cracks.segments]
     for a, b in nodes:
         axes.plot(*(1e3 * np.array([a, b])).T, color={4e-3: "C3", 2e-3: "C0", 1e-3: "k"}[increment], lw=1.2)
     ends[increment] = last.tips["point"][np.argmax(last.tips["point"][:, 1])]
-    print(f"increment {1e3 * increment:.0f} mm: tip at {np.round(1e3 * ends[increment], 3)} mm, load factor {last.load_factor:.3f}")
+    place = np.round(1e3 * ends[increment], 3)
+    print(f"increment {1e3 * increment:.0f} mm: tip at {place} mm, load factor {last.load_factor:.3f}")
 axes.set_aspect("equal")
 axes.set(xlabel="mm", ylabel="mm", title="paths by increments of 4, 2 and 1 mm")
 
 # %%
-# Rules of thumb stand in :doc:`/howto/settings`; error against time of many problems, for this solver and others, in :doc:`/verification/speed`.
+# Rules of thumb stand in :doc:`/howto/settings`; error against time of many problems, for this solver and others, in
+# :doc:`/verification/speed`.

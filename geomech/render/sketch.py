@@ -25,9 +25,9 @@ def sketch(
     """Draw the blocks and cracks of ``what`` and return the axes: a coupling `Cycle` (blocks where they are), a
     `Problem`, or a scene that was loaded (as drawn).
 
-    ``axes`` are those of Matplotlib (None: of a new figure); ``values`` (n_blocks,) colour the blocks, with a colour bar that
-    says ``label``; displacements are drawn ``magnify`` times. Raises ValueError where there are not as many values as
-    blocks.
+    ``axes`` are those of Matplotlib (None: of a new figure); ``values`` (n_blocks,) colour the blocks, with a colour bar
+    that says ``label``; displacements are drawn ``magnify`` times. Raises ValueError where there are not as many values
+    as blocks.
     """
     from matplotlib.collections import LineCollection, PathCollection
     from matplotlib.path import Path

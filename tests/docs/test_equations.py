@@ -1,5 +1,5 @@
-"""The index of equations: every row names a function that is there, whose docstring or module has the words that mark the
-equation, and no marked module is left out of the page."""
+"""The index of equations: every row names a function that is there, whose docstring or module has the words that mark
+the equation."""
 
 import importlib.util
 import sys

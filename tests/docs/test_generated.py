@@ -21,7 +21,11 @@ def test_every_key_verb_and_column_is_in_its_page(docs, tmp_path, capsys):
 
     pages.write_all(tmp_path)
     keys = (tmp_path / "scene_keys.md").read_text(encoding="utf-8")
-    values = {key for key, places in places_of_keys().items() if f"\n`{key}` = " in keys or f".{key}" in keys or f"[{key}" in keys}
+    values = {
+        key
+        for key, places in places_of_keys().items()
+        if f"\n`{key}` = " in keys or f".{key}" in keys or f"[{key}" in keys
+    }
     assert values == set(places_of_keys())
     commands = (tmp_path / "command_line.md").read_text(encoding="utf-8")
     with pytest.raises(SystemExit):
@@ -59,7 +63,19 @@ def test_figures_of_verification_are_the_stored_ones(docs, tmp_path):
 def test_docstrings_become_restructured_text(docs):
     from generate.docstrings import as_rst
 
-    lines = ["One block.", "", "area      m², |A|", "          of the polygon", "a, b      (n,) sides", "", "    x = a * b", "", "Said::", "", "    code()"]
+    lines = [
+        "One block.",
+        "",
+        "area      m², |A|",
+        "          of the polygon",
+        "a, b      (n,) sides",
+        "",
+        "    x = a * b",
+        "",
+        "Said::",
+        "",
+        "    code()",
+    ]
     assert [line for line in as_rst(lines) if line] == [
         "One block.",
         r"- ``area``: m², \|A\|",
@@ -77,16 +93,31 @@ def test_the_first_example_of_a_page_runs(page):
     """The solvers alone, as the how-to shows them."""
     text = (ROOT / "docs" / "howto" / page).read_text(encoding="utf-8")
     code = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
+    )
     assert done.returncode == 0 and done.stdout, done.stderr
 
 
 @pytest.mark.slow
 def test_the_manual_builds_without_a_warning(tmp_path):
     """Without running the tutorials, which have tests of their own; a minute."""
-    if any(importlib.util.find_spec(name) is None for name in ("sphinx", "myst_parser", "sphinx_gallery", "sphinx_design")):
+    if any(
+        importlib.util.find_spec(name) is None for name in ("sphinx", "myst_parser", "sphinx_gallery", "sphinx_design")
+    ):
         pytest.skip("the manual's packages are not installed: pip install -e '.[docs]'")
-    command = [sys.executable, "-m", "sphinx", "-W", "-b", "html", "-D", "plot_gallery=False", "docs", str(tmp_path / "html")]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "-b",
+        "html",
+        "-D",
+        "plot_gallery=False",
+        "docs",
+        str(tmp_path / "html"),
+    ]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "html" / "index.html").read_text(encoding="utf-8")

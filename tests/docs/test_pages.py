@@ -14,7 +14,9 @@ DOCS = ROOT / "docs"
 #: Written by the build, or by others beside the manual.
 MADE = ("generated/", "gallery/")
 PAGES = sorted(
-    path for path in DOCS.rglob("*") if path.suffix in (".md", ".py") and not str(path.relative_to(DOCS)).startswith(MADE)
+    path
+    for path in DOCS.rglob("*")
+    if path.suffix in (".md", ".py") and not str(path.relative_to(DOCS)).startswith(MADE)
 )
 README = ROOT / "README.md"
 
@@ -26,13 +28,13 @@ def test_paths_of_the_project_exist(page):
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
-@pytest.mark.parametrize("page", [README, *(page for page in PAGES if page.suffix == ".md")], ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page", [README, *(page for page in PAGES if page.suffix == ".md")], ids=lambda page: page.name
+)
 def test_links_lead_somewhere(page):
     text = page.read_text(encoding="utf-8")
     links = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text)
-    absent = [
-        link for link in links if not (page.parent / link).exists() and not any(part in link for part in MADE)
-    ]
+    absent = [link for link in links if not (page.parent / link).exists() and not any(part in link for part in MADE)]
     # Beside the manual there are files that come with a release.
     assert set(absent) <= {"CHANGELOG.md", "CONTRIBUTING.md", "CITATION.cff"}
 
