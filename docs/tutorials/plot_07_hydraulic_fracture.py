@@ -22,7 +22,7 @@ fracture = np.array([[-2.0, 0.0], [2.0, 0.0]])
 fault = np.array([[3.0, -1.4], [7.4, 3.0]])
 cracks = Cracks.from_polylines([fracture, fault], names=["fracture", "fault"], law=[0, 1])
 laws = [JointLaw("fracture", friction_angle=np.radians(30)), JointLaw("fault", friction_angle=np.radians(21))]
-settings, growth = DdmSettings(order=4), GrowthSettings(increment=0.4)
+settings, growth = DdmSettings(order=4, elements_per_crack=8), GrowthSettings(increment=0.4)
 
 # %%
 # In-situ stress: 10 MPa from above, 22 MPa from the side (tension is positive). The fracture opens against the
@@ -48,7 +48,7 @@ def load(pressure: float, cracks: Cracks = cracks) -> ddm.BodyLoad:
     return ddm.BodyLoad(remote_stress=stress, crack_pressure=np.where(cracks.crack == 0, 1e6 * pressure, 0.0))
 
 
-figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+figure, left = plt.subplots(figsize=(5.5, 3.4), layout="constrained")
 body = ddm.Body([], cracks, rock, settings, face_laws=laws)
 for pressure in (10.2, 10.6, 11.0):
     solution = body.solve(load(pressure))
@@ -72,6 +72,7 @@ print("estimated errors", np.round(solution.tip_errors[:2, 0] / alone, 9), "of i
 
 x, y = np.meshgrid(np.linspace(-4, 9, 130), np.linspace(-4, 5, 90))
 field = solution.stress(np.column_stack([x.ravel(), y.ravel()])).reshape(*x.shape, 3)
+figure, right = plt.subplots(figsize=(6.5, 4), layout="constrained")
 shades = right.pcolormesh(x, y, np.clip(field[..., 1] / 1e6, -12, -8), cmap="RdBu_r", shading="auto")
 for line in (fracture, fault):
     right.plot(*line.T, color="k", lw=2)
