@@ -38,8 +38,8 @@ for warning in scene.warnings:
 # What ``geomech build`` writes
 # -----------------------------
 
-told = write_block_system(scene, work / "build")
-print(*told["lines"], sep="\n")
+written = write_block_system(scene, work / "build")
+print(*written["lines"], sep="\n")
 print(sorted(path.name for path in (work / "build").iterdir()))
 blocks = json.loads((work / "build" / "block_system.geojson").read_text())
 print(len(blocks["features"]), "features;", blocks["features"][0]["properties"])
@@ -103,6 +103,6 @@ for warning in cut.warnings:
 sketch(cut)
 
 # %%
-# Ends that miss by less than ``tolerance_m`` were meant to meet, and are told with their place. Look at the list
+# Ends that miss by less than ``tolerance_m`` were meant to meet, and are reported with their place. Look at the list
 # before you trust the blocks: it is what
 # the person who digitised did not mean.
