@@ -88,7 +88,7 @@ figure.colorbar(shades, ax=right, label="σyy, MPa")
 
 
 def grow(network: Cracks, **options) -> list:
-    """The steps of growth of the fracture alone: the fault's tips are given no say by its friction."""
+    """Eight steps, each at the pressure that just drives the most driven tip."""
     return list(
         ddm.propagate([], network, rock, load, growth, settings, control="toughness", max_steps=8, **options)
     )
