@@ -32,8 +32,8 @@ def with_rigid_motion(held: np.ndarray | None) -> np.ndarray:
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def hold(held, matrix, right, vectors, block, other, order):
-    """Constrain the unknowns ``held`` (n_blocks, 6) bool to zero, in place: rows and columns become those of the
-    identity.
+    """Constrain the unknowns ``held`` (n_blocks, 6) bool to zero, in place: their rows and columns
+    become diagonal.
 
     ``matrix`` (n, 6, 6) and ``right`` (n, 6) as in `assembly`; ``vectors`` (n_contacts, 2, 12) of the contacts between
     ``block`` and ``other``; ``order`` (n_blocks,) the row of each block, −1 if fixed.
