@@ -188,7 +188,7 @@ def assemble_blocks(
     stiffness_damping,
     n,
 ):
-    """The blocks' own part of the equations: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0
+    """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0
     (n_blocks, 3)).
 
     - inertia and elasticity as in this module's equation, with velocity ``carried``, factor ``heavier`` 1/w and
@@ -217,7 +217,7 @@ def assemble_blocks(
         if soft:
             _invert(compliance[b], crack_compliance[b], tangent[b])
         else:
-            # Element by element: Numba takes seconds to compile the assignment of one array to another.
+            # By numbers: Numba takes seconds to compile the assignment of one array to another.
             for k in range(3):
                 for m in range(3):
                     tangent[b, k, m] = stiffness[b, k, m]
@@ -283,7 +283,7 @@ def advance(
     crack_strain,
     turns,
 ):
-    """The state after a step with the displacement ``increment`` (n_blocks, 6) about the old centroids.
+    """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids.
 
     Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so that a spinning block does not swell.
     Stress, strain rates and crack strain are rotated by the same R; before, the stress is ``tangent`` Δε + ``stress0``.
