@@ -67,10 +67,10 @@ def refuse_numbers(of: object, table: Mapping[str, Number], who: str = "") -> No
             continue
         finite = isinstance(value, (float, np.floating)) and math.isinf(value) and value > 0 and number.most == math.inf
         wish = f"{number.wish} and finite" if finite else number.wish
-        raise ValueError(f"{f'{who}: ' if who else ''}{name} {wish}, got {told(value)} {number.unit}".rstrip())
+        raise ValueError(f"{f'{who}: ' if who else ''}{name} {wish}, got {as_text(value)} {number.unit}".rstrip())
 
 
-def told(value: object) -> str:
+def as_text(value: object) -> str:
     """``value`` as text for a message: NumPy scalars without their type."""
     return repr(value.item() if isinstance(value, np.generic) else value)
 

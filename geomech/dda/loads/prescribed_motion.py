@@ -163,7 +163,7 @@ class ImposedMotion:
         h = float(np.sqrt(self.moments[block, 0]))
         return np.array([1.0, 1.0, h, h, h, h])
 
-    def take_held(self, held: np.ndarray) -> np.ndarray:
+    def without_prescribed(self, held: np.ndarray) -> np.ndarray:
         """The constraints ``held`` (n_blocks, 6) without those of blocks with prescribed motion, which impose them as
         zeros."""
         rest = held.copy()

@@ -14,7 +14,7 @@ from .polygon import (
     crossing_edges,
     crossing_loops,
     distance_to_edges,
-    plainly_simple,
+    convex_and_simple,
     point_in_both,
     roundoff_of,
     signed_area,
@@ -94,7 +94,7 @@ class Blocks:
         loop_start = np.concatenate([[0], np.cumsum([len(loop) for loop in loops])]).astype(int)
         if loops:
             with np.errstate(invalid="ignore"):
-                simple, turns_left = plainly_simple(np.concatenate(loops), loop_start)
+                simple, turns_left = convex_and_simple(np.concatenate(loops), loop_start)
             for k in np.flatnonzero(~simple):
                 _refuse_crooked(loops[k], names[owner[k]])
             for k in np.flatnonzero(~outer):

@@ -58,7 +58,7 @@ def distance_to_edges(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> 
     return float(np.hypot(*(arm - share[:, None] * along).T).min())
 
 
-def plainly_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def convex_and_simple(vertices: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quick pre-check of many loops: (n_loops,) bool, convex and simple; (n_loops,) bool, counter-clockwise.
 
     ``vertices`` (n, 2) of all loops, loop k from ``start[k]`` to ``start[k + 1]``. A loop passes if it is convex, winds

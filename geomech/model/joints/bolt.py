@@ -11,7 +11,7 @@ import numpy as np
 
 from ..blocks.block_arrays import Blocks
 from ..blocks.polygon import winding_number
-from ..numbers import POSITIVE, Number, refuse_numbers, refuse_point, told
+from ..numbers import POSITIVE, Number, as_text, refuse_numbers, refuse_point
 
 #: Block number of an anchor's far end that is fixed in the ground.
 GROUND = -1
@@ -113,7 +113,7 @@ def grouted_bolt(
     """
     for what, value, unit in (("axial_stiffness", axial_stiffness, "N"), ("active_length", active_length, "m")):
         if not POSITIVE.holds(value):
-            raise ValueError(f"bolt {name!r}: {what} must be positive and finite, got {told(value)} {unit}")
+            raise ValueError(f"bolt {name!r}: {what} must be positive and finite, got {as_text(value)} {unit}")
     refuse_point(f"bolt {name!r}: its start", start)
     refuse_point(f"bolt {name!r}: its end", end)
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
