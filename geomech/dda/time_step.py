@@ -24,7 +24,7 @@ from .kinematics.constraints import balanced, hold, with_rigid_motion
 from .kinematics.midpoint_configuration import Middle
 from .kinematics.newmark import advance, assemble_blocks, turned
 from .kinematics.rigid_blocks import mean_stress
-from .kinematics.roundoff import warn_of_roundoff, undecided_gaps
+from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
 from .loads.step_actions import StepActions, effective_gravity

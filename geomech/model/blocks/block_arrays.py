@@ -11,10 +11,10 @@ import numpy as np
 from ...conventions import outward_normal_of
 from .polygon import (
     area_moments,
+    convex_and_simple,
     crossing_edges,
     crossing_loops,
     distance_to_edges,
-    convex_and_simple,
     point_in_both,
     roundoff_of,
     signed_area,
