@@ -72,6 +72,7 @@ def test_steps_of_a_walk_name_what_stands_in_their_function(place, rest):
 def test_the_reader_of_the_guide_sees_what_is_wrong():
     """The checks above are only as good as their reading."""
     assert len(PATHS) > 100 and len(STEPS) > 50
+    assert not [line for line in PROSE.splitlines() if line.count("`") % 2], "a name in backticks goes over two lines"
     assert definition("geomech/conventions.py:normal_of") is not None
     assert definition("geomech/conventions.py:VTK_STRESS") is not None
     assert definition("geomech/conventions.py:no_such_name") is None
