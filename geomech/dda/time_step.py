@@ -140,7 +140,8 @@ class Attempt:
         """Forces, imposed motion and bolts of this step."""
         system, state, scheme, dt, middle = self.system, self.state, self.system.scheme, self.dt, self.middle
         acting = state.time + scheme.weight * dt if load_time is None else load_time
-        self.gravity = effective_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
+        ahead = scheme.ahead(state.acceleration, dt)
+        self.gravity = effective_gravity(loads, state.time, acting, dt, scheme.static, ahead)
         self.points, self.edges = system.load_map.rows(loads, acting, middle.vertices, state.rotation + self.turn)
         self.load = middle.loads_back(generalised(self.points, self.edges, middle.centroid))
         end = self.time if load_time is None else load_time
