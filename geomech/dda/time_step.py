@@ -24,10 +24,10 @@ from .kinematics.constraints import balanced, hold, with_rigid_motion
 from .kinematics.midpoint_configuration import Middle
 from .kinematics.newmark import advance, assemble_blocks, turned
 from .kinematics.rigid_blocks import mean_stress
-from .kinematics.roundoff import undecided_gaps, warn_of_roundoff
+from .kinematics.roundoff import tell_felt, undecided_gaps
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
-from .loads.step_actions import StepActions, effective_gravity
+from .loads.step_actions import StepActions, felt_gravity
 from .loads.viscous_boundary import QuietEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
@@ -140,8 +140,7 @@ class Attempt:
         """Forces, imposed motion and bolts of this step."""
         system, state, scheme, dt, middle = self.system, self.state, self.system.scheme, self.dt, self.middle
         acting = state.time + scheme.weight * dt if load_time is None else load_time
-        ahead = scheme.ahead(state.acceleration, dt)
-        self.gravity = effective_gravity(loads, state.time, acting, dt, scheme.static, ahead)
+        self.gravity = felt_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
         self.points, self.edges = system.load_map.rows(loads, acting, middle.vertices, state.rotation + self.turn)
         self.load = middle.loads_back(generalised(self.points, self.edges, middle.centroid))
         end = self.time if load_time is None else load_time
@@ -325,7 +324,7 @@ class Attempt:
         if not system.rounding_told:
             system.rounding_told = True
             weight = np.where(system.fixed, np.inf, system.mass * np.hypot(*self.gravity))
-            warn_of_roundoff(system.rounding, weight, found.block, found.other, springs.normal, system.finder.names)
+            tell_felt(system.rounding, weight, found.block, found.other, springs.normal, system.finder.names)
 
         def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
             def settled(contacts: ContactSet) -> Settled:

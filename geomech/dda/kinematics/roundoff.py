@@ -38,7 +38,7 @@ def undecided_gaps(
     return np.clip(_NOTHING * least / np.maximum(normal, 1e-300), rounding, _WANDERS * rounding)
 
 
-def warn_of_roundoff(
+def tell_felt(
     rounding: float, weight: np.ndarray, block: np.ndarray, other: np.ndarray, normal: np.ndarray, names: Sequence[str]
 ) -> None:
     """Warn of the block whose weight is smallest relative to the contact forces that ``rounding`` (m) causes.

@@ -22,9 +22,7 @@ from .prescribed_motion import ImposedMotion, Pairs
 Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]
 
 
-def effective_gravity(
-    loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0
-) -> np.ndarray:
+def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0) -> np.ndarray:
     """Effective gravity (2,), m/s²: gravity at the time ``acting`` minus the acceleration of a moving base frame.
 
     The base acceleration is averaged over ``dt`` from ``start`` + ``ahead`` (s): over the step for ``ahead`` 0, so that

@@ -78,18 +78,17 @@ class JointLaw:
     A contact sticks up to |τ| = c + σ tan φ. A bonded face fails as a whole: in tension at its extreme fibre, in
     shear at c ℓ + N tan φ.
 
-    friction_angle, cohesion   peak values, before slip; with ``roughness`` the angle is the residual φr
-    tensile_strength           lost, as the peak cohesion is, at the first tensile or shear failure
+    friction_angle, cohesion    peak values, before slip; with ``roughness`` the angle is the residual φr
+    tensile_strength            lost, as the peak cohesion is, at the first tensile or shear failure
     residual_friction_angle, residual_cohesion   after slip (angle None: as before)
-    softening_slip             m of slip over which tan φ and cohesion fall linearly to their residuals; 0: at once
-    dilation_angle             ψ: sliding opens the faces by tan ψ times the slip, up to ``dilation_slip`` m from the
-                               start
-    roughness                  strength curve of Barton and Bandis with its own dilation and decay; None: straight
+    softening_slip              m of slip over which tan φ and cohesion fall linearly to their residuals; 0: at once
+    dilation_angle              ψ: sliding opens the faces by tan ψ times the slip, up to ``dilation_slip`` m from the
+                                start
+    roughness                   strength curve of Barton and Bandis with its own dilation and decay; None: straight
     normal_stiffness, shear_stiffness   Pa/m; None: the solver's penalty springs. A face with a normal stiffness resists
-                               rotation as an elastic bed without tension does
-    max_closure                Vm, m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) with the initial stiffness
-                               ``normal_stiffness`` (Bandis, Lumsden & Barton 1983, Int. J. Rock Mech. 20, 249-268);
-                               None: linear
+                                rotation as an elastic bed without tension does
+    max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J.
+                                Rock Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
 
     Raises ValueError that names the joint.
     """
