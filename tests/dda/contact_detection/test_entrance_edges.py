@@ -8,6 +8,8 @@ import pytest
 from geomech import dda
 from geomech.dda.contact_detection.entrance_edges import (
     Corners,
+    Known,
+    Outlines,
     convex_corners,
     describe_contacts,
     find_contacts,
@@ -32,8 +34,9 @@ def search(polygons, window=0.05, turn=0.0, fixed=None, rounding=0.01):
         convex_corners(v, next_, previous), *corner_lengths(blocks, rounding), np.zeros(len(polygons)), np.zeros_like(v),
         np.inf,
     )  # fmt: skip
-    table, met = find_contacts(v, next_, previous, start, near, window, none, corners)
-    geometry, mate, _ = describe_contacts(table, met, v, next_, previous, window, none, none, np.empty((0, 2)), none)
+    outlines = Outlines(v, next_, previous, start)
+    table, met = find_contacts(outlines, near, window, none, corners)
+    geometry, mate, _ = describe_contacts(table, met, outlines, window, Known(none, none, np.empty((0, 2)), none))
     return table, geometry, mate
 
 
