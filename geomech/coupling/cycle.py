@@ -237,9 +237,9 @@ class Coupling:
                 return step.stops
             if grown.rests:
                 now.take_step(found.result.state, energies.budget)
-            pending = take_growth(now, grown.growth, found.result.state, found.solutions)
+            step.pending = take_growth(now, grown.growth, found.result.state, found.solutions)
             self.under_way = UnderWay(
-                step.dt, step.load_time, grown.events, pending, growth_pass + 1, step.until, step.whole
+                step.dt, step.load_time, grown.events, step.pending, growth_pass + 1, step.until, step.whole
             )
             self.between()
         raise AssertionError("unreachable: the last pass takes no growth")
