@@ -461,12 +461,11 @@ def _meets_edge(outlines, convex, window, v, edge):
     if along > length and not convex[end] and _nearer(vertices, v, next_vertex[end], end):
         return False
     # Corner to corner is done apart, for corners that meet; of others the shallower edge is met within its ends.
-    if convex[edge] and (along <= window or _by(vertices, v, edge, window)):
-        if along < 0.0 or not _is_met_beside(outlines, v, gap, edge, previous_vertex[edge]):
-            return False
-    if convex[end] and (along >= length - window or _by(vertices, v, end, window)):
-        return not along > length and _is_met_beside(outlines, v, gap, end, end)
-    return True
+    at_start = convex[edge] and (along <= window or _by(vertices, v, edge, window))
+    if at_start and (along < 0.0 or not _is_met_beside(outlines, v, gap, edge, previous_vertex[edge])):
+        return False
+    at_end = convex[end] and (along >= length - window or _by(vertices, v, end, window))
+    return not at_end or (not along > length and _is_met_beside(outlines, v, gap, end, end))
 
 
 @part(fastmath=False, error_model="numpy", nogil=True)

@@ -91,9 +91,9 @@ def _clear(nodes, segments, s, edges, near):
             return False
         # From the node that they share.
         ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
-        if j == p or j == q:
+        if j in (p, q):
             ux, uy = -ux, -uy
-        if q == i or q == j:
+        if q in (i, j):
             vx, vy = -vx, -vy
         if ux * vx + uy * vy > SPREAD * math.hypot(ux, uy) * math.hypot(vx, vy):
             return False

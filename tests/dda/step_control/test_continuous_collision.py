@@ -139,5 +139,5 @@ def test_energy_of_overlaps_is_told_of_and_ends_the_run(caplog):
     assert len(caplog.records) == 1
     assert "'a' and 'b' lay 0.01 m in each other near x = 2, y = 3 m" in caplog.text
     budget = budget.after(empty._replace(kinetic=100.0, before=100.0, overlap=3.0), 0.5)
-    with pytest.raises(dda.NotConverged, match="0.11 of all energy turned over .* 'a' and 'b'"):
+    with pytest.raises(dda.NotConverged, match=r"0.11 of all energy turned over .* 'a' and 'b'"):
         watch.check(budget, worst, ("a", "b"), 0.5)
