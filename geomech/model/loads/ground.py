@@ -51,7 +51,9 @@ def lowest_over(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(xs), np.array(ys)
 
 
-def _together(line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]):
+def _together(
+    line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(x, height of the ``line``, height of the ``ground``) at all their points and where they cross."""
     x = np.unique(np.concatenate([line[0], ground[0]]))
     above = np.interp(x, *line) - np.interp(x, *ground)
