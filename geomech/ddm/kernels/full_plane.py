@@ -469,13 +469,14 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
     count = np.empty(_CLASSES, np.int64)
     p, q = np.empty(n1), np.empty(n1)
     folded_p, folded_q = np.empty(table.shape[1]), np.empty(table.shape[1])
+    ordinary = table[0]
     for begin in range(first, last, _TILE):
         n = min(_TILE, last - begin)
         for i in range(5 * _TILE):
             total[i] = 0.0
         for e in range(len(elements.start)):
             c, tx, ty = _sort(points, begin, n, elements, e, kernel.tol, kernel.side, tile, chosen, count)
-            source = elements.kind[e]
+            source, weights = elements.kind[e], table[elements.kind[e]]
             for k in range(n1):
                 p[k] = factor * density[e, 0, k]
                 q[k] = factor * density[e, 1, k]
@@ -483,7 +484,7 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
             nearest = 1
             while nearest < _CLASSES - 1 and count[nearest] == 0:
                 nearest += 1
-            _fold(p, q, table[source], _TERMS[nearest - 1] + n1, folded_p, folded_q)
+            _fold(p, q, weights, _TERMS[nearest - 1] + n1, folded_p, folded_q)
             along = both(splat(tx), splat(ty))
             turn = both(splat(tx), splat(-ty))
             turn = turn * turn
@@ -493,11 +494,11 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
                     y = gather(tile, 2 * _TILE, chosen, batch)
                     zp, zm = both(gather(tile, 0, chosen, batch), y), both(gather(tile, _TILE, chosen, batch), y)
                     if distance == 0 or (distance == 1 and highest <= 5):
-                        sums = _near_sums(source, zp, zm, p, q, table[source], force)
+                        sums = _near_sums(source, zp, zm, p, q, weights, force)
                     else:
                         sums = _far_sums(zp, zm, _TERMS[distance - 1] + order, folded_p, folded_q, force)
                     if force:
-                        half, deviator, moved = _of_forces(sums, y, c, nu, p, q, table[0])
+                        half, deviator, moved = _of_forces(sums, y, c, nu, p, q, ordinary)
                     else:
                         half, deviator, moved = _of_jumps(sums, y, c, nu)
                     deviator = deviator * turn

@@ -296,6 +296,7 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
     height_at = len(points) // 2
     f = 1.0 / (4.0 * np.pi * (1.0 - nu))
     kappa = 3.0 - 4.0 * nu
+    ordinary = table[0]
     for begin in range(first, last, _TILE):
         n = min(_TILE, last - begin)
         for i in range(5 * _TILE):
@@ -305,6 +306,7 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
             eta = 0.5 * (elements.start[e, 1] + elements.end[e, 1]) / c
             source = elements.kind[e]
             own, conj = both(splat(tx), splat(ty)), both(splat(tx), splat(-ty))
+            of_element = density[e]
             for distance in range(_CLASSES):
                 row = distance * _ROW
                 for batch in range(row, row + count[distance], WIDTH):
@@ -315,10 +317,10 @@ def fields(points, first, last, elements, order, density, kernel, table, out):
                     depth = -gather(points, begin + height_at, chosen, batch)
                     if kernel.force:
                         half, bent, back, moved = _of_forces(
-                            w, density[e], 0.5 * f, kappa, eta, c, ty, own, conj, zm, table[0]
+                            w, of_element, 0.5 * f, kappa, eta, c, ty, own, conj, zm, ordinary
                         )
                     else:
-                        half, bent, back, moved = _of_jumps(w, density[e], f, kappa, eta, c, ty, own, conj)
+                        half, bent, back, moved = _of_jumps(w, of_element, f, kappa, eta, c, ty, own, conj)
                     moved = moved - 2.0 * times_i(depth * half)
                     deviator = 2.0 * times_i(depth * bent) - half - back
                     trace = 2.0 * re(half)
