@@ -137,12 +137,7 @@ axes.set_title(f"after {cycle.state.time:g} s")
 # :math:`\tfrac12 g (\sin 30° - \cos 30° \tan 24°)\,t^2`.
 # The fastest block, once nothing stands in its way, moves like that:
 
-slab = (
-    0.5
-    * 9.81
-    * (np.sin(np.radians(30)) - np.cos(np.radians(30)) * np.tan(np.radians(24)))
-    * cycle.state.time**2
-)
+slab = 0.5 * 9.81 * (np.sin(np.radians(30)) - np.cos(np.radians(30)) * np.tan(np.radians(24))) * cycle.state.time**2
 print(f"fastest block {moved.max():.2f} m, slab on a plane {slab:.2f} m")
 
 # %%

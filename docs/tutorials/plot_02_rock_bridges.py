@@ -93,9 +93,7 @@ axes.set(ylim=(-12, 33), title="red: cracks; the gap is the bridge")
 
 history = []
 for cycle in geomech.cycles(scene):
-    history.append(
-        (cycle.state.time, cycle.tips["k_i"].max(initial=0), np.abs(cycle.tips["k_ii"]).max(initial=0))
-    )
+    history.append((cycle.state.time, cycle.tips["k_i"].max(initial=0), np.abs(cycle.tips["k_ii"]).max(initial=0)))
     for event in cycle.events:
         print(f"{event.time:.4f} g  {event.kind}: {event.detail}")
 failure = cycle.state.time
@@ -118,16 +116,12 @@ bridge = 2.4e6 * np.sqrt(np.pi * 0.3)
 holds = 10e3 * (plane - 0.6) + bridge
 drive = weight * (np.sin(dip) - np.cos(dip) * np.tan(np.radians(25)))
 limit = holds / drive
-print(
-    f"failure at {failure:.3f} g, limit equilibrium with the bridge {limit:.3f} g ({failure / limit - 1:+.1%})"
-)
+print(f"failure at {failure:.3f} g, limit equilibrium with the bridge {limit:.3f} g ({failure / limit - 1:+.1%})")
 
 # %%
 # The same slope without the bridge would slide at
 
-print(
-    f"{10e3 * plane / drive:.2f} g: the bridge of 0.6 m does the rest."
-)
+print(f"{10e3 * plane / drive:.2f} g: the bridge of 0.6 m does the rest.")
 
 # %%
 # What drives the tips, and what is left

@@ -100,10 +100,7 @@ weight = (
     2600
     * 9.81
     * 0.5
-    * abs(
-        np.dot([0, 20, 20, 6], np.roll([0, 10, 22, 22], -1))
-        - np.dot([0, 10, 22, 22], np.roll([0, 20, 20, 6], -1))
-    )
+    * abs(np.dot([0, 20, 20, 6], np.roll([0, 10, 22, 22], -1)) - np.dot([0, 10, 22, 22], np.roll([0, 20, 20, 6], -1)))
 )
 thrust, uplift = 0.5 * 9810 * levels**2, 0.5 * 9810 * levels * length
 normal = weight * np.cos(dip) - uplift - thrust * np.sin(dip)

@@ -132,9 +132,7 @@ for axes, name in zip(both, ("tunnel", "bolted")):
 # A run folder has them in ``history.csv``, a column a bolt and joint. From Python they are rows of the state:
 
 carried = cycle.state.bolts["force"] / 1e3
-print(
-    f"{len(carried)} pieces of bolts between joints carry up to {carried.max():.1f} kN/m; they yield at 160"
-)
+print(f"{len(carried)} pieces of bolts between joints carry up to {carried.max():.1f} kN/m; they yield at 160")
 
 # %%
 # ``geometry/tunnel.geo`` is a horseshoe tunnel with a fault, whose roof bolts are drawn in the model as lines called

@@ -80,9 +80,7 @@ side = np.array([[-0.03, -0.06], [0.03, -0.06], [0.03, 0.06], [-0.03, 0.06]])
 pressed = ddm.BodyLoad(sides={0: (0.0, 1e6), 2: (0.0, -1e6)})
 for order in (2, 4, 6):
     tips = ddm.Body([side], problem.cracks, rock, DdmSettings(order=order)).solve(pressed).tips
-    print(
-        f"order {order}: K_I, K_II at 1 MPa = {np.round(tips['k_i'] / 1e6, 6)}, {np.round(tips['k_ii'] / 1e6, 6)}"
-    )
+    print(f"order {order}: K_I, K_II at 1 MPa = {np.round(tips['k_i'] / 1e6, 6)}, {np.round(tips['k_ii'] / 1e6, 6)}")
 
 # %%
 # What else there is: ``--variant closed_0`` with closed faces, ``paper_0`` with the paper's elements and Kelvin's

@@ -69,9 +69,7 @@ for friction in (0, 10, 20, 28, 32):
 # one header line and SI units, so that ``pandas.read_csv`` and
 # any spreadsheet read it too.)
 
-frames = {
-    friction: geomech.open_run(work / f"friction_{friction}").history for friction in (0, 10, 20, 28, 32)
-}
+frames = {friction: geomech.open_run(work / f"friction_{friction}").history for friction in (0, 10, 20, 28, 32)}
 print(
     frames[20][["time", "block_ux", "block_uy", "open_close_iterations", "kinetic_energy"]]
     .tail(3)
@@ -82,8 +80,7 @@ table = pd.DataFrame(rows).set_index("friction")
 table["way_m"] = [np.hypot(f["block_ux"].iloc[-1], f["block_uy"].iloc[-1]) for f in frames.values()]
 angle = np.radians(30)
 table["closed_form_m"] = [
-    max(0.0, 0.5 * 9.81 * (np.sin(angle) - np.cos(angle) * np.tan(np.radians(f))) * 0.5**2)
-    for f in table.index
+    max(0.0, 0.5 * 9.81 * (np.sin(angle) - np.cos(angle) * np.tan(np.radians(f))) * 0.5**2) for f in table.index
 ]
 print(table.to_string())
 

@@ -49,9 +49,7 @@ for springs in ("stiff", "resolved"):
     for dt in (0.02, 0.01, 0.005):
         work, spent = fall(time_step_s=dt, springs=springs)
         found.append((spent, abs(work / reference - 1)))
-        print(
-            f"{springs:9} dt = {1e3 * dt:4.0f} ms: {spent:5.2f} s, work of gravity off by {found[-1][1]:.2%}"
-        )
+        print(f"{springs:9} dt = {1e3 * dt:4.0f} ms: {spent:5.2f} s, work of gravity off by {found[-1][1]:.2%}")
     left.loglog(*np.array(found).T, "o-", label=f"{springs} springs, 20 / 10 / 5 ms")
 left.set(xlabel="processor time, s", ylabel="error of the work of gravity", title="a slope that slides")
 left.legend(frameon=False)

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from geomech.ddm.fracture.criteria import maximum_tangential_stress
-from geomech.model import Cracks, Cycle
-from geomech.model import whole_network
+from geomech.model import Cracks, Cycle, whole_network
 from geomech.reference.specimens import brazilian_disc as published
 from geomech.report.study_part import Part
 

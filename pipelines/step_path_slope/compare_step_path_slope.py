@@ -11,8 +11,7 @@ import numpy as np
 
 from geomech import ddm
 from geomech.ddm.fracture.criteria import maximum_tangential_stress
-from geomech.model import Cracks, Cycle, DdmSettings, Problem
-from geomech.model import whole_network
+from geomech.model import Cracks, Cycle, DdmSettings, Problem, whole_network
 from geomech.reference.slopes import rock_bridges as published
 from geomech.report.study_part import Part
 

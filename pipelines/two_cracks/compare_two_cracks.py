@@ -9,8 +9,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from geomech.model import Cracks, Cycle, Problem
-from geomech.model import whole_network
+from geomech.model import Cracks, Cycle, Problem, whole_network
 from geomech.reference.specimens import two_cracks as published
 from geomech.report.study_part import Part
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geomech.model import Blocks, Cracks, DdaSettings, State
+from geomech.model import Blocks, Cracks, State
 from geomech.model.state import Cycle
 from geomech.render import sketch
 
@@ -12,7 +12,7 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 def cycle_of(turn=0.0, removed=None):
     """A fixed block, and beside it one with a hole and a crack, turned by ``turn`` rad about the origin."""
-    hole = (0.2 * SQUARE[::-1] + [2.4, 0.4])
+    hole = 0.2 * SQUARE[::-1] + [2.4, 0.4]
     blocks = Blocks.from_polygons([SQUARE, [SQUARE + [2.0, 0.0], hole]], fixed=[True, False])
     cracks = Cracks.from_polylines([np.array([[2.1, 0.2], [2.3, 0.9]])], block=1)
     state = State.at_rest(blocks)
