@@ -240,11 +240,7 @@ class Coupling:
             parts = len(cut) > 0
             ends = growth is None or self.follows or (parts and not static)
             rests = parts or (not ends and most > growing.max_passes and (growth_pass + 1) % growing.max_passes == 0)
-            # What is dug out takes what it stores along.
-            dug = result.state.removed is not now.state.removed
-            budget = (now.budget.cut() if dug else now.budget).after(
-                result.energy, result.state.time, growing=static and growth_pass > 0
-            )
+            budget = self._budget_after(result, static and growth_pass > 0)
             statistics = {**result.statistics, **budget.statistics(), **found.statistics}
             gone_by = result.state.time - self.began
             if abs(gone_by - result.dt) > 1e-9 * result.dt:
@@ -310,10 +306,17 @@ class Coupling:
             if until - result.state.time <= 1e-9 * result.dt:
                 return replace(found, result=replace(result, state=replace(result.state, time=until)))
             self.range.check(now.motion(result.state), now.blocks, result.state.time)
-            budget = now.budget.after(result.energy, result.state.time)
+            budget = self._budget_after(result, False)
             now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
             self._count_at_cracks(result.state, budget)
             now.take_step(result.state, budget)
+
+    def _budget_after(self, result: dda.StepResult, growing: bool) -> dda.EnergyBudget:
+        """The blocks' budget with the step ``result``, in which cracks are ``growing`` at one load or not."""
+        now = self.now
+        # What is dug out takes what it stores along.
+        dug = result.state.removed is not now.state.removed
+        return (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time, growing=growing)
 
     def _count_at_cracks(self, state: State, budget: dda.EnergyBudget, cut: Sequence[int] = ()) -> None:
         """A step has been taken to ``state``, after which the blocks have this ``budget``, and in which some are

@@ -113,7 +113,10 @@ class Attempt:
             np.ascontiguousarray(crack.compliance, dtype=float) if self.given else system.no_compliance
         )
         self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
-        self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
+        self.stress, self.crack_strain = np.array(state.stress), np.ascontiguousarray(state.crack_strain)
+        if system.taken_out is not None:
+            # What blocks store goes with them, in the first step without them and not after it.
+            self.stress[system.taken_out] = 0.0
         self.iterations = 0
         if not scheme.static and found.tried is None and len(found):
             self.found = found.expecting(*self._expected_states())

@@ -362,6 +362,7 @@ class EnergyBudget:
         """The columns of a history, J/m."""
         sums = self.totals.tolist()
         out = {column: sums[_SUMS[name]] for column, name in _COLUMNS.items()}
+        out["split_energy"] = self.split
         out["energy_residual"] = self.residual
         out["growth_release"] = self.released
         return out
