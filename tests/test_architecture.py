@@ -213,6 +213,6 @@ def test_top_level_is_as_agreed():
         pytest.skip("not a git checkout")
     files = [Path(line) for line in listed.stdout.splitlines()]
     allowed = {"pyproject.toml", "README.md", "LICENSE", ".gitignore", ".ci"}
-    allowed |= {"geomech", "geometry", "pipelines", "tests", "outputs"}
+    allowed |= {"geomech", "geometry", "pipelines", "tests", "outputs", "docs"}
     assert {f.parts[0] for f in files} <= allowed
     assert not [f for f in files if f.parts[0] == "geometry" and f.suffix == ".py"], "geometry holds data, no Python"

@@ -363,6 +363,29 @@ def test_a_finished_run_says_so_and_can_be_made_longer(write, tmp_path):
     assert longer.history["time"][-1] == pytest.approx(0.12) and longer.scene["run"]["end_time_s"] == 0.12
 
 
+@pytest.mark.parametrize(
+    ("text", "settings", "first", "then"),
+    [
+        (SLIDING, [], 0.055, 0.1),
+        (SHAKEN, [], 0.07, 0.1),
+        (SPLIT, ["run.stepping='events'", "output.interior=false"], 140.0, 160.0),
+    ],
+    ids=["fixed", "automatic", "events"],
+)
+def test_a_run_made_longer_is_one_that_was_as_long_from_the_start(text, settings, first, then, write, tmp_path):
+    """Its first end lies within a step, which the longer run takes whole."""
+    path = write(text)
+    whole, short = (load_scene(path, [*settings, f"run.end_time_s={end}"]) for end in (then, first))
+    for name, scene in (("whole", whole), ("parts", short)):
+        run(scene, tmp_path / name, standard_observers(scene, quiet=True))
+    assert Run(tmp_path / "parts").history["time"][-1] == pytest.approx(first)
+    assert Run(tmp_path / "whole").history["time"].tolist().count(first) == 0
+    with pytest.raises(Finished, match=f"beyond {first:g}"):
+        resume(tmp_path / "parts")
+    resume(tmp_path / "parts", [f"run.end_time_s={then}"], quiet=True)
+    assert differing(tmp_path / "whole", tmp_path / "parts") == []
+
+
 def test_a_run_that_stopped_goes_on_as_if_never_told_to(write, tmp_path):
     """It stops at the coalescence, before the next pass of growth; told not to, it is the run without that key."""
     path = write(SPLIT)
@@ -407,6 +430,30 @@ def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
         resume(out, quiet=True)
     (out / "history.csv").write_bytes(history)
     assert resume(out, quiet=True)["end"] == "end of the scene"
+
+
+def test_a_changed_file_that_the_model_includes_is_refused(write, tmp_path):
+    """A model is all files that it reads, one in another."""
+    (tmp_path / "sizes.geo").write_text("width = 3;\n")
+    (tmp_path / "parts.geo").write_text('Include "sizes.geo";\nheight = 0.5;\n')
+    model = tmp_path / "ground.geo"
+    model.write_text(
+        'Include "parts.geo";\n// Include "none.geo";\nSetFactory("OpenCASCADE");\n'
+        "Rectangle(1) = {0, -1, 0, width, 1};\nRectangle(2) = {1, 0, 0, 1, height};\nCoherence;\n"
+        'Physical Surface("slope") = {1};\nPhysical Surface("block") = {2};\n'
+    )
+    head, rest = SLIDING.split("[materials.rock]")
+    text = 'title = "included"\n[geometry]\nmodel = "ground.geo"\n[materials.rock]' + rest
+    out = tmp_path / "out"
+    broken_off(load_scene(write(text)), out, 2)
+    for name, was, now in (("sizes.geo", "3", "4"), ("parts.geo", "0.5", "0.6"), ("ground.geo", "{1, 0", "{0.5, 0")):
+        file = tmp_path / name
+        begun = file.read_text()
+        file.write_text(begun.replace(was, now))
+        with pytest.raises(NotResumable, match=rf"{name} is not what the run was begun with"):
+            resume(out)
+        file.write_text(begun)
+    resume(out, quiet=True)
 
 
 def test_what_is_no_run_is_told(write, tmp_path, capfd):

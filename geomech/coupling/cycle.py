@@ -125,6 +125,17 @@ class Coupling:
         told = () if self.under_way is None else self.under_way.told + self.under_way.pending
         return self._stops(told + self._brought)
 
+    @property
+    def ends_next(self) -> bool:
+        """Whether the next load step is cut, or may be, because the run ends in it: one that lasted longer would take
+        another."""
+        if self.under_way is not None:
+            return False
+        time, end = self.now.state.time, self.problem.run.end_time
+        if self.events is not None:
+            return self.events.may_pass(self.now, end)
+        return end - time < self.length.dt
+
     def cycles(self) -> Iterator[Cycle]:
         """From the initial state to the end; the same to the bit in whatever process and beside whatever else."""
         return alike(self._from_the_start())
