@@ -12,10 +12,10 @@ import sys
 from collections.abc import Callable, Sequence
 
 from .. import __version__
-from . import bench, build, check, doctor, render, report, resume, run, safety
+from .messages import say, say_errors, silence, spell_out
 from .scenes import default_folder
-from .telling import say, say_errors, silence, spell_out
 from .verb import BAD_INPUT, DONE, FAILED, INTERRUPTED, BadInput
+from .verbs import bench, build, check, doctor, render, report, resume, run, safety
 
 __all__ = ["BAD_INPUT", "DONE", "FAILED", "INTERRUPTED", "default_folder", "main"]
 

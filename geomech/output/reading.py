@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .fields import HISTORY, SERIES, TIPS
-from .vtu import read_collection
+from .vtk.vtu import read_collection
 
 if TYPE_CHECKING:
     import pyvista

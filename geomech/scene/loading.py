@@ -11,21 +11,21 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..model import Blocks, Cracks, Problem
-from .action_checks import check_actions
+from .assembly.drawn_marks import with_marks
 from .build import build_problem
-from .checks import check
+from .checks.action_checks import check_actions
+from .checks.cross_checks import check
+from .checks.plausibility import check_plausible
+from .checks.supported_loads import check_loads
 from .drawing import Drawing, draw
-from .drawn_marks import with_marks
-from .endless import check_endless
-from .equilibrium import check_loads
 from .errors import Check, Fault, SceneError, one_a_cause
 from .keys import describe_keys
 from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
 from .overview import overview
-from .plausibility import check_plausible
 from .tables import SceneTables
 from .tables.output import OutputTable, RenderTable
+from .unbounded_rock import check_endless
 from .validation import DECIMAL_COMMA, nearest, validate
 from .world import moved
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.dda.energy import EnergyBudget
+from geomech.dda.energy_balance import EnergyBudget
 from geomech.model import Blocks, Bolt, DdaSettings, Excavation, History, JointLaw, Loads, Material
 
 ROCK = Material("rock", 2e9, 0.2, density=2500.0)
@@ -61,8 +61,8 @@ def test_nothing_of_a_block_that_is_gone_is_stored():
     joint = JointLaw("face", friction_angle=np.radians(35))
     list(dda.run(blocks, [ROCK], [joint], loads, settings, 0.004, watch=results.append))
     for result in results:
-        elastic = 0.5 * blocks.areas() @ np.einsum(
-            "bi,ij,bj->b", result.state.stress, ROCK.compliance(), result.state.stress
+        elastic = (
+            0.5 * blocks.areas() @ np.einsum("bi,ij,bj->b", result.state.stress, ROCK.compliance(), result.state.stress)
         )
         assert result.energy.elastic == pytest.approx(elastic, rel=1e-4)
     with_it, first, *_ = (r.energy.elastic for r in results[1:])

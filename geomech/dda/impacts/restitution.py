@@ -26,8 +26,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...model import OPEN, SLIP
-from ..contact_set import ContactSet
-from ..step_equations import Settled
+from ..open_close.contact_set import ContactSet
+from ..open_close.equations import Settled
 from .impulses import ImpulseProblem
 
 #: The time of an impact is known to 2⁻ⁿ of the step.
@@ -108,7 +108,10 @@ class Striking:
         problem = _turned_back(problem, blocks, 1.0 - part)
         ended = problem.speeds(blocks.velocity)
         there = problem.relative(
-            *(blocks.begun[b] + part[:, None] * (blocks.velocity - blocks.begun)[b] for b in (problem.block, problem.other))
+            *(
+                blocks.begun[b] + part[:, None] * (blocks.velocity - blocks.begun)[b]
+                for b in (problem.block, problem.other)
+            )
         )
         there[:, 0] = np.minimum(there[:, 0], 0.0)
         # What sticks or was closed goes on as it did; what slides may be stopped.
@@ -194,7 +197,12 @@ def touching_time(gap: np.ndarray, left: np.ndarray, begun: np.ndarray, ended: n
 
 
 def _without_gain(
-    dull: np.ndarray, bounced: np.ndarray, before: np.ndarray, problem: ImpulseProblem, least: np.ndarray, most: np.ndarray
+    dull: np.ndarray,
+    bounced: np.ndarray,
+    before: np.ndarray,
+    problem: ImpulseProblem,
+    least: np.ndarray,
+    most: np.ndarray,
 ) -> float:
     """The largest part s of the way from impulses ``dull`` to those ``bounced`` (n, 2) that gains no energy; they lead to
     velocities ``least`` and ``most`` (n_blocks, 3), where relative ones were ``before`` (n, 2) them."""

@@ -32,7 +32,9 @@ def turned(polygon: np.ndarray, angle: float) -> np.ndarray:
 class Fall:
     """Blocks above a fixed floor, their states, velocities (n_steps, n_blocks, 6) and budget."""
 
-    def __init__(self, polygons, dt, end, *, restitution, friction=0.0, velocity=None, gravity=GRAVITY, fixed=(0,), **more):
+    def __init__(
+        self, polygons, dt, end, *, restitution, friction=0.0, velocity=None, gravity=GRAVITY, fixed=(0,), **more
+    ):
         self.blocks = Blocks.from_polygons(polygons, fixed=[b in fixed for b in range(len(polygons))])
         settings = DdaSettings(time_step=dt, dynamic_factor=1.0, max_displacement_ratio=1.0, **more)
         state = State.at_rest(self.blocks)
@@ -47,7 +49,13 @@ class Fall:
 
         self.states = list(
             dda.run(
-                self.blocks, [ROCK], [law], Loads(gravity=History.constant([0.0, -gravity])), settings, end, state=state,
+                self.blocks,
+                [ROCK],
+                [law],
+                Loads(gravity=History.constant([0.0, -gravity])),
+                settings,
+                end,
+                state=state,
                 watch=watch,
             )
         )
@@ -105,7 +113,9 @@ def test_bounces_follow_each_other_as_a_geometric_series(dt):
     energy = above + speed**2 / (2 * GRAVITY)
     strikes = seen.strikes(1)[:4]
     for n, (strike, following) in enumerate(pairwise(strikes), 1):
-        assert energy[(strike + following) // 2] == pytest.approx(exact.rebound_height(height, restitution, n), rel=1e-6)
+        assert energy[(strike + following) // 2] == pytest.approx(
+            exact.rebound_height(height, restitution, n), rel=1e-6
+        )
         # Back along its parabola from where it is at the end of the step.
         since = (np.sqrt(2.0 * GRAVITY * energy[strike]) - speed[strike]) / GRAVITY
         assert seen.time[strike] - since == pytest.approx(exact.bounce_time(height, restitution, n), abs=1e-6)
@@ -191,9 +201,7 @@ def test_two_blocks_in_flight_keep_their_momentum(restitution):
 @pytest.mark.parametrize("dt", (5e-3, 1e-3))
 def test_a_block_that_rests_passes_the_blow_to_the_floor(dt):
     """What strikes a block that lies on the floor comes up as from the floor, and that block stays where it is."""
-    seen = Fall(
-        [floor(), rectangle(-1, 0, 2, 0.5), rectangle(0, 0.9, 1, 1.9)], dt, 0.35, restitution=0.5, friction=0.5
-    )
+    seen = Fall([floor(), rectangle(-1, 0, 2, 0.5), rectangle(0, 0.9, 1, 1.9)], dt, 0.35, restitution=0.5, friction=0.5)
     first = seen.strikes(2)[-1]
     height = seen.centroid(2)[:, 1] - 1.0 + seen.velocity[:, 2, 1] ** 2 / (2 * GRAVITY)
     assert height[first] == pytest.approx(0.1, rel=0.01)
@@ -204,9 +212,7 @@ def test_the_energy_of_a_fall_is_accounted_for():
     """A tilted block tumbles down a stair until it lies: gravity's work is in friction, impacts, and little else."""
     stair = np.array([[-4, -2], [6, -2], [6, 0], [2, 0], [2, 1], [0, 1], [0, 2], [-4, 2]], dtype=float)
     block = turned(rectangle(-0.4, -0.3, 0.4, 0.3), np.radians(25.0)) + [-0.4, 3.0]
-    seen = Fall(
-        [stair, block], 4e-3, 2.5, restitution=0.4, friction=0.4, velocity={1: (1.5, 0.0)}
-    )
+    seen = Fall([stair, block], 4e-3, 2.5, restitution=0.4, friction=0.4, velocity={1: (1.5, 0.0)})
     budget = seen.budget
     assert budget.gravity_work > 0.0 and budget.impact > 0.1 * budget.gravity_work and budget.friction > 0.0
     assert abs(budget.scheme) < 0.02 * budget.turnover

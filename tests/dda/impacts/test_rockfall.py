@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import geomech
-from geomech.model.polygon import winding_number
+from geomech.model.blocks.polygon import winding_number
 from geomech.scene import load_scene
 
 SCENE = Path(__file__).parents[3] / "geometry" / "rockfall.toml"
