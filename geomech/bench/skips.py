@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from ..model import Blocks, Cracks, Problem, State
-from .cost import block_scenes, coupling_cost
+from .cost import block_scenes
 from .figures import Measured, stopwatch
 
 #: Where the picture goes, below the working folder.
@@ -59,8 +59,8 @@ def measure(quick: bool = False) -> Measured:
 
 def _rows(quick: bool) -> Iterator[tuple[str, float, float, float]]:
     times, cracks, steps = (1, 10, 3) if quick else (2, 20, 5)
-    cracked = coupling_cost.wall(40 if quick else 200, cracks)
-    cracked = replace(cracked, run=replace(cracked.run, end_time=(steps - 0.5) * coupling_cost.TIME_STEP))
+    cracked = block_scenes.cracked_wall(40 if quick else 200, cracks)
+    cracked = replace(cracked, run=replace(cracked.run, end_time=(steps - 0.5) * block_scenes.CRACKED_WALL_STEP))
     label = (
         f"bodies, factors and compliances of what has not changed: a wall with {cracks} cracked bricks, {steps} steps"
     )

@@ -33,13 +33,14 @@ from .loads.step_actions import StepActions, felt_gravity
 from .loads.viscous_boundary import QuietEdges
 from .open_close.augmented_lagrangian import settle_augmented
 from .open_close.contact_set import ContactSet
-from .open_close.equations import Settled, Unsettled
+from .open_close.equations import Unsettled
 from .open_close.iteration import hurries, settle
+from .open_close.settled_states import Settled
 from .results import CrackResponse, StepResult
 from .statics.out_of_balance import imbalance
 
 if TYPE_CHECKING:
-    from .system import BlockSystem
+    from .interfaces import SteppedSystem
 
 #: A moving step whose faces still seek their place after this many times the iterations that states may take is cut, so
 #: often at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
@@ -90,7 +91,7 @@ class Attempt:
 
     def __init__(
         self,
-        system: BlockSystem,
+        system: SteppedSystem,
         state: State,
         vertices: np.ndarray,
         carried: np.ndarray,

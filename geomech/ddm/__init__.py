@@ -29,8 +29,8 @@ _PUBLIC = {
     "Solution": ".solution",
     "Work": ".counters",
     "propagate": ".propagation",
-    "TargetMissed": ".adaptivity",
-    "solve_to": ".adaptivity",
+    "TargetMissed": ".fracture.target_error",
+    "solve_to": ".accurate_solution",
 }
 _MODULES = {"criteria": ".fracture.criteria", "initiation": ".growth.initiation", "shapes": ".kernels.shape_functions"}
 

@@ -21,16 +21,18 @@ import numpy as np
 
 from ..model import Cracks, DdmSettings, JointLaw, Material
 from ..model.blocks.polygon import area_moments
-from .adaptivity import finer, for_target, met
+from .adaptivity import finer, for_target
 from .counters import Work
 from .crack_contact.face_contact import settle_faces
 from .crack_contact.face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
 from .crack_contact.frictional_contact import FaceEquations
-from .fracture.chord_error import rounder
+from .fracture.chord_error import with_halved_chords
+from .fracture.target_error import met
 from .fracture.tip_elements import tip_elements
 from .fracture.weight_functions import TipFunctionals
 from .iterative.boundary_gmres import is_iterated
-from .iterative.gmres import FACTORABLE, NotSolved, compressed, is_compressed
+from .iterative.crack_gmres import FACTORABLE, compressed, is_compressed
+from .iterative.gmres import NotSolved
 from .loads.body_loads import BodyLoad
 from .loads.load_vectors import Applied, apply, check_equilibrium
 from .loads.supports import Holds, Support, called, marks, place, values_at
@@ -182,8 +184,22 @@ class Body:
 
     @cached_property
     def rounder(self) -> Body | None:
-        """See `chords.rounder`."""
-        return rounder(self)
+        """The same body with every chord of a curved wall halved (`with_halved_chords`); None where all are straight."""
+        halved = with_halved_chords(self)
+        if halved is None:
+            return None
+        loops, cracks, supports = halved
+        n_outlines = int(self.outlined)
+        return Body(
+            loops[:n_outlines],
+            cracks,
+            self.material,
+            self.settings,
+            holes=loops[n_outlines:],
+            supports=supports,
+            face_laws=self.face_laws,
+            half_plane=self.half_plane,
+        )
 
     def _in_half_plane(self, edges: np.ndarray) -> np.ndarray:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""

@@ -23,7 +23,7 @@ from .system.boundary_system import middle_of
 from .system.influence_matrix import add_fields
 
 if TYPE_CHECKING:
-    from .body import Body
+    from .interfaces import CrackedBody
     from .loads.body_loads import BodyLoad
 
 
@@ -43,7 +43,7 @@ class Solution:
 
     def __init__(
         self,
-        body: Body,
+        body: CrackedBody,
         applied: Applied,
         eliminated: np.ndarray,
         answer: FaceAnswer,

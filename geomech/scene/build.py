@@ -29,10 +29,10 @@ from ..shapes.parts import JOINT
 from .assembly.fixed_blocks import first_velocities, fixed_blocks, held_unknowns
 from .assembly.joint_laws import joint_law
 from .assembly.load_functions import actions_of, force_history, in_situ_of, profile_of, traction_history
+from .checks.check import Check
 from .checks.cross_checks import carrier, gauge_carriers, material_of
 from .checks.edges import contact_names, joint_names
 from .drawing import Drawing
-from .errors import Check
 from .tables import SceneTables
 from .tables.rock import MaterialTable
 from .unbounded_rock import endless_of

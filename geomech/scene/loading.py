@@ -11,14 +11,16 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from ..model import Blocks, Cracks, Problem
+from ..shapes.mesh_exchange import SUFFIXES as OTHER_MESHES
 from .assembly.drawn_marks import with_marks
 from .build import build_problem
 from .checks.action_checks import check_actions
+from .checks.check import Check
 from .checks.cross_checks import check
 from .checks.plausibility import check_plausible
 from .checks.supported_loads import check_loads
 from .drawing import Drawing, draw
-from .errors import Check, Fault, SceneError, one_a_cause
+from .errors import Fault, SceneError, one_a_cause
 from .keys import describe_keys
 from .locator import Path, dotted, locate
 from .overrides import OverrideError, assign, flattened, parse_override
@@ -33,7 +35,7 @@ from .world import moved
 SCENE_FILE = "scene.toml"
 
 #: What a scene's geometry.model may be, and is taken for a scene at times.
-MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf")
+MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf", *OTHER_MESHES)
 
 #: A scene nests tables and arrays some six deep; what is nested deeper than this is a mistake, or meant to exhaust.
 DEEPEST = 40

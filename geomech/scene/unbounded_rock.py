@@ -10,8 +10,8 @@ from ..conventions import outward_normal_of, traction
 from ..model import EndlessRock, Fluid, History
 from ..model.blocks.polygon import distance_to_edges
 from ..model.unbounded_rock import connected_cracks
+from .checks.check import Check
 from .drawing import Drawing
-from .errors import Check
 from .tables import SceneTables
 from .tables.loads import FluidTable, Rising
 from .validation import nearest

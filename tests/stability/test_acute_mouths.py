@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.fracture.sif_error_estimate import factors, largest
+from geomech.ddm.fracture.tip_factors import factors, largest
 from geomech.model import Cracks, Material
 from geomech.reference.cracks import dislocations
 from geomech.reference.cracks.dislocations import Arm

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.fracture.sif_error_estimate import factors, largest
+from geomech.ddm.fracture.tip_factors import factors, largest
 from geomech.model import Cracks, DdmSettings, JointLaw, Material
 from geomech.reference.cracks import fracture
 from geomech.reference.specimens import two_cracks

@@ -13,7 +13,7 @@ import pytest
 
 from geomech import ddm
 from geomech.ddm.adaptivity import for_target
-from geomech.ddm.fracture.sif_error_estimate import factors, largest
+from geomech.ddm.fracture.tip_factors import factors, largest
 from geomech.model import Cracks, DdmSettings, Material
 from geomech.reference.cracks import fracture
 from geomech.reference.specimens import two_cracks

@@ -56,11 +56,11 @@ def points() -> list[Passes]:
 def _run(tolerance: float) -> tuple[np.ndarray, int, float]:
     """K of all tips at the end, the number of passes, and seconds of the steps, bodies made before."""
     from ...coupling import cycles
-    from ..cost.coupling_cost import wall
+    from ..cost.block_scenes import cracked_wall
 
     passes, cycle = 0, None
     with _until(tolerance):
-        problem = wall(*WALL)
+        problem = cracked_wall(*WALL)
         steps = cycles(replace(problem, dda=replace(problem.dda, dynamic_factor=0.0)))
         next(steps)
         spent_on = stopwatch()

@@ -9,7 +9,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
+from ...model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    DdmSettings,
+    GrowthSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+    State,
+)
 
 ROCK = Material("rock", 20e9, 0.25, density=2600.0)
 FRICTION = math.radians(35)
@@ -97,3 +110,29 @@ def at_rest(blocks: Blocks) -> State:
 
 def _rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
+
+
+#: Of the wall with cracked bricks, s.
+CRACKED_WALL_STEP = 0.01
+
+
+def cracked_wall(n: int, n_cracked: int) -> Problem:
+    """About ``n`` bricks, every so many of them with an open slot of 0.2 m across its middle that rises at 45°."""
+    blocks = wall(n)
+    cracked = np.linspace(1, blocks.n_blocks - 1, n_cracked).astype(int)
+    reach = np.array([0.07, 0.07])
+    middles = [blocks.area_moments(b)[1] for b in cracked.tolist()]
+    return Problem(
+        title="a wall with cracked bricks",
+        blocks=blocks,
+        cracks=Cracks.from_polylines(
+            [np.array([middle - reach, middle + reach]) for middle in middles], block=cracked.tolist(), aperture=np.inf
+        ),
+        materials=(replace(ROCK, k_ic=1e12),),
+        joints=(JOINT,),
+        loads=WEIGHT,
+        dda=settings(CRACKED_WALL_STEP),
+        ddm=DdmSettings(),
+        growth=GrowthSettings(increment=0.05),
+        run=RunSettings(end_time=1.0),
+    )

@@ -11,12 +11,9 @@ from __future__ import annotations
 
 import os
 import statistics
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
-
-from ...model import Cracks, DdmSettings, GrowthSettings, Problem, RunSettings
 from ...output.tables.summary import write_json
 from ..accuracy import pass_tolerance
 from ..figures import Measured, stopwatch
@@ -27,31 +24,8 @@ FOLDER = Path("outputs/bench_coupling")
 SPECIMEN = Path("pipelines/two_cracks/scene.toml")
 #: Goals on two cores: coupling's share of a step beside the blocks' own; seconds of the specimen, warm.
 RATIO, SECONDS = 1.0, 2.0
-TIME_STEP = 0.01
 #: What a run's phases call the blocks' own part.
 BLOCKS = "dda"
-
-
-def wall(n: int, n_cracked: int) -> Problem:
-    """About ``n`` bricks, every so many of them with an open slot of 0.2 m across its middle that rises at 45°."""
-    blocks = block_scenes.wall(n)
-    cracked = np.linspace(1, blocks.n_blocks - 1, n_cracked).astype(int)
-    reach = np.array([0.07, 0.07])
-    middles = [blocks.area_moments(b)[1] for b in cracked.tolist()]
-    return Problem(
-        title="a wall with cracked bricks",
-        blocks=blocks,
-        cracks=Cracks.from_polylines(
-            [np.array([middle - reach, middle + reach]) for middle in middles], block=cracked.tolist(), aperture=np.inf
-        ),
-        materials=(replace(block_scenes.ROCK, k_ic=1e12),),
-        joints=(block_scenes.JOINT,),
-        loads=block_scenes.WEIGHT,
-        dda=block_scenes.settings(TIME_STEP),
-        ddm=DdmSettings(),
-        growth=GrowthSettings(increment=0.05),
-        run=RunSettings(end_time=1.0),
-    )
 
 
 def of_wall(n: int, n_cracked: int, steps: int) -> dict:
@@ -60,7 +34,7 @@ def of_wall(n: int, n_cracked: int, steps: int) -> dict:
     from ...coupling import cycles
     from ...coupling.crack_compliance.growth_screening import STOOD
 
-    problem = wall(n, n_cracked)
+    problem = block_scenes.cracked_wall(n, n_cracked)
     before: dict[str, float] = {}
     blocks, coupling, solved, passes, left_out, cycle = [], [], [], [], 0, None
     for cycle in cycles(problem):

@@ -16,7 +16,6 @@ from dataclasses import asdict, dataclass, field, fields
 from functools import partial
 from pathlib import Path
 
-from ...output.tables.summary import write_json
 from ..figures import Measured
 from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Heard, limited
 from .random_slopes import scene_text

@@ -152,7 +152,8 @@ def invariance(seed: int, seconds: float = LIMIT, text: str | None = None) -> In
         scene = drawn(scene_text(seed) if text is None else text)
         first = problem_of(scene)
     except ValueError as error:
-        ended = limited(lambda heard: _raise(error), seconds)
+        refusal = error
+        ended = limited(lambda heard: _raise(refusal), seconds)
         return Invariance(seed, ended.verdict, reason=ended.reason or ended.message.strip())
     compared = _Compared(seed, scene, seconds)
     threshold = moving_from(first)

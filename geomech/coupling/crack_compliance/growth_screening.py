@@ -10,14 +10,14 @@ nothing is left out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from ...ddm import Body, BodyLoad
     from ...ddm.fracture.sif_bound import TipBound
-    from ...model import Problem
-    from ..coupled_state import CrackedBlocks
+    from ...model import Blocks, Problem
 
 #: Solutions of a body after which its bound is found, which takes about as long as twenty of them; …
 STOOD = 5
@@ -25,6 +25,16 @@ STOOD = 5
 FAR = 0.1
 #: Of the toughness, what a bound has to stay below.
 BELOW = 1.0 - 1e-6
+
+
+class CoupledBlocks(Protocol):
+    """What of a coupled run is looked at: its blocks, and by block their elastic bodies, loads and solutions."""
+
+    problem: Problem
+    blocks: Blocks
+    bodies: dict[int, Body]
+    loads: dict[int, BodyLoad]
+    solutions: dict[int, Any]
 
 
 @dataclass(eq=False)
@@ -47,7 +57,7 @@ class CannotGrow:
     asked: int = 0
     _known: dict[int, _Known] = field(default_factory=dict)
 
-    def among(self, now: CrackedBlocks, dt: float) -> set[int]:
+    def among(self, now: CoupledBlocks, dt: float) -> set[int]:
         """The blocks that need not be solved for under the present loads, in a step of ``dt`` s."""
         problem = now.problem
         if not _may_leave_out(problem) or 2 * self.asked > self.passes:
@@ -56,7 +66,7 @@ class CannotGrow:
         self.passes += bool(found)
         return found
 
-    def solved(self, now: CrackedBlocks, tips: np.ndarray, toughness: np.ndarray) -> None:
+    def solved(self, now: CoupledBlocks, tips: np.ndarray, toughness: np.ndarray) -> None:
         """Blocks have been solved for, and have these ``tips``, TIP rows, of this ``toughness`` (n_tips,)."""
         if not _may_leave_out(now.problem):
             return
@@ -76,7 +86,7 @@ class CannotGrow:
         known = self._known
         self._known = {child: known[parent[child]] for child in whole.tolist() if parent[child] in known}
 
-    def _bound(self, now: CrackedBlocks, block: int, known: _Known) -> None:
+    def _bound(self, now: CoupledBlocks, block: int, known: _Known) -> None:
         from ...ddm.fracture.sif_bound import TipBound, is_bounded, most_per_factor
 
         body = now.bodies[block]
@@ -85,7 +95,7 @@ class CannotGrow:
             known.bound = TipBound(body)
             known.per_factor = most_per_factor(now.problem.growth.criterion, body.material)
 
-    def _cannot(self, now: CrackedBlocks, block: int, dt: float) -> bool:
+    def _cannot(self, now: CoupledBlocks, block: int, dt: float) -> bool:
         known, body, load = self._known.get(block), now.bodies[block], now.loads[block]
         if known is None or known.bound is None or known.crack_system is not body.crack_system:
             return False

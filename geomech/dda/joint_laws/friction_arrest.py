@@ -25,7 +25,7 @@ import numpy as np
 from ...model import OPEN, SLIP, STICK
 from ..linear_solver import assembly
 from ..open_close.contact_set import ContactSet
-from ..open_close.equations import Settled
+from ..open_close.settled_states import Settled
 
 #: Impulses found to be beyond what friction can have been are brought back to it so often.
 _ROUNDS = 4

@@ -13,7 +13,8 @@ import numpy as np
 
 from ...model import OPEN
 from ..open_close.contact_set import ContactSet
-from ..open_close.equations import Settled, Unsettled
+from ..open_close.equations import Unsettled
+from ..open_close.settled_states import Settled
 from .nonlinear_laws import CurvedJoints
 from .penalty_springs import Springs
 

@@ -12,7 +12,7 @@ from ...model import BOLT, GROUND, Blocks, Loads, State
 from ..kinematics.midpoint_configuration import Middle
 from ..linear_solver.assembly import Links, Pattern
 from ..open_close.contact_set import ContactSet
-from ..open_close.equations import Settled
+from ..open_close.settled_states import Settled
 from ..results import contact_resultants
 from .bolts import ROUNDS, BoltSet, check_bolts, labels
 from .force_records import POINT_FORCE

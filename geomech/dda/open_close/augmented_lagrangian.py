@@ -20,7 +20,8 @@ import numpy as np
 from ...model import OPEN, STICK
 from ..joint_laws.penalty_springs import Springs
 from .contact_set import ContactSet
-from .equations import Settled, Unsettled
+from .equations import Unsettled
+from .settled_states import Settled
 
 #: Former differences that Anderson's mixing combines.
 _DEPTH = 12

@@ -17,7 +17,8 @@ import numpy as np
 from ..joint_laws.coulomb_return import moved
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
-from .equations import Answer, Equations, Settled, States, Unsettled
+from .equations import Answer, Equations, States, Unsettled
+from .settled_states import Settled
 
 #: A patch reaches so many blocks beyond those whose contacts are wrong, fewer where it would take more than this part of
 #: all blocks, or more than so many: its factors stand beside those of all.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from ..contact_detection.contact_records import fill
 from ..contact_detection.face_quadrature import FacePoints
 from ..joint_laws.bonds import BondedFaces
 from ..joint_laws.penalty_springs import Springs
-
-if TYPE_CHECKING:
-    from .equations import Settled
+from .settled_states import Settled
 
 
 @dataclass(frozen=True, eq=False)

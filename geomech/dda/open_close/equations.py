@@ -15,6 +15,7 @@ from ..linear_solver import assembly
 from ..linear_solver.block_solver import RESIDUAL
 from .contact_set import ContactSet
 from .local_complementarity import clusters, settled_together, with_neighbours
+from .settled_states import Settled
 
 #: No more than so many contacts have their states sought together.
 _JOINED = 80
@@ -22,29 +23,6 @@ _JOINED = 80
 _ROUGHLY = 1e-8
 #: Bonds that come to their strengths within this part of the same load break at once.
 _AT_ONCE = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """A consistent set of contact states and what goes with it; ``unknowns`` (n_free, 6) scaled as in `assembly`.
-
-    ``gap`` is counted from where the faces meet, ``slip`` is what the shear spring did not take up of the motion along
-    the edge, ``lifted`` what it added to the lift (all m); ``springs`` those of the final iteration; ``stretch`` what
-    multipliers have left of the motion of sticking contacts.
-    """
-
-    unknowns: np.ndarray
-    state: np.ndarray
-    direction: np.ndarray
-    bonded: np.ndarray
-    normal_force: np.ndarray
-    shear_force: np.ndarray
-    gap: np.ndarray
-    slip: np.ndarray
-    lifted: np.ndarray
-    springs: Springs
-    iterations: int
-    stretch: np.ndarray | float = 0.0
 
 
 class Unsettled(Exception):

@@ -29,9 +29,10 @@ from ..joint_laws.nonlinear_laws import CurvedJoints
 from ..joint_laws.penalty_springs import Springs
 from ..linear_solver import assembly
 from .block_patches import settled_in_patch
-from .equations import Answer, Equations, Settled, States, Unsettled
+from .equations import Answer, Equations, States, Unsettled
 from .interior_point.central_path import CentralPath
 from .lagged_friction import LaggedFriction
+from .settled_states import Settled
 from .smoothed_newton import RoundedLaws
 from .successive_convex import ConvexRounds
 

@@ -25,8 +25,8 @@ from .continuous_collision import INTO, THROUGH, crossings
 from .relative_motion import Windows
 
 if TYPE_CHECKING:
+    from ..interfaces import AttemptedStep
     from ..results import StepResult
-    from ..time_step import Attempt
 
 log = logging.getLogger(__name__)
 
@@ -125,7 +125,7 @@ class StepLimits:
             vertices, affine_motion(dt * carried), np.ascontiguousarray(moments[:, 1:3]), fall, lift
         )
 
-    def used(self, attempt: Attempt, result: StepResult) -> Used:
+    def used(self, attempt: AttemptedStep, result: StepResult) -> Used:
         """What a step has used of what it may move."""
         affine = affine_motion(attempt.increment)
         closed = result.contacts[result.contacts["state"] != OPEN]
@@ -154,7 +154,7 @@ class StepLimits:
         )
         return Used(float(of_all), reason, moved, DISPLACEMENT, (block,))
 
-    def crossed(self, attempt: Attempt, result: StepResult) -> Crossed | None:
+    def crossed(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
         """What has gone where contacts saw nothing come; None for nothing."""
         if len(self._size) < 2:
             return None
@@ -203,7 +203,7 @@ class StepLimits:
             np.maximum.at(out, vertices, deep)
         return out
 
-    def pressed_apart(self, attempt: Attempt, result: StepResult) -> Crossed | None:
+    def pressed_apart(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
         """What pushes blocks apart out of which they have not come in: contacts that close in a step with a vertex that
         lay behind their edge as it began, if that brings more than `_GIVEN` of the energy there is; not what was drawn
         so. A shorter step looks for contacts less far away, and meets them where they are met first."""

@@ -15,8 +15,7 @@ from .frictional_contact import settle_rough
 from .frictionless_contact import NotConverged, Settled, settle
 
 if TYPE_CHECKING:
-    from ..body import Body
-    from ..solution import Solution
+    from ..interfaces import CrackedBody, SolvedBody
 
 #: Faces that no state of contact satisfies may be this part of their crack: what happens at the end of a blade of rock
 #: is not felt by a tip that is far away.
@@ -41,12 +40,12 @@ class FaceAnswer:
 
 
 def settle_faces(
-    body: Body,
+    body: CrackedBody,
     load_traction: np.ndarray,
     opened: np.ndarray,
     pressure: np.ndarray | float,
-    warm: Solution | None,
-    history: Solution | FaceMemory | None = None,
+    warm: SolvedBody | None,
+    history: SolvedBody | FaceMemory | None = None,
 ) -> FaceAnswer:
     """The faces of ``body``; ``load_traction`` (n_unknowns,) is what loads do to closed faces, ``opened`` S⁻¹ of it,
     ``pressure`` (n_elements, p+1) that of a fluid at the nodes. ``warm`` and ``history`` as in `Body.solve`."""
@@ -90,7 +89,7 @@ def settle_faces(
     return FaceAnswer(state["w"], state["traction"], settled.closed, settled.solves)
 
 
-def _whereabouts(body: Body, node: int | None) -> str:
+def _whereabouts(body: CrackedBody, node: int | None) -> str:
     """The crack on which the ``node`` is, and what rock there is between its tips and the outline where that is next to
     none: a piece that hangs by it rattles."""
     c, cracks, edges = body.faces, body.cracks, body.mesh.edges
@@ -114,7 +113,7 @@ def _whereabouts(body: Body, node: int | None) -> str:
     return said
 
 
-def _judge(body: Body, settled: Settled) -> None:
+def _judge(body: CrackedBody, settled: Settled) -> None:
     """Log where the nodes are of which no state of contact was found. Raises NotConverged, which names the crack, when
     they are more than a crack's last bit at a mouth or junction: then they matter."""
     c, cracks = body.faces, body.cracks
@@ -139,11 +138,11 @@ def _judge(body: Body, settled: Settled) -> None:
 
 
 def _rough(
-    body: Body,
+    body: CrackedBody,
     right: np.ndarray,
     applied: np.ndarray,
-    warm: Solution | None,
-    history: Solution | FaceMemory | None,
+    warm: SolvedBody | None,
+    history: SolvedBody | FaceMemory | None,
 ) -> FaceAnswer:
     laws = body.laws
     began = body.never_loaded if history is None else _memory(history, body)
@@ -160,7 +159,7 @@ def _rough(
     return FaceAnswer(w, applied - reaction, closed, solves, memory, began)
 
 
-def _memory(of: Solution | FaceMemory, body: Body) -> FaceMemory:
+def _memory(of: SolvedBody | FaceMemory, body: CrackedBody) -> FaceMemory:
     """What the faces of ``of`` remember, on the elements of ``body``."""
     if isinstance(of, FaceMemory):
         return carried_over(of, body.faces)

@@ -27,10 +27,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..counters import Work
-from ..iterative.gmres import Iterated, IterativeCrackSystem
+from ..iterative.crack_gmres import Iterated, IterativeCrackSystem
 from ..system.closed_face_factor import HeldFactor
+from ..system.contact_rows import Rows
 from ..system.dense_lu import Factor
-from ..system.schur_complement import CrackSystem, Rows
+from ..system.schur_complement import CrackSystem
 from .face_laws import FaceLaws, FaceMemory, FaceStates, Released
 from .frictionless_contact import NotConverged
 

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Cracks
+from .tip_factors import factors
 
 if TYPE_CHECKING:
-    from ..body import Body
-    from ..solution import Solution
+    from ..interfaces import CrackedBody, SolvedBody
+    from ..loads.supports import Support
 
 _log = logging.getLogger(__name__)
 
@@ -30,11 +31,9 @@ LIKE = 2.0
 NEAR_MIDDLE = 0.2
 
 
-def chord_errors(solution: Solution) -> np.ndarray:
+def chord_errors(solution: SolvedBody) -> np.ndarray:
     """(n_tips, 2) Pa √m: by how much K_I and K_II change when curved walls are followed more closely; zeros where there
     are none. Logs a warning where that cannot be told."""
-    from .sif_error_estimate import factors
-
     k = factors(solution)
     try:
         body, load = solution.body.rounder, solution.load
@@ -48,26 +47,14 @@ def chord_errors(solution: Solution) -> np.ndarray:
     return np.abs(factors(other) - k)
 
 
-def rounder(body: Body) -> Body | None:
-    """``body`` with every chord of a curved wall halved, on the curve, and the mouths on it moved there; None where all
-    walls are straight. Raises ValueError where a crack is too short to be followed."""
-    from ..body import Body
-
+def with_halved_chords(body: CrackedBody) -> tuple[list[np.ndarray], Cracks, list[Support]] | None:
+    """Loops, cracks and supports of ``body`` with every chord of a curved wall halved, on the curve, and the mouths on
+    it moved there; None where all walls are straight. Raises ValueError where a crack is too short to be followed."""
     if not any(sagittas(loop).any() for loop in body.loops):
         return None
     loops, cracks = followed(body.loops, body.cracks)
-    n_outlines = int(body.outlined)
     supports = [replace(one, on=tuple(map(tuple, at))) for one, at in zip(body.supports, _supported(body))]
-    return Body(
-        loops[:n_outlines],
-        cracks,
-        body.material,
-        body.settings,
-        holes=loops[n_outlines:],
-        supports=supports,
-        face_laws=body.face_laws,
-        half_plane=body.half_plane,
-    )
+    return loops, cracks, supports
 
 
 def sagittas(loop: np.ndarray) -> np.ndarray:
@@ -137,8 +124,8 @@ def _end_on_arc(cracks: Cracks, node: int, a: np.ndarray, b: np.ndarray, sagitta
     return mouth + step * way
 
 
-def _halved_load(body: Body, where, value) -> list[tuple]:
-    """The traction ``value`` of the side ``where`` of ``body`` on its `rounder`, which counts its sides anew."""
+def _halved_load(body: CrackedBody, where, value) -> list[tuple]:
+    """The traction ``value`` of the side ``where`` of ``body`` on its `Body.rounder`, which counts its sides anew."""
     if not isinstance(where, (int, np.integer)):
         return [(where, value)]
     parts = 1 + np.concatenate([sagittas(loop) != 0 for loop in body.loops])
@@ -149,5 +136,5 @@ def _halved_load(body: Body, where, value) -> list[tuple]:
     return [(first, np.array([value[0], middle])), (first + 1, np.array([middle, value[1]]))]
 
 
-def _supported(body: Body) -> np.ndarray:
+def _supported(body: CrackedBody) -> np.ndarray:
     return body.support_segments.tolist() if body.supports else []

@@ -16,10 +16,10 @@ from .. import adaptivity
 from ..mesh.elements import interior_angles, wedges
 from ..mesh.grading import Grading, ungraded
 from .chord_error import chord_errors
+from .tip_factors import factors, largest
 
 if TYPE_CHECKING:
-    from ..body import Body
-    from ..solution import Solution
+    from ..interfaces import CrackedBody, SolvedBody
 
 _log = logging.getLogger(__name__)
 
@@ -28,11 +28,9 @@ _log = logging.getLogger(__name__)
 SAFETY = 2.0
 #: An estimated error above this part of the largest K is told to the log.
 WORTH_A_WARNING = 0.01
-#: K below this part of the stress on closed cracks times the root of their length is no K.
-ROUND_OFF = 1e-11
 
 
-def tip_errors(solution: Solution) -> np.ndarray:
+def tip_errors(solution: SolvedBody) -> np.ndarray:
     """(n_tips, 2) estimated absolute error of K_I and K_II at every tip, Pa √m, for the price of another body, somewhat
     larger than the solution's own. Logs a warning when it exceeds 1 % of the largest K."""
     body = solution.body
@@ -47,25 +45,6 @@ def tip_errors(solution: Solution) -> np.ndarray:
     return errors
 
 
-def factors(solution: Solution) -> np.ndarray:
-    """(n_tips, 2) K_I and K_II, Pa √m."""
-    return np.stack([solution.tips["k_i"], solution.tips["k_ii"]], axis=1)
-
-
-def largest(k: np.ndarray) -> float:
-    """The largest √(K_I² + K_II²) of (n_tips, 2) factors: what errors are relative to."""
-    return float(np.hypot(*k.T).max(initial=0.0))
-
-
-def negligible(solution: Solution) -> float:
-    """Pa √m: K that is round-off of the stress on the cracks, where faces in contact let none of it reach the tips."""
-    return (
-        ROUND_OFF
-        * float(np.abs(solution.face_load).max(initial=0.0))
-        * float(np.sqrt(solution.body.faces.length.sum()))
-    )
-
-
 def warn(errors: np.ndarray, k: np.ndarray) -> None:
     """Log a warning when ``errors`` exceed 1 % of the largest of ``k``, both (n_tips, 2)."""
     if errors.max(initial=0.0) > WORTH_A_WARNING * largest(k):
@@ -77,7 +56,7 @@ def warn(errors: np.ndarray, k: np.ndarray) -> None:
         )
 
 
-def floor(body: Body) -> float:
+def floor(body: CrackedBody) -> float:
     """Relative error of K that grading leaves where it ends for round-off's sake (`grading.Grading.finest`), which a
     finer solution shares and cannot show. Only meshes made for a target error go that far."""
     grading = Grading.of(body.settings)
@@ -96,7 +75,7 @@ def floor(body: Body) -> float:
     return left
 
 
-def _left_at(body: Body, point: np.ndarray, part: float) -> float:
+def _left_at(body: CrackedBody, point: np.ndarray, part: float) -> float:
     """What an element of ``part`` of its side or segment that ends at ``point`` leaves, if that is a node of the
     geometry."""
     network, left = body.cracks, 0.0

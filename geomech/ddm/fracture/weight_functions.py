@@ -19,10 +19,9 @@ import numpy as np
 from ..crack_contact.face_laws import FaceStates
 
 if TYPE_CHECKING:
-    from ..body import Body
+    from ..interfaces import CrackedBody, SolvedBody
     from ..loads.body_loads import BodyLoad
     from ..loads.unit_load_cache import UnitLoad
-    from ..solution import Solution
 
 #: Functionals of so many unit loads are remembered.
 _KEPT = 400
@@ -38,7 +37,7 @@ class TipFunctionals:
     Where the crack unknowns are iterated on, so are these, by the transposed equations.
     """
 
-    def __init__(self, body: Body, solution: Solution | None = None):
+    def __init__(self, body: CrackedBody, solution: SolvedBody | None = None):
         self.body = body
         c, equations = body.faces, body.face_equations
         n_nodes = c.n * c.per

@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..loads.supports import Holds
+from ..system.contact_rows import Rows
 from ..system.influence_matrix import ElementSet, line_influence
-from ..system.schur_complement import Rows
 from .fast_multipole import Compressed
 from .gmres import Patches, gmres, scales
 

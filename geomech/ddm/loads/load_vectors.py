@@ -16,7 +16,7 @@ from .body_loads import BodyLoad, OutOfEquilibrium, resultants
 from .unit_load_cache import on_elements
 
 if TYPE_CHECKING:
-    from ..body import Body
+    from ..interfaces import CrackedBody
     from .hole_supports import Anchors
 
 #: Where a point load cannot be singular it is spread over this part of the extent of the body.
@@ -87,7 +87,7 @@ class Applied:
         return self.particular.displacement(points) + sum(p.displacement(points) for p in self.wedges)
 
 
-def apply(load: BodyLoad, body: Body) -> Applied:
+def apply(load: BodyLoad, body: CrackedBody) -> Applied:
     """What ``load`` is on ``body``. Raises ValueError naming what does not fit it."""
     none = np.empty((0, 2, 2))
     out = Applied(
@@ -128,7 +128,7 @@ def apply(load: BodyLoad, body: Body) -> Applied:
     return out
 
 
-def _particular(load: BodyLoad, body: Body) -> Particular | GrowingWithDepth:
+def _particular(load: BodyLoad, body: CrackedBody) -> Particular | GrowingWithDepth:
     force = np.zeros(2) if load.body_force is None else load.body_force
     gradient = np.zeros((2, 2)) if load.body_force_gradient is None else load.body_force_gradient
     uniform = np.zeros(3) if load.remote_stress is None else load.remote_stress
@@ -145,7 +145,7 @@ def _particular(load: BodyLoad, body: Body) -> Particular | GrowingWithDepth:
     return Particular(body.centroid, force, gradient, uniform, body.material)
 
 
-def _point(out: Applied, body: Body, k: int, point, force, segments: list, tractions: list) -> None:
+def _point(out: Applied, body: CrackedBody, k: int, point, force, segments: list, tractions: list) -> None:
     """Add point load ``k`` as what it is where it stands."""
     from ..mesh.point_location import inside
 
@@ -201,7 +201,7 @@ def _point(out: Applied, body: Body, k: int, point, force, segments: list, tract
         tractions.append(np.stack([force, force])[None] / width)
 
 
-def _kelvin(body: Body, point: np.ndarray, force: np.ndarray, core: float = 0.0) -> KelvinLoad:
+def _kelvin(body: CrackedBody, point: np.ndarray, force: np.ndarray, core: float = 0.0) -> KelvinLoad:
     if body.half_plane is None:
         return KelvinLoad(point, force, body.material, core=core)
     return MelanLoad(point, force, body.material, core=core, half_plane=body.half_plane)
@@ -216,7 +216,7 @@ def _meets(edges: np.ndarray, origin: np.ndarray, way: np.ndarray, own: set[int]
     return bool((across & (ahead.max(axis=1) > 1e-9 * extent)).any())
 
 
-def _left_over(wedge: WedgeLoad, body: Body) -> LineForces:
+def _left_over(wedge: WedgeLoad, body: CrackedBody) -> LineForces:
     """Minus the tractions of the ``wedge``'s field on the boundary, away from its own sides."""
     edges, parts = body.mesh.edges, []
     for edge in range(len(edges)):
@@ -235,7 +235,7 @@ def _left_over(wedge: WedgeLoad, body: Body) -> LineForces:
     return LineForces.join(parts)
 
 
-def check_equilibrium(applied: Applied, body: Body, tolerance: float) -> None:
+def check_equilibrium(applied: Applied, body: CrackedBody, tolerance: float) -> None:
     """Raise OutOfEquilibrium unless force and moment vanish within ``tolerance`` of the loads' size; with supports, as
     far as no support resists them."""
     force, gradient = applied.particular.force, applied.particular.gradient

@@ -10,7 +10,7 @@ import numpy as np
 from ..kernels.body_force_fields import Particular
 
 if TYPE_CHECKING:
-    from ..body import Body
+    from ..interfaces import CrackedBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Reactions:
     moment: np.ndarray
 
 
-def reactions(body: Body, density: np.ndarray, particular: Particular) -> Reactions:
+def reactions(body: CrackedBody, density: np.ndarray, particular: Particular) -> Reactions:
     """The reactions of ``body`` from their ``density`` (h_unknowns,) in local components."""
     n = len(body.supports)
     holds = body._outside.holds

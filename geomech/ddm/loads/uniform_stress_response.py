@@ -16,8 +16,7 @@ from ..crack_contact.face_laws import FaceStates, Released
 from .unit_load_cache import on_elements
 
 if TYPE_CHECKING:
-    from ..body import Body
-    from ..solution import Solution
+    from ..interfaces import CrackedBody, SolvedBody
 
 #: Responses for so many sets of closed faces are kept.
 KEPT = 4
@@ -27,7 +26,7 @@ class EvenResponse:
     """The jumps (n, 4), times 2μ, of ``body`` under unit stresses, last column without any, while the openings that are
     ``closed`` (n,) bool stay used up. Raises LinAlgError when cracks cut a part off and closed faces do not hold it."""
 
-    def __init__(self, body: Body, closed: np.ndarray) -> None:
+    def __init__(self, body: CrackedBody, closed: np.ndarray) -> None:
         c = body.faces
         right = np.column_stack([-on_elements(c, unit) for unit in np.eye(3)])
         per_stress, reaction = body.crack_system.constrained(right, closed, np.zeros_like(right))
@@ -55,7 +54,7 @@ class EvenSolution:
     frictional_work = filling_energy = 0.0
     given_way = 0.0, Released()
 
-    def __init__(self, body: Body, response: EvenResponse, stress: np.ndarray) -> None:
+    def __init__(self, body: CrackedBody, response: EvenResponse, stress: np.ndarray) -> None:
         self.body, self.closed, self._response = body, response.closed, response
         self._stress = np.array([*stress, 1.0])
 
@@ -121,14 +120,14 @@ class EvenSolution:
         return known[name]
 
 
-def scales(body: Body) -> bool:
+def scales(body: CrackedBody) -> bool:
     """Whether solutions of ``body`` under an even stress are scaled from those under unit ones while its faces keep
     their states: where these have no memory of their own, without holes, which bear an even stress otherwise, and with
     factors."""
     return body.outlined and len(body.loops) == 1 and not (body.rough or body.supports or body.compressed)
 
 
-def even_response(body: Body, closed: np.ndarray) -> EvenResponse:
+def even_response(body: CrackedBody, closed: np.ndarray) -> EvenResponse:
     """How the cracks of a ``body`` that `scales` answer to an even stress while these openings, (n_crack_unknowns,)
     bool, are ``closed``; kept with it."""
     key = np.packbits(closed).tobytes()
@@ -139,7 +138,7 @@ def even_response(body: Body, closed: np.ndarray) -> EvenResponse:
     return body.even[key]
 
 
-def scaled(body: Body, stress: np.ndarray, warm: Solution | EvenSolution | None = None) -> EvenSolution | None:
+def scaled(body: CrackedBody, stress: np.ndarray, warm: SolvedBody | EvenSolution | None = None) -> EvenSolution | None:
     """The solution of ``body`` under an even ``stress`` (3,), Pa, where its faces keep the states of ``warm``, an earlier
     solution of this geometry (None: all are open); None where they do not, or where that takes a solution to know."""
     if not scales(body) or not body.faces.n:

@@ -16,8 +16,8 @@ from ..system.influence_matrix import ElementSet, line_forces, project_jumps
 from ..system.row_store import KeptRows
 
 if TYPE_CHECKING:
+    from ..interfaces import LoadParts
     from .hole_supports import Anchors
-    from .load_vectors import Applied
 
 #: Loads on so many different segments are remembered.
 _REMEMBERED = 400
@@ -128,7 +128,7 @@ class UnitLoads:
             self._segments[key] = grown(old._segments[key], on_new)
         self._recent = keys
 
-    def of(self, applied: Applied) -> list[tuple[UnitLoad, np.ndarray]]:
+    def of(self, applied: LoadParts) -> list[tuple[UnitLoad, np.ndarray]]:
         """The unit loads of which what is ``applied`` is made, all but functions and point loads, and their sizes."""
         load, particular = applied.load, applied.particular
         units = self._unit_segments(applied.segments, applied.tractions)

@@ -19,7 +19,7 @@ from .dense_lu import Factor
 
 if TYPE_CHECKING:
     from .bordered_factor import BorderedFactor
-    from .schur_complement import Rows
+    from .contact_rows import Rows
 
 
 class InverseColumns(Protocol):

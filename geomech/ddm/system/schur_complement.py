@@ -7,7 +7,6 @@ and the equations of the free unknowns are factored instead.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from ..counters import Work
 from .bordered_factor import LOSS, SINGULAR, Bordered, BorderedFactor
 from .closed_face_factor import HeldFactor
+from .contact_rows import Rows
 from .dense_lu import Factor
 
 #: Reciprocal condition of S below which contact is not built on its inverse.
@@ -23,18 +23,6 @@ _SAFE = 1e-11
 WORTHWHILE, MOST_HELD = 400, 0.4
 #: Factors for so many sets of free unknowns are kept.
 _KEPT = 8
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """How contact changes the equations S w = right. Unknowns that are ``held`` (n,) bool are zero and have no
-    equation; ``mixed`` (n,) times the equation across a node is added to that along it, ``per`` places before;
-    ``spring`` (n,) is taken off the diagonal."""
-
-    held: np.ndarray
-    mixed: np.ndarray
-    spring: np.ndarray
-    per: int
 
 
 class CrackSystem:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..checks.check import Check
 from ..drawing import Drawing
-from ..errors import Check
 from ..tables import SceneTables
 
 #: Edges called "fixed" or "fixed:NAME" fix the blocks that have them, "guided:x" or "guided:x:NAME" let them move along

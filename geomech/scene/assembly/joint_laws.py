@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ...model import JointLaw, Roughness
-from ..errors import Check
+from ..checks.check import Check
 from ..tables.rock import JointTable
 
 #: Keys of a rough joint that mean nothing without its roughness.

@@ -26,8 +26,8 @@ from ...model import (
 )
 from ...model.loads.ground import Pond, lowest_over, ponds
 from ...shapes.block_cutting.rock_outline import ground_of
+from ..checks.check import Check
 from ..checks.cross_checks import carrier
-from ..errors import Check
 from ..tables import SceneTables
 from ..tables.loads import BaseTable, BoltTable, ForceTable, Timed, TractionTable
 

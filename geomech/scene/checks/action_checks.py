@@ -7,8 +7,8 @@ import numpy as np
 
 from ..assembly.fixed_blocks import fixed_blocks
 from ..assembly.load_functions import bolts_of, history_of
-from ..errors import Check
 from ..validation import nearest
+from .check import Check
 from .cross_checks import carrier
 
 

@@ -10,10 +10,10 @@ from ...model import CHANGES, Blocks
 from ...shapes import cutting_cracks
 from ..assembly.fixed_blocks import check_borne, check_holding, fixed_blocks
 from ..assembly.joint_laws import check_joints
-from ..errors import Check
 from ..locator import Path
 from ..tables import SceneTables
 from ..validation import nearest
+from .check import Check
 from .edges import check_edges
 
 #: No tip advances by less, in units of the rock's largest side: coordinates of a drawing keep twelve digits.

@@ -10,9 +10,9 @@ from ...shapes.gmsh_models.model_drawing import CRACK
 from ...shapes.parts import JOINT
 from ..assembly.fixed_blocks import fixed_blocks, holds
 from ..drawing import Drawing
-from ..errors import Check
 from ..locator import Path
 from ..validation import nearest
+from .check import Check
 
 
 def check_edges(c: Check) -> None:

@@ -11,9 +11,9 @@ from ...model.blocks.polygon import distance_to_edges
 from ...shapes.block_cutting.rock_outline import ground_of
 from ..assembly.fixed_blocks import fixed_blocks, held_unknowns
 from ..assembly.load_functions import traction_history
-from ..errors import Check
 from ..tables import SceneTables
 from ..tables.loads import TractionTable
+from .check import Check
 from .cross_checks import material_of
 
 #: A crack end that misses an outline by less than this share of its crack's length was probably meant to reach it.

@@ -7,10 +7,10 @@ import numpy as np
 from ...model import Blocks
 from ..assembly.fixed_blocks import fixed_blocks
 from ..assembly.load_functions import force_history, traction_history
-from ..errors import Check
 from ..tables import SceneTables
 from ..unbounded_rock import endless_zone
 from .action_checks import records_are_sound
+from .check import Check
 from .cross_checks import blocks_at, material_of
 
 

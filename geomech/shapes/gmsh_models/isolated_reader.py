@@ -14,7 +14,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from geomech import plain_data
 
 from ..traces.field_lines import FieldFile, FieldFileError
 from .model_drawing import GmshDrawing, GmshModelError
-from .session import GmshUnavailable, load_gmsh
+from .session import GmshUnavailable
 
 #: Processor time that reading one file may take, s: a hundred times that of a section with thousands of curves.
 SECONDS = 60
@@ -31,7 +30,7 @@ PATIENCE = 10
 #: Memory that it may take, bytes.
 BYTES = 4 << 30
 
-_ALLOWED = plain_data.Allowed(
+ALLOWED = plain_data.Allowed(
     classes=(
         "geomech.shapes.curves:Chords", "geomech.shapes.traces.field_lines:FieldFile", "geomech.shapes.traces.field_lines:FieldLine",
         "geomech.shapes.gmsh_models.model_drawing:GmshDrawing", "geomech.shapes.gmsh_models.model_drawing:Parameter",
@@ -39,11 +38,11 @@ _ALLOWED = plain_data.Allowed(
         "geomech.shapes.parts:Zone",
     )
 )  # fmt: skip
-_ERRORS = {"model": GmshModelError, "field": FieldFileError, "gmsh": GmshUnavailable}
+ERRORS = {"model": GmshModelError, "field": FieldFileError, "gmsh": GmshUnavailable}
 #: What the child runs; the job comes by its standard input.
 _CHILD = (
     "import json, sys; job = json.load(sys.stdin); sys.path[:] = job['path']; "
-    "from geomech.shapes.gmsh_models.isolated_reader import serve; serve(job)"
+    "from geomech.shapes.gmsh_models.reader_process import serve; serve(job)"
 )
 
 
@@ -73,13 +72,13 @@ def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Excep
         code, out = done.returncode, done.stdout
     if code == 0:
         try:
-            said, what = plain_data.read(io.BytesIO(out), _ALLOWED)
+            said, what = plain_data.read(io.BytesIO(out), ALLOWED)
         except plain_data.Broken:
             said, what = "failed", "its reader said nothing that makes sense"
         if said == "read":
             return what
-        if said in _ERRORS:
-            raise _ERRORS[said](*what)
+        if said in ERRORS:
+            raise ERRORS[said](*what)
         raise error(f"{path} cannot be read: {what}", "the file is damaged: export it again")
     if code in (-signal.SIGXCPU, -signal.SIGKILL):
         raise error(
@@ -89,40 +88,3 @@ def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Excep
         raise error(f"{path} cannot be read within {BYTES >> 30} GiB of memory", "export it again, with less in it")
     name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
     raise error(f"{path} cannot be read: it ends its reader ({name})", "the file is damaged: export it again")
-
-
-def serve(job: Mapping[str, Any]) -> None:
-    """In the child: read the file of ``job`` within its limits and write what came of it to the standard output."""
-    import resource
-
-    # What libraries print must not get into the answer.
-    out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    if job["kind"] == "model":
-        with suppress(GmshUnavailable):  # told when it is used; loaded here, where memory is no limit
-            load_gmsh()
-    seconds, memory = job["limits"]
-    for limit, value in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, memory), (resource.RLIMIT_CORE, 0)):
-        hard = resource.getrlimit(limit)[1]
-        resource.setrlimit(limit, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
-    with out:
-        plain_data.write(out, _answer(job), _ALLOWED)
-
-
-def _answer(job: Mapping[str, Any]) -> tuple[str, Any]:
-    from ..traces.trace_tables import read_field_file
-    from .model_files import read_here
-
-    read = {"model": read_here, "field": read_field_file}[job["kind"]]
-    try:
-        return "read", read(Path(job["file"]), **job["arguments"])
-    except GmshModelError as error:
-        return "model", (error.message, error.way_out, error.parameter)
-    except FieldFileError as error:
-        return "field", (error.message, error.way_out)
-    except GmshUnavailable as error:
-        return "gmsh", (str(error),)
-    except MemoryError:
-        raise
-    except Exception as error:  # noqa: BLE001 (whatever a damaged file leads readers to)
-        return "failed", f"{type(error).__name__}: {error}"

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .model_drawing import GmshModelError, Parameter
-from .opening import open_model
+from .session import open_model
 
 
 def open_with_parameters(gmsh, path: Path, wanted: Mapping[str, float | str]) -> dict[str, Parameter]:

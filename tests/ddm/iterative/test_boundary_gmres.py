@@ -5,7 +5,7 @@ import pytest
 
 from geomech import ddm
 from geomech.conventions import traction
-from geomech.ddm.iterative import boundary_gmres, gmres
+from geomech.ddm.iterative import boundary_gmres, crack_gmres
 from geomech.ddm.iterative.gmres import NotSolved
 from geomech.model import Cracks, DdmSettings, JointLaw, Material
 from geomech.reference.cracks.crack_arrays import cracks_in_cells
@@ -110,7 +110,7 @@ def test_what_the_iteration_does_not_solve_is_factored(few, monkeypatch):
     def stuck(*arguments, **options):
         raise NotSolved("stuck")
 
-    for module in (boundary_gmres, gmres):
+    for module in (boundary_gmres, crack_gmres):
         monkeypatch.setattr(module, "gmres", stuck)
     body = ddm.Body([OUTLINE], network(1), ROCK)
     assert body._outside.iterated

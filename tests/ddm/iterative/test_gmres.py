@@ -5,8 +5,9 @@ import pytest
 
 from geomech import ddm
 from geomech.conventions import traction
-from geomech.ddm.iterative import gmres as iterative
-from geomech.ddm.iterative.gmres import CROSSOVER, NotSolved, gmres
+from geomech.ddm.iterative import crack_gmres
+from geomech.ddm.iterative.crack_gmres import CROSSOVER
+from geomech.ddm.iterative.gmres import NotSolved, gmres
 from geomech.model import Cracks, DdmSettings, JointLaw, Material
 from geomech.reference.cracks.crack_arrays import cracks_in_cells
 
@@ -180,12 +181,12 @@ def test_what_the_iteration_does_not_solve_is_factored_after_all(monkeypatch):
     """Picked by the number of unknowns, as it stops at elements that are very unlike; asked for by name, it says so."""
     cracks, load = network(4), ddm.BodyLoad(remote_stress=np.array([0.0, 1e6, 3e5]))
     dense = ddm.Body(PLANE, cracks, ROCK).solve(load)
-    monkeypatch.setattr(iterative, "CROSSOVER", 1)
+    monkeypatch.setattr(crack_gmres, "CROSSOVER", 1)
 
     def stuck(*arguments, **options):
         raise NotSolved("stuck")
 
-    monkeypatch.setattr(iterative, "gmres", stuck)
+    monkeypatch.setattr(crack_gmres, "gmres", stuck)
     body = ddm.Body(PLANE, cracks, ROCK)
     assert body.compressed
     agree(dense, body.solve(load), 1e-13)

@@ -6,8 +6,8 @@ import pytest
 from geomech import ddm
 from geomech.ddm.system import schur_complement
 from geomech.ddm.system.closed_face_factor import HeldFactor
+from geomech.ddm.system.contact_rows import Rows
 from geomech.ddm.system.dense_lu import Factor
-from geomech.ddm.system.schur_complement import Rows
 from geomech.model import Cracks, JointLaw, Material
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21, k_ic=1e6)
