@@ -216,12 +216,8 @@ def test_top_level_is_as_agreed():
         pytest.skip("not a git checkout")
     files = [Path(line) for line in listed.stdout.splitlines()]
     allowed = {"pyproject.toml", "README.md", "LICENSE", ".gitignore", ".ci"}
-<<<<<<< 9ca75dae43cd71c8cb8c33bf5f8a7168309278ed
-    allowed |= {"geomech", "geometry", "pipelines", "tests", "outputs", "docs"}
-=======
     allowed |= {"docs", "CHANGELOG.md", "CONTRIBUTING.md", "CITATION.cff"}
     allowed |= {"geomech", "geometry", "pipelines", "tests", "outputs"}
->>>>>>> c250ab7a352deb886c439e1d81b8684e5429ee34
     assert {f.parts[0] for f in files} <= allowed
     assert not [f for f in files if f.parts[0] == "geometry" and f.suffix == ".py"], "geometry holds data, no Python"
 

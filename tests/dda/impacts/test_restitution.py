@@ -13,7 +13,7 @@ import pytest
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
-from geomech.reference import impact as exact
+from geomech.reference.blocks import impact as exact
 
 GRAVITY, DENSITY = 9.81, 2600.0
 ROCK = Material("rock", 5e9, 0.25, density=DENSITY)
