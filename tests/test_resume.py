@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_scenes import PLATE
 
 from geomech import cli
-from geomech.bench.cost.coupling_cost import wall
+from geomech.bench.cost.block_scenes import wall
 from geomech.model import RunSettings
 from geomech.output import (
     Checkpoints,
@@ -47,36 +48,13 @@ k_ic_pa_sqrt_m = 1e6
 """
 #: A plate that is pulled until its crack has cut it in two, and whose parts then part.
 SPLIT = (
-    """
-title = "A plate that is torn"
-[geometry]
-zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
-cracks = [{ name = "flaw", points = [[-0.005, 0.0], [0.005, 0.002]] }]
-edges = [
-    { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
-    { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
-]
-"""
-    + ROCK
+    'title = "A plate that is torn"\n'
+    + PLATE
     + """
-[[loads.tractions]]
-edge = "load:top"
-rate_pa_per_s = [0.0, 0.05e6]
-[[loads.tractions]]
-edge = "load:bottom"
-rate_pa_per_s = [0.0, -0.05e6]
-[dda]
-time_step_s = 10.0
-max_displacement_ratio = 1.0
 [ddm]
 elements_per_crack = 2
 elements_per_side = 2
 grading_layers = 1
-[growth]
-increment_m = 6e-3
-[run]
-end_time_s = 400.0
-stop_at = ["split"]
 [output]
 interior_every = 5
 """
