@@ -18,7 +18,7 @@ import pytest
 from small_scenes import PLATE
 
 from geomech import cli
-from geomech.bench.cost.block_scenes import wall
+from geomech.bench.cost.block_scenes import cracked_wall
 from geomech.model import RunSettings
 from geomech.output import (
     Checkpoints,
@@ -285,7 +285,7 @@ def test_two_cracks_broken_off_at_every_tenth(how, tmp_path):
 def test_a_problem_made_in_python_is_resumed_as_well(tmp_path):
     """A wall of 300 bricks, five of them cracked, without a scene: the blocks' kept factors, and no file to read it
     from."""
-    problem = replace(wall(300, 5), run=RunSettings(end_time=0.2))
+    problem = replace(cracked_wall(300, 5), run=RunSettings(end_time=0.2))
 
     def observers(*more) -> list:
         return [RunLog(), Histories(), JointHistories(), Series(), Checkpoints(every=4), Summary(), *more]
