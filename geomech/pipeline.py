@@ -119,7 +119,8 @@ class CoupledRun:
         self.stopping = [] if stored is None else [kind for kind in stored["stopping"] if kind in self.stops_at]
         self.ended = stored is not None and stored["ended"] and bool(self.stopping)
         self.spent = 0.0 if stored is None else stored["wall_s"]
-        #: Whether the last checkpoint is what a run that is to stop or end later goes on from: from before its last pass, in
+        #: Whether the last checkpoint is what a run that is to stop or end later goes on from: from before its last
+        #: pass, in
         #: which no crack may grow, or before the step that its end cuts.
         self.before_the_last = False
 

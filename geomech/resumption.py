@@ -42,9 +42,11 @@ def resume(
     on the same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint
     are dropped.
 
-    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on: from before the step that its
+    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on: from before the step
+    that its
     first end has cut, as a run that was as long from the beginning). A run without a checkpoint so far begins again.
-    ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told when the run begins again. Raises `Finished` when
+    ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told
+    when the run begins again. Raises `Finished` when
     there is nothing left to do, `NotResumable` when the run cannot be gone on with, `geomech.output.run_lock.FolderInUse`
     while another process is at work in the folder, SceneError on bad input.
     """

@@ -420,7 +420,7 @@ def test_a_changed_file_that_the_model_includes_is_refused(write, tmp_path):
         "Rectangle(1) = {0, -1, 0, width, 1};\nRectangle(2) = {1, 0, 0, 1, height};\nCoherence;\n"
         'Physical Surface("slope") = {1};\nPhysical Surface("block") = {2};\n'
     )
-    head, rest = SLIDING.split("[materials.rock]")
+    rest = SLIDING.split("[materials.rock]")[1]
     text = 'title = "included"\n[geometry]\nmodel = "ground.geo"\n[materials.rock]' + rest
     out = tmp_path / "out"
     broken_off(load_scene(write(text)), out, 2)

@@ -48,7 +48,8 @@ class StepEnergy(NamedTuple):
     carried          lost because only a part of the velocity is carried over (dynamic factor below 1)
     overlap          brought in by contacts that close where blocks already overlap
     residual         of the balance within the step: round-off
-    impact           lost in impacts with a coefficient of restitution, across the contact (`impacts`); their friction is in
+    impact           lost in impacts with a coefficient of restitution, across the contact (`impacts`); their friction
+                     is in
                      ``friction``
     """
 

@@ -54,7 +54,8 @@ def run(
     watch: Callable[[StepResult], None] | None = None,
 ) -> Iterator[State]:
     """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
-    long. ``watch`` sees every `StepResult`. The arrays of states are those that the run goes on with: they can be read and
+    long. ``watch`` sees every `StepResult`. The arrays of states are those that the run goes on with: they can be read
+    and
     kept, and not written to (`State.writable` has copies).
 
     ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``

@@ -13,7 +13,6 @@ from ..model import Cracks
 from ..model.blocks.polygon import signed_area
 from .gmsh_models.session import gmsh_session
 
-
 log = logging.getLogger(__name__)
 
 #: Triangles with a smaller angle than this are told of, rad. Gmsh keeps 20° where nothing is narrow.
@@ -34,7 +33,8 @@ class InteriorMesh:
     side: np.ndarray
 
     def flattest(self) -> tuple[float, np.ndarray]:
-        """(rad, (2,) m) the least angle of any triangle, and where. Between cracks that nearly touch it is as small as their
+        """(rad, (2,) m) the least angle of any triangle, and where. Between cracks that nearly touch it is as small as
+        their
         distance beside the triangles' sides, which follow the cracks (`mesh_interior`)."""
         corner = self.points[self.triangles]
         least, at = np.inf, 0
@@ -59,9 +59,12 @@ def mesh_interior(
     ``size`` is the length of a triangle's side away from cracks (default: two to four thousand triangles in all),
     ``tip_size`` that at crack tips (default a tenth of it), both in m; along cracks sides are half of ``size``, and all
     grow back to it by ``slope`` times the distance (a half: over two of its lengths). Nodes on cracks are
-    doubled, at junctions once a sector, at mouths too; tips stay single. Between cracks, or a crack and the outline, that come
-    nearer to each other than sides are long triangles are as flat as that; flatter ones than 1° are told to the log with their
-    place: fields are shown at nodes and lose nothing, but another program's finite elements would. Raises ValueError for sizes that are not
+    doubled, at junctions once a sector, at mouths too; tips stay single. Between cracks, or a crack and the outline,
+    that come
+    nearer to each other than sides are long triangles are as flat as that; flatter ones than 1° are told to the log
+    with their
+    place: fields are shown at nodes and lose nothing, but another program's finite elements would. Raises ValueError
+    for sizes that are not
     positive, RuntimeError where Gmsh cannot mesh the block.
     """
     loops = [np.asarray(loop, dtype=float) for loop in loops]
@@ -78,7 +81,8 @@ def mesh_interior(
     angle, (x, y) = mesh.flattest()
     if angle < SLIVER:
         log.info(
-            "the interior mesh has triangles of %.2g degrees, where cracks or the outline nearly touch, at (%.6g, %.6g) m",
+            "the interior mesh has triangles of %.2g degrees, where cracks or the outline nearly touch, at (%.6g, %.6g) "
+            "m",
             math.degrees(angle), x, y,
         )  # fmt: skip
     return mesh

@@ -1,4 +1,5 @@
-"""The energy balance of runs in stages: what is dug out takes what it stores, what is bolted does its work, nothing else."""
+"""The energy balance of runs in stages: what is dug out takes what it stores, what is bolted does its work, nothing
+else."""
 
 from __future__ import annotations
 

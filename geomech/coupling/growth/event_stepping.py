@@ -182,7 +182,8 @@ class EventSteps:
         return self._pace is None or self._pace * way > NEAR
 
     def may_pass(self, now: CrackedBlocks, end: float) -> bool:
-        """Whether the next first pass would go beyond the time ``end`` s but for it, as far as can be said before: no tip is
+        """Whether the next first pass would go beyond the time ``end`` s but for it, as far as can be said before: no
+        tip is
         expected to be driven before."""
         start = now.state.time
         if self._limit(now, start, math.inf) <= end:

@@ -14,7 +14,8 @@ UNPAID = 0.25
 
 
 class BudgetWatch:
-    """Logs a warning when more than `GAIN` of all energy turned over is left over, blocks and cracks together, and again
+    """Logs a warning when more than `GAIN` of all energy turned over is left over, blocks and cracks together, and
+    again
     whenever that has doubled since."""
 
     def __init__(self) -> None:

@@ -1,4 +1,5 @@
-"""Impulses of rigid blocks that strike each other: Newton's restitution across the contact, Coulomb's friction along it.
+"""Impulses of rigid blocks that strike each other: Newton's restitution across the contact, Coulomb's friction along
+it.
 
 Contact i has the relative velocity uᵢ of its vertex against its edge, across it (n, positive apart) and along it (t).
 Impulses p change u = u₀ + W p, W = J M⁻¹ Jᵀ of the blocks' rigid motion, so that
@@ -6,8 +7,8 @@ Impulses p change u = u₀ + W p, W = J M⁻¹ Jᵀ of the blocks' rigid motion,
     uₙ ≥ gₙ,   pₙ ≥ 0,   pₙ (uₙ − gₙ) = 0          gₙ = −e uₙ(before) where blocks strike
     |pₜ| ≤ μ pₙ,   pₜ against uₜ − gₜ where it reaches that
 
-(Moreau 1988, *Unilateral contact and dry friction in finite freedom dynamics*). Solved by Gauss and Seidel's sweeps over
-the contacts, each projected on its cone (Jourdan, Alart & Jean 1998, non-smooth contact dynamics).
+(Moreau 1988, *Unilateral contact and dry friction in finite freedom dynamics*). Solved by Gauss and Seidel's sweeps
+over the contacts, each projected on its cone (Jourdan, Alart & Jean 1998, non-smooth contact dynamics).
 """
 
 from __future__ import annotations

@@ -1,21 +1,21 @@
 """Impacts of blocks whose joint law names a coefficient of restitution e: v′ = −e v across the contact.
 
-An implicit step holds blocks apart by forces over all of its length. Where one begins to touch within it, how much of its
-speed is left depends on the part of the step in which it does: Shi's scheme leaves between nothing and all of it. With a
-coefficient of restitution the impact is an impulse at its moment instead:
+An implicit step holds blocks apart by forces over all of its length. Where one begins to touch within it, how much of
+its speed is left depends on the part of the step in which it does: Shi's scheme leaves between nothing and all of it.
+With a coefficient of restitution the impact is an impulse at its moment instead:
 
-1. The step is solved as if blocks that come together at a speed did not touch. Their gap closes at the time t* where the
-   cubic of its values and rates at both ends does.
-2. On the geometry of t*, impulses (`ImpulseProblem`) change the velocity across it by −(1 + e) u(t*), with Coulomb's friction along it. Contacts
-   that are closed pass them on, and do not let blocks come nearer for them.
+1. The step is solved as if blocks that come together at a speed did not touch. Their gap closes at the time t* where
+   the cubic of its values and rates at both ends does.
+2. On the geometry of t*, impulses (`ImpulseProblem`) change the velocity across it by −(1 + e) u(t*), with Coulomb's
+   friction along it. Contacts that are closed pass them on, and do not let blocks come nearer for them.
 3. Blocks move on with the change of velocity for the rest of the step, dt − t*: no time is lost, and the forces of the
    step have done their work on the way without the impact, which does its own.
 4. What has come back by the end of the step, or is met by what others have made of it, ends it touching and at rest.
 
-So neither the rebound nor its time depends on the step. Energy is never gained: e is lowered for this step where friction
-and an eccentric impact would (Newton's law allows it, Kane & Levinson 1985). A closing that is slower than what gravity
-makes in a step is none of this: there blocks come to rest as without restitution. No impact strains its blocks: Newton's law
-knows of speeds alone.
+So neither the rebound nor its time depends on the step. Energy is never gained: e is lowered for this step where
+friction and an eccentric impact would (Newton's law allows it, Kane & Levinson 1985). A closing that is slower than
+what gravity makes in a step is none of this: there blocks come to rest as without restitution. No impact strains its
+blocks: Newton's law knows of speeds alone.
 """
 
 from __future__ import annotations
@@ -55,8 +55,10 @@ class RigidBlocks:
 
 
 class Rebound(NamedTuple):
-    """What impacts have done: rigid ``velocity`` (n_blocks, 3) after them, by what blocks have ``moved`` (n_blocks, 3) m and
-    rad beside the step's displacement, and the energies (J/m) that restitution (``lost``) and friction (``rubbed``) have
+    """What impacts have done: rigid ``velocity`` (n_blocks, 3) after them, by what blocks have ``moved`` (n_blocks, 3)
+    m and
+    rad beside the step's displacement, and the energies (J/m) that restitution (``lost``) and friction (``rubbed``)
+    have
     taken."""
 
     velocity: np.ndarray
@@ -100,7 +102,8 @@ class Striking:
     def rebound(
         self, found: ContactSet, settled: Settled, struck: np.ndarray, gap: np.ndarray, blocks: RigidBlocks, dt: float
     ) -> Rebound:
-        """What comes of the contacts ``struck`` (n,), whose ``gap`` (n,) m at the end of a step of ``dt`` is below 0."""
+        """What comes of the contacts ``struck`` (n,), whose ``gap`` (n,) m at the end of a step of ``dt`` is below
+        0."""
         rows, problem = _of_closed(found, settled, struck, blocks)
         hit, bouncing = struck[rows], np.nan_to_num(self.restitution[rows])
         rates = self.speed[rows, 0], problem.speeds(blocks.velocity)[:, 0]
@@ -154,7 +157,8 @@ class Striking:
 def _of_closed(
     found: ContactSet, settled: Settled, struck: np.ndarray, blocks: RigidBlocks
 ) -> tuple[np.ndarray, ImpulseProblem]:
-    """The contacts that are closed or ``struck`` (n,), and the problem of their impulses but for what it asks of them."""
+    """The contacts that are closed or ``struck`` (n,), and the problem of their impulses but for what it asks of
+    them."""
     rows = np.flatnonzero((settled.state != OPEN) | struck)
     friction = np.where(struck, found.springs.friction, settled.springs.friction)[rows]
     nothing, both = np.zeros(len(rows)), (found.block[rows], found.other[rows])
@@ -178,14 +182,16 @@ def _turned_back(problem: ImpulseProblem, blocks: RigidBlocks, part: np.ndarray)
 
 
 def _works(impulse: np.ndarray, before: np.ndarray, change: np.ndarray) -> tuple[float, float]:
-    """J/m that ``impulse`` (n, 2) across contacts and along them takes, where relative velocities were ``before`` (n, 2)
+    """J/m that ``impulse`` (n, 2) across contacts and along them takes, where relative velocities were ``before`` (n,
+    2)
     and had this ``change`` (n, 2): −p (u + u′)/2 (Thomson & Tait 1867, § 308)."""
     across, along = (-impulse * (before + 0.5 * change)).sum(axis=0).tolist()
     return across, along
 
 
 def touching_time(gap: np.ndarray, left: np.ndarray, begun: np.ndarray, ended: np.ndarray, dt: float) -> np.ndarray:
-    """(n,) s at which a ``gap`` (n,) m closes that is ``left`` m < 0 after ``dt``, with the rates ``begun`` and ``ended``
+    """(n,) s at which a ``gap`` (n,) m closes that is ``left`` m < 0 after ``dt``, with the rates ``begun`` and
+    ``ended``
     m/s: a root of the cubic of these, by halving."""
     low, high = np.zeros(len(gap)), np.ones(len(gap))
     for _ in range(_HALVINGS):
@@ -204,7 +210,8 @@ def _without_gain(
     least: np.ndarray,
     most: np.ndarray,
 ) -> float:
-    """The largest part s of the way from impulses ``dull`` to those ``bounced`` (n, 2) that gains no energy; they lead to
+    """The largest part s of the way from impulses ``dull`` to those ``bounced`` (n, 2) that gains no energy; they lead
+    to
     velocities ``least`` and ``most`` (n_blocks, 3), where relative ones were ``before`` (n, 2) them."""
     start = problem.speeds(least - problem.velocity)
     way = problem.speeds(most - least)

@@ -142,7 +142,8 @@ def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: floa
 
 
 def _corners_beside(cracks: Cracks, loops: list[np.ndarray], settings: DdmSettings, grading: Grading):
-    """Re-entrant corners of the outline that cracks come near to, and the layers that each takes: (point (2,), layers)."""
+    """Re-entrant corners of the outline that cracks come near to, and the layers that each takes: (point (2,),
+    layers)."""
     if grading.target is not None or not cracks.n_segments:
         return []
     found = []

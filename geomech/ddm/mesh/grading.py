@@ -31,9 +31,9 @@ FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
 #: to 45°, 1 to 0.01 of their crack), and ungraded ones leave this error of K, in proportion to the turn up to that
 #: beside it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
-#: Re-entrant corners of the outline that a crack comes nearer to than so many of the outline's elements get as many layers as
-#: leave this error of K there, unless none are wanted: three, which serve elsewhere, left 1.5e-2 beside a right-angled one
-#: (`tests/ddm/mesh/test_corner_beside_crack.py`).
+#: Re-entrant corners of the outline that a crack comes nearer to than so many of the outline's elements get as many
+#: layers as leave this error of K there, unless none are wanted: three, which serve elsewhere, left 1.5e-2 beside a
+#: right-angled one (`tests/ddm/mesh/test_corner_beside_crack.py`).
 BESIDE, CORNER_ERROR = 3.0, 2e-3
 #: Layers that any node gets; the smallest element stays above `Grading.finest` anyhow.
 MOST_LAYERS = 16

@@ -14,7 +14,6 @@ from geomech.shapes.meshing import SLIVER, mesh_interior
 
 from ..vtk.triangulate import Triangles
 
-
 log = logging.getLogger(__name__)
 
 
@@ -96,8 +95,8 @@ def _fine(problem: Problem, size: float) -> tuple[np.ndarray, np.ndarray, np.nda
         angle, (x, y) = mesh.flattest()
         if angle < SLIVER:
             log.warning(
-                "block %d: triangles of %.2g degrees where cracks or its outline nearly touch, at (%.6g, %.6g) m: finite elements "
-                "want such cracks to be joined or moved apart",
+                "block %d: triangles of %.2g degrees where cracks or its outline nearly touch, at (%.6g, %.6g) m: finite "
+                "elements want such cracks to be joined or moved apart",
                 block, math.degrees(angle), x, y,
             )  # fmt: skip
         points.append(mesh.points)

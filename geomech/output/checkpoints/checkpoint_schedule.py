@@ -93,7 +93,8 @@ class Checkpoints:
 
 
 def digests(scene: Mapping[str, Any]) -> dict[str, str]:
-    """file → SHA-256 of what stands in every file that the resolved ``scene`` names, and in those that its models read."""
+    """file → SHA-256 of what stands in every file that the resolved ``scene`` names, and in those that its models
+    read."""
     names = set(_files(scene))
     for name in tuple(names):
         if Path(name).suffix.lower() in MODELS:

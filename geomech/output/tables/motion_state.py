@@ -70,7 +70,8 @@ def energy_summary(cycle: Cycle) -> dict[str, float]:
     names = (
         "kinetic_energy", "elastic_energy", "contact_energy", "gravity_work", "load_work", "crack_work",
         "friction_loss",
-        "damping_loss", "bond_loss", "impact_loss", "scheme_loss", "carried_loss", "overlap_energy", "split_energy", "energy_residual",
+        "damping_loss", "bond_loss", "impact_loss", "scheme_loss", "carried_loss", "overlap_energy",
+        "split_energy", "energy_residual",
         "growth_release",
         "uneven_work", "set_free_energy", "crack_elastic", "crack_friction", "crack_bond_loss", "fracture_energy",
         "runaway_loss", "parting_energy", "toughness_energy", "crack_residual", "budget_residual",

@@ -119,8 +119,8 @@ class JointTable(Table):
     )
     restitution: Annotated[float, Field(ge=0, le=1)] | None = Field(
         None,
-        description="coefficient of restitution of blocks that strike each other, 0 (they stay together) to 1 (elastic), at "
-        "any time step; for rockfall (unset: what springs and time scheme leave, 0.5 to 0.75 of the energy)",
+        description="coefficient of restitution of blocks that strike each other, 0 (they stay together) to 1 (elastic), "
+        "at any time step; for rockfall (unset: what springs and time scheme leave, 0.5 to 0.75 of the energy)",
     )
     edges: Names = Field(
         (),

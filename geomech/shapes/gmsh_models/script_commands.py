@@ -86,7 +86,8 @@ def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
 
 
 def files_read(path: Path) -> list[Path]:
-    """The model ``path`` and all files that Gmsh reads with it, as far as their names are written out: what it includes and
+    """The model ``path`` and all files that Gmsh reads with it, as far as their names are written out: what it
+    includes and
     merges, lists of numbers, options beside it, and what these read. Nothing is refused."""
     seen: dict[Path, Path] = {}
     waiting = [path]

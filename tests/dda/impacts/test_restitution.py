@@ -1,7 +1,7 @@
 """Impacts with a coefficient of restitution against closed forms of rigid bodies, whatever the step.
 
-Motion in a straight line agrees to the round-off of the sweeps that impulses are found by (1e-9); where a block turns, gaps
-do not close in a parabola, and agree to the square of its turn in a step.
+Motion in a straight line agrees to the round-off of the sweeps that impulses are found by (1e-9); where a block turns,
+gaps do not close in a parabola, and agree to the square of its turn in a step.
 """
 
 from __future__ import annotations
@@ -130,8 +130,8 @@ def test_an_oblique_impact_is_coulombs(friction, dt):
     """μ = 0.2: it slides on; 0.5: friction stops it. A flat block, so low that it is not turned over."""
     across, along = -3.0, 2.0
     seen = Fall(
-        [rectangle(-5, -1, 9, 0), rectangle(0, 0.05, 2, 0.55)], dt, 0.04, restitution=0.4, friction=friction, gravity=0.0,
-        velocity={1: (along, across)},
+        [rectangle(-5, -1, 9, 0), rectangle(0, 0.05, 2, 0.55)], dt, 0.04, restitution=0.4, friction=friction,
+        gravity=0.0, velocity={1: (along, across)},
     )  # fmt: skip
     after = exact.oblique(across, along, 0.4, friction)
     assert seen.velocity[-1, 1, 1] == pytest.approx(after[0], rel=1e-6)
@@ -221,7 +221,8 @@ def test_the_energy_of_a_fall_is_accounted_for():
 
 
 def test_friction_never_makes_restitution_a_gain():
-    """A rod at 60° (Kane & Levinson 1985): its blow would turn its tip backwards, friction holds that, and so pushes the way
+    """A rod at 60° (Kane & Levinson 1985): its blow would turn its tip backwards, friction holds that, and so pushes
+    the way
     the tip was going: with e = 1 Newton's law would add 8 % to the energy. Restitution gives way, to what keeps it."""
     rod = turned(rectangle(-1.0, -0.05, 1.0, 0.05), np.radians(60.0))
     rod = rod + [0.0, 0.003 - rod[:, 1].min()]

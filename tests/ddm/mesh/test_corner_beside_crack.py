@@ -1,4 +1,5 @@
-"""Cracks beside a re-entrant corner of the outline: what the default mesh leaves of K, against meshes made for an error."""
+"""Cracks beside a re-entrant corner of the outline: what the default mesh leaves of K, against meshes made for an
+error."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ def body(off: float, length: float, angle_deg: float, **settings) -> ddm.Body:
     angle = np.radians(angle_deg)
     away, along = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     middle = np.array([5.0, 5.0]) + off * away
-    crack = Cracks.from_polylines([np.array([middle - 0.5 * length * along, middle + 0.5 * length * along])], aperture=np.inf)
+    crack = Cracks.from_polylines(
+        [np.array([middle - 0.5 * length * along, middle + 0.5 * length * along])], aperture=np.inf
+    )
     return ddm.Body([L_SHAPE], crack, ROCK, DdmSettings(**settings))
 
 
@@ -32,7 +35,8 @@ def pulled() -> ddm.BodyLoad:
     [(0.05, 0.5, 225), (0.5, 0.5, 180), (0.3, 1.0, 180), (1.0, 1.0, 225), (0.3, 0.3, 270)],
 )
 def test_k_beside_a_re_entrant_corner(off, length, angle_deg):
-    """Three layers at the corner left up to 1.5 %, as `grading.ungraded` says; as many as two thousandths ask for leave that.
+    """Three layers at the corner left up to 1.5 %, as `grading.ungraded` says; as many as two thousandths ask for
+    leave that.
     (2.6e-3: the constant is the worst measured within 30 %, the reference itself is good to 1e-4.)"""
     exact = body(off, length, angle_deg, target_error=1e-4).solve(pulled()).tips
     found = body(off, length, angle_deg).solve(pulled()).tips
@@ -44,7 +48,11 @@ def test_k_beside_a_re_entrant_corner(off, length, angle_deg):
 def test_corners_far_from_cracks_stay_as_they_are():
     """Three layers there, as before; six beside a crack; one where settings want none elsewhere."""
     crack = Cracks.from_polylines([np.array([[0.5, 8.5], [1.5, 9.0]])], aperture=np.inf)
-    far, near, plain = ddm.Body([L_SHAPE], crack, ROCK, DdmSettings()), body(1.0, 1.0, 225), body(1.0, 1.0, 225, grading_layers=0)
+    far, near, plain = (
+        ddm.Body([L_SHAPE], crack, ROCK, DdmSettings()),
+        body(1.0, 1.0, 225),
+        body(1.0, 1.0, 225, grading_layers=0),
+    )
 
     def layers(of: ddm.Body) -> int:
         """Elements shrink by 0.3 towards the corner, the last two are alike."""
