@@ -379,7 +379,9 @@ def _take_onward(touching: np.ndarray, pieces: np.ndarray, wanted: np.ndarray, c
             way = 0.0
             for last, b in zip(numbers[k:], numbers[k + 1 :]):
                 way += length[last] if last != a else 0.0
-                if way > wanted[a] or b == a or abs(math.remainder(heading[b] - heading[a], 2 * math.pi)) > ONWARD:
+                # Increments of growth are not digitised.
+                turns = abs(math.remainder(heading[b] - heading[a], 2 * math.pi)) > ONWARD
+                if wanted[b] == 0 or way > wanted[a] or b == a or turns:
                     break
                 touching[a, b] = touching[b, a] = True
 
