@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -362,7 +363,7 @@ def _wanted(loops: list[np.ndarray], cracks: Cracks, settings: DdmSettings) -> n
 def _chains(loops: list[np.ndarray], cracks: Cracks) -> list[np.ndarray]:
     """Numbers of pieces (edges, then segments) that follow one another: of every loop, going round, and of every crack."""
     first = np.cumsum([0] + [len(loop) for loop in loops]).tolist()
-    chains = [np.r_[a:b, a:b] for a, b in zip(first[:-1], first[1:])]
+    chains = [np.r_[a:b, a:b] for a, b in pairwise(first)]
     if cracks.n_segments:
         goes_on = (cracks.segments[1:, 0] == cracks.segments[:-1, 1]) & (cracks.crack[1:] == cracks.crack[:-1])
         chains += np.split(first[-1] + np.arange(cracks.n_segments), np.flatnonzero(~goes_on) + 1)
