@@ -21,7 +21,8 @@ from .moments import block_moments, mass_matrix
 from .running import run
 from .step import CrackResponse, NotConverged, StepResult, contact_resultants
 from .step_length import StepLength
-from .strength_reduction import FactorOfSafety, NothingToReduce, factor_of_safety
+from .safety_answer import FactorOfSafety
+from .strength_reduction import NothingToReduce, factor_of_safety
 from .system import BlockSystem
 from .time_integration import TimeScheme
 from .told_contacts import ToldContacts

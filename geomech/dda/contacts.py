@@ -21,6 +21,7 @@ from .glued_corners import held_by_glue
 from .near_pairs import NearPairs
 from .nodes_in_faces import nodes_in_faces
 from .toes import SHARP, ToeCorners, stand_off
+from .whole_faces import WholeFaces
 from .work import Work
 
 #: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
@@ -97,6 +98,8 @@ class ContactFinder:
         self.rounding = np.minimum(self._rounding, self._longest)
         #: Whether toes hold: `SHARP`, `ROUNDED` or `FREE` (`toes`).
         self.toes = SHARP
+        #: Whether faces keep all their cohesion for as long as they touch anywhere (`whole_faces`).
+        self.whole_faces = False
         self._corners = ToeCorners(
             self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
         )
@@ -220,6 +223,10 @@ class ContactFinder:
             released=eased,
             **remembered,
         )
+        if self.whole_faces:
+            cohesion = np.where(bonded > 0, self._table.cohesion[law], 0.0)
+            whole = WholeFaces.of(block, other, found.geometry, law, cohesion)
+            found = replace(found, whole=whole).sharing_cohesion(found.state, bonded)
         if lumped or not (self._stiff.any() or found.inset.any()):
             return found
         inside = found.inset & (bonded == 1)

@@ -14,7 +14,7 @@ import numpy as np
 from ..dda.design_strength import PartialFactors
 from ..dda.displacement_limit import MOVED
 from ..dda.mobilised import MobilisedJoint, mobilised_joints
-from ..dda.strength_reduction import FactorOfSafety
+from ..dda.safety_answer import FactorOfSafety
 from ..model import OPEN, SLIP, Problem, counted
 
 #: A block slides when it turns by less than the first of these (rad) as it goes its own size √area, topples when it
