@@ -37,7 +37,8 @@ class FactorOfSafety:
 
     ``toes`` bar the way of what moves. Where they are rounded and hold nothing, ``other_factor`` is what it would be
     were their tips sharp; where they hold (``toes_hold``), what it is without them; None where it is not known.
-    ``factor_if_parted``: what it is if faces lose the cohesion of an end that opens, where that is another. ``warnings``
+    ``factor_if_parted``: what it is if faces lose the cohesion of an end that opens, where that is another;
+    ``factor_if_rigid``: what it is of rigid blocks, where faces of elastic ones hold nothing for being open by a hair. ``warnings``
     in words."""
 
     factor: float
@@ -53,6 +54,7 @@ class FactorOfSafety:
     toes_hold: bool = False
     other_factor: float | None = None
     factor_if_parted: float | None = None
+    factor_if_rigid: float | None = None
     warnings: tuple[str, ...] = ()
 
     @property
@@ -105,6 +107,7 @@ class FactorOfSafety:
             "toes_hold": self.toes_hold,
             "factor_without_toes" if self.toes_hold else "factor_with_sharp_toes": self.other_factor,
             "factor_if_parted_faces_lose_cohesion": self.factor_if_parted,
+            "factor_of_rigid_blocks": self.factor_if_rigid,
             "warnings": list(self.warnings),
             "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],
         }

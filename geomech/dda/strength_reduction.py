@@ -27,7 +27,9 @@ from .stability_trial import Trial, TrialLoads, stability_trial
 from .step import NotConverged
 from .system import BlockSystem
 from .toes import FREE, ROUNDED, SHARP
-from .what_holds import bearing_toes, parted_faces, toes_in_the_way, with_anchors, with_parted_faces, with_toes
+from .what_holds import (
+    bearing_toes, hairline_faces, parted_faces, toes_in_the_way, with_anchors, with_hairlines, with_parted_faces, with_toes,
+)  # fmt: skip
 
 log = logging.getLogger(__name__)
 
@@ -173,7 +175,14 @@ class _Search:
         return bearing_toes(self.system(found.lower, counted), found.state, self.under.loads, self.under.time)
 
     def _with_parted_faces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
-        parted = parted_faces(self.system(found.lower, counted), found.state)
+        system = self.system(found.lower, counted)
+        loose = hairline_faces(system, found.state)
+        if loose and math.isfinite(found.upper):
+            rigid = replace(self, materials=[replace(material, rigid=True) for material in self.materials])
+            above = found.upper * (1.0 + 2.0 * self.tolerance)
+            other = rigid._otherwise(counted, found.lower, above)
+            found = found if other is None else with_hairlines(self.blocks, found, loose, other)
+        parted = parted_faces(system, found.state)
         if not parted:
             return found
         just_below = found.lower * (1.0 - 2.0 * self.tolerance)

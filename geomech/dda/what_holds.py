@@ -160,6 +160,38 @@ def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
     return tuple(sorted(out, key=lambda each: -each.gap))
 
 
+def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
+    """Faces with whole cohesion that in ``state`` are open at all of their ends, by less than what blocks are known to,
+    and so hold nothing; the one that is open farthest first."""
+    near = system.contacts_near(state)
+    if near.whole is None:
+        return ()
+    face, hair = near.whole.face, near.gap_before <= near.precision
+    loose = (near.state == OPEN) & (near.bonded > 0) & ~near.whole.touch(near.state)
+    out = []
+    for number in np.unique(face[loose & (face >= 0)]):
+        own = np.flatnonzero(face == number)
+        if hair[own].all():
+            first, length = int(own[0]), float(near.whole.length[own].sum())
+            gap = float(near.gap_before[own].max())
+            out.append(PartedFace(int(near.block[first]), int(near.other[first]), gap, length))
+    return tuple(sorted(out, key=lambda each: -each.gap))
+
+
+def with_hairlines(
+    blocks: Blocks, found: FactorOfSafety, loose: tuple[PartedFace, ...], rigid: FactorOfSafety
+) -> FactorOfSafety:
+    """The answer ``found`` with the faces that are ``loose`` in it by a hair, and the answer of ``rigid`` blocks."""
+    worst = loose[0]
+    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+    line = (
+        f"{'a face' if len(loose) == 1 else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
+        f"{'' if len(loose) == 1 else ' and others'} hold nothing, open by {1e3 * worst.gap:.2g} mm because blocks strain "
+        f"evenly; rigid blocks have the factor {rigid.factor:.4f}"
+    )
+    return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
+
+
 def with_parted_faces(
     blocks: Blocks, found: FactorOfSafety, parted: tuple[PartedFace, ...], other: FactorOfSafety
 ) -> FactorOfSafety:
