@@ -143,7 +143,7 @@ def _numba() -> Check:
 
 
 def _rendering() -> Check:
-    from .render.offscreen import APT_LINE, usable_window
+    from .render.pictures.offscreen import APT_LINE, usable_window
 
     window = usable_window()
     if window is None:

@@ -108,7 +108,7 @@ class CoupledRun:
     def __init__(
         self, problem: Problem, folder: Path, observers: Iterable[Any], stored: dict[str, Any] | None = None
     ) -> None:
-        from .output.checkpointing import Checkpoints
+        from .output.checkpoints.checkpoint_schedule import Checkpoints
         from .output.observer import Group
 
         self.problem, self.folder, self.stored = problem, Path(folder), stored
@@ -238,10 +238,10 @@ def safety_report(
     divide: Mapping[str, float] | None = None,
     **wishes,
 ):
-    """`geomech.report.of_safety.SafetyReport` of the same: its ``text()``, ``as_dict()`` and ``draw(path)``; the factor
+    """`geomech.report.safety_page.SafetyReport` of the same: its ``text()``, ``as_dict()`` and ``draw(path)``; the factor
     itself is ``found``."""
     from . import dda
-    from .report.of_safety import SafetyReport
+    from .report.safety_page import SafetyReport
 
     problem = _loaded(scene).problem()
     cracks = cracked_and_free(problem)

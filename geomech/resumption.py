@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from .output import checkpoint
-from .output.checkpoint import FilesChanged, NotResumable
-from .output.checkpointing import digests
+from .output.checkpoints import checkpoint_file
+from .output.checkpoints.checkpoint_file import FilesChanged, NotResumable
+from .output.checkpoints.checkpoint_schedule import digests
 from .output.run_lock import RunLock
 from .pipeline import CoupledRun, run
 
@@ -64,7 +64,7 @@ def _resumed(
     quiet: bool,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    header, path = next(checkpoint.whole(folder / checkpoint.FOLDER), (None, None))
+    header, path = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), (None, None))
     if path is None:
         return _begin_again(folder, overrides, observers, quiet, tell)
     _refuse_other_sources(header, path)
@@ -73,7 +73,7 @@ def _resumed(
     told = _told_end(folder)
     if told is not None:
         _refuse_finished(told, changes, header, scene)
-    stored = checkpoint.read(path)
+    stored = checkpoint_file.read(path)
     problem = stored["coupling"].problem
     if scene is not None:
         wanted = scene.problem()
@@ -94,7 +94,7 @@ def _refuse_other_folders(folder: Path) -> None:
     if not folder.is_dir():
         raise NotResumable(f"there is no run folder {folder}")
     # The log is there before anything else of a run but the scene, which other folders hold as well.
-    if not any((folder / name).exists() for name in ("run.log", "history.csv", checkpoint.FOLDER)):
+    if not any((folder / name).exists() for name in ("run.log", "history.csv", checkpoint_file.FOLDER)):
         below = sorted(str(found.parent) for found in folder.glob("*/history.csv"))
         raise NotResumable(
             f"{folder} holds no run: name the folder that `geomech run` wrote"
@@ -103,7 +103,7 @@ def _refuse_other_folders(folder: Path) -> None:
 
 
 def _refuse_other_sources(header: Mapping[str, Any], path: Path) -> None:
-    now = checkpoint.identity()
+    now = checkpoint_file.identity()
     for name, value in now.items():
         if header.get(name) != value:
             what = {"format": "way of storing runs", "sources": "geomech's sources"}.get(name, name)
@@ -205,6 +205,6 @@ def _other_surroundings(header: Mapping[str, Any]) -> list[str]:
     return [
         f"{name} was {header.get(name)!r} and is {value!r}: the last digits may differ from those of an uninterrupted "
         "run"
-        for name, value in checkpoint.surroundings().items()
+        for name, value in checkpoint_file.surroundings().items()
         if header.get(name) != value
     ]

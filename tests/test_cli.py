@@ -255,7 +255,7 @@ def test_report_of_a_folder_of_runs(finished, capsys):
 
 
 def test_render_prints_what_it_drew(finished, capsys):
-    from geomech.render import offscreen
+    from geomech.render.pictures import offscreen
 
     if offscreen.usable_window() is None:
         pytest.skip("no off-screen OpenGL here")
@@ -342,7 +342,7 @@ def test_a_scene_runs_from_the_command_line_to_its_folder(tmp_path, capsys):
     import numpy as np
 
     from geomech.output import Run
-    from geomech.reference.two_cracks import OPEN_SLOT_K_I, OPEN_SLOT_K_II
+    from geomech.reference.specimens.two_cracks import OPEN_SLOT_K_I, OPEN_SLOT_K_II
 
     scene = Path(__file__).parents[1] / "pipelines" / "two_cracks" / "scene.toml"
     out = tmp_path / "out"

@@ -5,15 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from geomech.conventions import (
-    IN_PLANE,
-    VTK_STRESS,
-    normal_of,
-    outward_normal_of,
-    rotate_stress,
-    traction,
-)
-from geomech.ddm.criteria import CRITERIA
+from geomech.conventions import IN_PLANE, VTK_STRESS, normal_of, outward_normal_of, rotate_stress, traction
+from geomech.ddm.fracture.criteria import CRITERIA
 from geomech.model import Blocks
 
 

@@ -35,7 +35,7 @@ def test_a_place_that_cannot_be_written_is_no_fault(tmp_path):
     (tmp_path / "file").write_text("")
     code = (
         "import numpy as np\n"
-        "from geomech.dda.moments import block_moments\n"
+        "from geomech.dda.kinematics.simplex_integration import block_moments\n"
         "print(block_moments(np.array([[0, 0], [1, 0], [1, 1.0]]), np.array([1, 2, 0]), np.array([0, 3]))[0, 0])"
     )
     package = Path(geomech.__file__).resolve().parent
@@ -96,7 +96,7 @@ def test_kernels_that_call_into_other_files_are_stamped_by_those_too():
                         assert isinstance(value._cache._impl.locator, WithCalled), value
     assert kernels > 20 and reaching > 5
     # Numbers of other files are a part of the stamp by their value.
-    assert "geomech.ddm.kernels.WIDTH" in constants
+    assert "geomech.ddm.kernels.full_plane.WIDTH" in constants
 
 
 def test_a_kernel_calls_its_own_copies_only(tmp_path):
@@ -106,7 +106,8 @@ def test_a_kernel_calls_its_own_copies_only(tmp_path):
         "import numpy as np\nfrom geomech.compiled import kept, part\n"
         "@part(error_model='numpy')\ndef long(x):\n"
         "    for k in range(len(x)):\n"
-        + "        x[k] = np.sin(x[k]) * np.cos(x[k]) + np.exp(-x[k]) ** 1.5\n" * 12  # too long to be inlined
+        + "        x[k] = np.sin(x[k]) * np.cos(x[k]) + np.exp(-x[k]) ** 1.5\n"
+        * 12  # too long to be inlined
         + "    return x.sum()\n"
         "@kept(error_model='numpy')\ndef twice(x):\n    return long(x) + long(x)\n"
     )

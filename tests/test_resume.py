@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from geomech import cli
-from geomech.bench.coupling_cost import wall
+from geomech.bench.cost.coupling_cost import wall
 from geomech.model import RunSettings
 from geomech.output import (
     Checkpoints,
@@ -27,9 +27,9 @@ from geomech.output import (
     RunLog,
     Series,
     Summary,
-    checkpoint,
     standard_observers,
 )
+from geomech.output.checkpoints import checkpoint_file
 from geomech.pipeline import run, run_problem
 from geomech.resumption import Finished, NotResumable, resume
 from geomech.scene import load_scene
@@ -260,7 +260,7 @@ def files(folder: Path) -> dict[str, bytes]:
     found = {}
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
-        if path.is_file() and name != "run.log" and path.parent.name != checkpoint.FOLDER:
+        if path.is_file() and name != "run.log" and path.parent.name != checkpoint_file.FOLDER:
             found[name] = path.read_bytes()
     summary = json.loads(found["summary.json"])
     for told in summary.get("skipped", {}).values():
@@ -324,8 +324,8 @@ def test_a_checkpoint_changes_nothing_of_the_run_that_writes_it(write, tmp_path)
     for name, scene in (("often", often), ("never", never)):
         run(scene, tmp_path / name, standard_observers(scene, quiet=True))
     assert differing(tmp_path / "often", tmp_path / "never") == ["scene.toml"]
-    assert len(checkpoint.found(tmp_path / "often" / checkpoint.FOLDER)) == checkpoint.KEPT
-    assert not (tmp_path / "never" / checkpoint.FOLDER).exists()
+    assert len(checkpoint_file.found(tmp_path / "often" / checkpoint_file.FOLDER)) == checkpoint_file.KEPT
+    assert not (tmp_path / "never" / checkpoint_file.FOLDER).exists()
     with pytest.raises(Finished, match="no checkpoint: run the scene anew"):
         resume(tmp_path / "never", ["run.end_time_s=0.2"])
 
@@ -337,8 +337,8 @@ def test_what_came_after_the_checkpoint_is_dropped(write, tmp_path):
     out = tmp_path / "parts"
     broken_off(scene, out, 9)
     # The one of cycle 8 is what a kill in cycle 10 would have left.
-    newest = checkpoint.found(out / checkpoint.FOLDER)
-    assert [checkpoint.read_header(path)["cycle"] for path in newest] == [9, 7]
+    newest = checkpoint_file.found(out / checkpoint_file.FOLDER)
+    assert [checkpoint_file.read_header(path)["cycle"] for path in newest] == [9, 7]
     newest[0].unlink()
     with open(out / "history.csv", "a", encoding="utf-8") as file:
         file.write("10,1e")
@@ -395,12 +395,12 @@ def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
     with pytest.raises(NotResumable, match="was 20.0, is now 25.0"):
         resume(out)
     copy.write_text(kept)
-    known = checkpoint.identity()
+    known = checkpoint_file.identity()
     for name, told in (("sources", "geomech's sources"), ("numpy", "another numpy"), ("format", "way of storing")):
-        monkeypatch.setattr(checkpoint, "identity", lambda name=name: {**known, name: "another"})
+        monkeypatch.setattr(checkpoint_file, "identity", lambda name=name: {**known, name: "another"})
         with pytest.raises(NotResumable, match=f"{told}.*go on with what wrote it, geomech 0"):
             resume(out)
-    monkeypatch.setattr(checkpoint, "identity", lambda: known)
+    monkeypatch.setattr(checkpoint_file, "identity", lambda: known)
     history = (out / "history.csv").read_bytes()
     (out / "history.csv").write_bytes(history[:-5])
     with pytest.raises(NotResumable, match="history.csv ends before its row 3"):
@@ -446,13 +446,13 @@ def test_a_second_interrupt_stops_at_once(write, tmp_path):
             [*standard_observers(scene, quiet=True), Breaks(5), Breaks(5), _At(5, AssertionError("too late"))],
         )
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    assert checkpoint.read_header(checkpoint.found(out / checkpoint.FOLDER)[0])["cycle"] == 3
+    assert checkpoint_file.read_header(checkpoint_file.found(out / checkpoint_file.FOLDER)[0])["cycle"] == 3
     assert resume(out, quiet=True)["end"] == "end of the scene"
 
 
 def test_a_full_disk_is_told_and_what_was_written_is_kept(write, tmp_path, monkeypatch, capfd):
     """As the file system says it, in the middle of a run; with room again the run goes on to the same bytes."""
-    from geomech.output import vtu
+    from geomech.output.vtk import vtu
 
     path, out, whole = write(SLIDING), tmp_path / "out", tmp_path / "whole"
     run(load_scene(path), whole, standard_observers(load_scene(path), quiet=True))
@@ -535,7 +535,7 @@ def _readable(out: Path) -> int:
     for grids in listed.values():
         if grids:
             pyvista.read(grids[max(grids)])
-    newest = next(checkpoint.whole(out / checkpoint.FOLDER), None)
+    newest = next(checkpoint_file.whole(out / checkpoint_file.FOLDER), None)
     if newest is not None:
         assert newest[0]["cycle"] < len(numbers)
     return len(numbers)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from geomech import kernel_folder
-from geomech.output.progress import Progress
+from geomech.output.console.progress import Progress
 
 SCENE = """
 title = "Böschung"
@@ -66,7 +66,7 @@ def test_a_terminal_that_is_gone_ends_the_cycle_and_leaves_a_checkpoint(scene, t
 
 def test_nohup_keeps_a_run_alive(scene, tmp_path):
     code = (
-        "import os, signal; from geomech import cli; from geomech.cli.run import prepare_for_a_run;"
+        "import os, signal; from geomech import cli; from geomech.cli.verbs.run import prepare_for_a_run;"
         "signal.signal(signal.SIGHUP, signal.SIG_IGN); prepare_for_a_run(); os.kill(os.getpid(), signal.SIGHUP)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
@@ -137,7 +137,7 @@ def unwritable(tmp_path, monkeypatch):
 def test_a_home_that_cannot_be_written_is_told_and_gone_round(unwritable):
     code = (
         "import numpy as np\n"
-        "from geomech.dda.moments import block_moments\n"
+        "from geomech.dda.kinematics.simplex_integration import block_moments\n"
         "print(block_moments(np.array([[0, 0], [1, 0], [1, 1.0]]), np.array([1, 2, 0]), np.array([0, 3]))[0, 0])"
     )
     done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True)

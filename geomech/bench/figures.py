@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..output.summary import installed, write_json
+from ..output.tables.summary import installed, write_json
 
 #: Kinds of figures. Less is better of both; `TIME` in seconds, `ERROR` relative.
 ERROR, TIME = "error", "time"

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from ..model import Blocks, Cracks, Problem, State
-from . import block_scenes, coupling_cost
+from .cost import block_scenes
 from .figures import Measured, stopwatch
 
 #: Where the picture goes, below the working folder.
@@ -33,7 +33,7 @@ Results = list[np.ndarray]
 def measure(quick: bool = False) -> Measured:
     """The table; leaves ``skips.png`` in `FOLDER`. Raises AssertionError when results with a skip are not those without
     it."""
-    from ..render.bars import draw_bars
+    from ..render.benchmarks.bars import draw_bars
 
     rows = [*_rows(quick)]
     width = max(len(label) for label, *_ in rows)
@@ -59,8 +59,8 @@ def measure(quick: bool = False) -> Measured:
 
 def _rows(quick: bool) -> Iterator[tuple[str, float, float, float]]:
     times, cracks, steps = (1, 10, 3) if quick else (2, 20, 5)
-    cracked = coupling_cost.wall(40 if quick else 200, cracks)
-    cracked = replace(cracked, run=replace(cracked.run, end_time=(steps - 0.5) * coupling_cost.TIME_STEP))
+    cracked = block_scenes.cracked_wall(40 if quick else 200, cracks)
+    cracked = replace(cracked, run=replace(cracked.run, end_time=(steps - 0.5) * block_scenes.CRACKED_WALL_STEP))
     label = (
         f"bodies, factors and compliances of what has not changed: a wall with {cracks} cracked bricks, {steps} steps"
     )
@@ -129,7 +129,7 @@ def _specimen(part: float) -> Problem:
 
 def _written(problem: Problem, interior: bool) -> Results:
     from ..coupling import cycles
-    from ..output.series import Series
+    from ..output.vtk.series import Series
 
     with TemporaryDirectory() as folder:
         observer = Series(interior_every=5 if interior else 0)
@@ -143,14 +143,14 @@ def _written(problem: Problem, interior: bool) -> Results:
 def _searches(skip: bool) -> Results:
     """Pairs of blocks at rest but for a thousandth of the window a time, sought anew or kept; each list as a set of
     results."""
-    from ..dda import near_pairs
+    from ..dda.contact_detection import neighbour_search
 
     blocks = block_scenes.wall(1000)
     window, vertices = 0.01, State.at_rest(blocks).vertices
-    kept = near_pairs.NearPairs(blocks.vertex_start, blocks.fixed)
-    box = near_pairs.boxes(vertices, blocks.vertex_start[:-1])
+    kept = neighbour_search.NearPairs(blocks.vertex_start, blocks.fixed)
+    box = neighbour_search.boxes(vertices, blocks.vertex_start[:-1])
     near = [
-        kept.of(vertices + 1e-5 * k, window) if skip else near_pairs.near_pairs(box, blocks.fixed, 2.0 * window)
+        kept.of(vertices + 1e-5 * k, window) if skip else neighbour_search.near_pairs(box, blocks.fixed, 2.0 * window)
         for k in range(20)
     ]
     return [pairs.astype(float) for pairs in near[-1:]]
@@ -158,22 +158,22 @@ def _searches(skip: bool) -> Results:
 
 def _lone_searches(skip: bool) -> Results:
     """The pairs of a single block: none, whether they are looked for or not."""
-    from ..dda import near_pairs
+    from ..dda.contact_detection import neighbour_search
 
     blocks = Blocks.from_polygons([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])])
     vertices, first = State.at_rest(blocks).vertices, blocks.vertex_start
-    kept, pairs = near_pairs.NearPairs(first, blocks.fixed), np.empty((0, 2))
+    kept, pairs = neighbour_search.NearPairs(first, blocks.fixed), np.empty((0, 2))
     for _ in range(1000):
         if skip:
             pairs = kept.of(vertices, 0.01)
         else:
-            pairs = near_pairs.near_pairs(near_pairs.boxes(vertices, first[:-1]), blocks.fixed, 0.02)
+            pairs = neighbour_search.near_pairs(neighbour_search.boxes(vertices, first[:-1]), blocks.fixed, 0.02)
     return [np.array([float(len(pairs)) + 1.0]), np.empty(0)]
 
 
 def _modules() -> list[str]:
     """What runs load, each in a process of its own; AssertionError where one loads what it does not need."""
-    from .startup import COMMANDS
+    from .cost.startup import COMMANDS
 
     lines = ["modules that a run does not load"]
     for label, unwanted, wishes in (

@@ -2,7 +2,7 @@
 
 At each load the cycle is repeated from the same start of the step until no tip grows; every pass is yielded as a
 `Cycle`. The state that leaves the last pass starts the next load step. Where the load follows the cracks
-(`event_steps`), each pass in which they grow is a load step of its own. Blocks part where a pass has left them: in
+(`event_stepping`), each pass in which they grow is a load step of its own. Blocks part where a pass has left them: in
 statics the passes that follow at the same load begin there (unless the block hung by a thread), in dynamics the next
 step does.
 
@@ -20,22 +20,22 @@ from typing import Any
 import numpy as np
 
 from .. import dda
-from ..dda.blas_threads import alike, asked_for, blas_threads
 from ..dda.excavation import until_next_event
-from ..dda.overlap_energy import Overlap, OverlapWatch
+from ..dda.linear_solver.blas_threads import alike, asked_for, blas_threads
+from ..dda.step_control.overlap_energy import Overlap, OverlapWatch
 from ..model import TIP, Cycle, Event, Problem, State
-from .balance import Balance, balanced, toughness
-from .budget_watch import BendingWatch, BudgetWatch, GrowthWatch
-from .collapse import collapse_in_situ, lost, relax, unheld
-from .cracked_blocks import CrackedBlocks
-from .endless import out_of_sight, solved_pass
-from .event_steps import SETTLED, TOGETHER, EventSteps
-from .first_change import FirstChange
-from .growing import births, growth_of_tips, initiations, part_here, take_growth
-from .load_balance import LoadBalance
-from .mechanism import Mechanism
-from .record import event, record
-from .tips_in_time import TipsInTime
+from .coupled_state import CrackedBlocks
+from .cycle_record import event, record
+from .growth.crack_growth import births, growth_of_tips, initiations, part_here, take_growth
+from .growth.dynamic_tips import TipsInTime
+from .growth.event_stepping import SETTLED, TOGETHER, EventSteps
+from .growth.first_state_change import FirstChange
+from .load_pass import Balance, balanced, toughness
+from .load_transfer.load_imbalance import LoadBalance
+from .load_transfer.unbounded_rock import out_of_sight, solved_pass
+from .monitoring.collapse import collapse_in_situ, lost, relax, unheld
+from .monitoring.energy_check import BendingWatch, BudgetWatch, GrowthWatch
+from .monitoring.mechanism import Mechanism
 
 log = logging.getLogger(__name__)
 

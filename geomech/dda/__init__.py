@@ -8,25 +8,25 @@
         ...
 """
 
-from .basis import displacement_matrix
-from .design_strength import PartialFactors, design_problem
-from .elastic_range import ElasticRange
-from .energy import EnergyBudget, StepEnergy
-from .equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
-from .force_rows import EDGE_FORCE, POINT_FORCE
-from .in_situ import InSituState, NoInSituEquilibrium, in_situ_state
-from .loads import AppliedForces
-from .mobilised import MobilisedJoint, mobilised_joints
-from .moments import block_moments, mass_matrix
-from .running import run
-from .step import CrackResponse, NotConverged, StepResult, contact_resultants
-from .step_length import StepLength
-from .safety_answer import FactorOfSafety
-from .strength_reduction import NothingToReduce, factor_of_safety
+from .contact_detection.inherited_contacts import ToldContacts
+from .counters import Work
+from .energy_balance import EnergyBudget, StepEnergy
+from .kinematics.displacement_matrix import displacement_matrix
+from .kinematics.newmark import TimeScheme
+from .kinematics.simplex_integration import block_moments, mass_matrix
+from .kinematics.strain_limits import ElasticRange
+from .loads.force_records import EDGE_FORCE, POINT_FORCE
+from .loads.load_vectors import AppliedForces
+from .results import CrackResponse, NotConverged, StepResult, contact_resultants
+from .statics.in_situ_stress import InSituState, NoInSituEquilibrium, in_situ_state
+from .statics.mobilised_strength import MobilisedJoint, mobilised_joints
+from .statics.partial_factors import PartialFactors, design_problem
+from .statics.pseudo_time_equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
+from .statics.safety_answer import FactorOfSafety
+from .statics.strength_reduction import NothingToReduce, factor_of_safety
+from .step_control.adaptive_time_step import StepLength
+from .stepping import run
 from .system import BlockSystem
-from .time_integration import TimeScheme
-from .told_contacts import ToldContacts
-from .work import Work
 
 __all__ = [
     "EDGE_FORCE",

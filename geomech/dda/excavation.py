@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model import Blocks, Excavation, Loads
-from ..model.polygon import winding_number
+from ..model.blocks.polygon import winding_number
 
 #: Times nearer than this part of their size are one.
 _SAME = 1e-12

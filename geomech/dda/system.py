@@ -9,26 +9,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..model import OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
-from . import assembly
-from .approach import Windows
-from .attempt import Attempt
-from .contact_set import ContactSet
-from .contacts import ContactFinder
+from .contact_detection.contact_finder import ContactFinder
+from .contact_detection.inherited_contacts import ToldContacts, at_their_springs, told_rows
+from .contact_detection.initial_overlap import refuse_overlap
+from .counters import Work
 from .excavation import Excavations, until_next_event
-from .loads import LoadMap
-from .middle import Middle
-from .moments import block_moments
-from .open_close import MANY
-from .overlap import refuse_overlap
-from .rigid import with_rigid
-from .rounding import rounding_of
-from .step import CrackResponse, NotConverged, StepResult
-from .step_equations import Unsettled
-from .step_limits import CROSSING, UNSETTLED, StepLimits
-from .stray_loads import StrayLoads
-from .time_integration import TimeScheme
-from .told_contacts import ToldContacts, at_their_springs, told_rows
-from .work import Work
+from .kinematics.midpoint_configuration import Middle
+from .kinematics.newmark import TimeScheme
+from .kinematics.rigid_blocks import with_rigid
+from .kinematics.roundoff import rounding_of
+from .kinematics.simplex_integration import block_moments
+from .linear_solver import assembly
+from .loads.load_checks import StrayLoads
+from .loads.load_vectors import LoadMap
+from .open_close.contact_set import ContactSet
+from .open_close.equations import Unsettled
+from .open_close.iteration import MANY
+from .results import CrackResponse, NotConverged, StepResult
+from .step_control.relative_motion import Windows
+from .step_control.step_limits import CROSSING, UNSETTLED, StepLimits
+from .time_step import Attempt
 
 log = logging.getLogger(__name__)
 
@@ -357,7 +357,9 @@ class BlockSystem:
         if pressed and self._redirected(found, again, state):
             return again
         known = np.isin(again.vertex * len(moved) + again.edge, found.vertex * len(moved) + found.edge)
-        missed = ~known & (self.finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision)
+        missed = ~known & (
+            self.finder.gaps(attempt.new_vertices, attempt.vertices, again) - again.lift < -again.precision
+        )
         return again if missed.any() else None
 
     def _redirected(self, found: ContactSet, again: ContactSet, state: np.ndarray) -> bool:

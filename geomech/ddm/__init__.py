@@ -8,7 +8,7 @@
     sol = ddm.solve_to(loops, cracks, material, load, target_error=1e-6)    # the mesh follows from the error
     sol.tip_errors                                                          # how far to trust each K
 
-`criteria` say where a tip goes, `growth` takes it there, and `propagate` does both again and again:
+`criteria` say where a tip goes, `tip_advance` takes it there, and `propagate` does both again and again:
 
     for step in ddm.propagate(loops, cracks, material, load, control="toughness"):
         step.load_factor, step.cracks, step.tips, step.solution
@@ -16,23 +16,23 @@
 
 from importlib import import_module
 
-# Resolved on first use: `criteria` and `growth` need no compiled kernel.
+# Resolved on first use: `criteria` and `tip_advance` need no compiled kernel.
 _PUBLIC = {
     "Body": ".body",
-    "BodyLoad": ".loads",
-    "HalfPlane": ".half_plane",
-    "OutOfEquilibrium": ".loads",
-    "Pressure": ".loads",
-    "Support": ".supports",
-    "LoadHistory": ".loads",
-    "NotConverged": ".faces",
+    "BodyLoad": ".loads.body_loads",
+    "HalfPlane": ".mesh.half_plane",
+    "OutOfEquilibrium": ".loads.body_loads",
+    "Pressure": ".loads.body_loads",
+    "Support": ".loads.supports",
+    "LoadHistory": ".loads.body_loads",
+    "NotConverged": ".crack_contact.frictionless_contact",
     "Solution": ".solution",
-    "Work": ".work",
+    "Work": ".counters",
     "propagate": ".propagation",
-    "TargetMissed": ".automatic",
-    "solve_to": ".automatic",
+    "TargetMissed": ".fracture.target_error",
+    "solve_to": ".accurate_solution",
 }
-_MODULES = ("criteria", "growth", "initiation", "shapes")
+_MODULES = {"criteria": ".fracture.criteria", "initiation": ".growth.initiation", "shapes": ".kernels.shape_functions"}
 
 __all__ = [
     "Body",
@@ -47,7 +47,6 @@ __all__ = [
     "TargetMissed",
     "Work",
     "criteria",
-    "growth",
     "initiation",
     "propagate",
     "shapes",
@@ -59,5 +58,5 @@ def __getattr__(name: str):
     if name in _PUBLIC:
         return getattr(import_module(_PUBLIC[name], __name__), name)
     if name in _MODULES:
-        return import_module(f".{name}", __name__)
+        return import_module(_MODULES[name], __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

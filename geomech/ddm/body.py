@@ -20,34 +20,36 @@ from functools import cached_property
 import numpy as np
 
 from ..model import Cracks, DdmSettings, JointLaw, Material
-from ..model.polygon import area_moments
-from .applied import Applied, apply, check_equilibrium
-from .automatic import finer, for_target, met
-from .bordered import SMALLEST, Bordered
-from .boundary import BoundarySystem
-from .boundary_iteration import is_iterated
-from .chords import rounder
-from .contact import settle_faces
-from .crack_system import CrackSystem
-from .even_stress import EvenResponse, even_response, scales
-from .face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
-from .friction import FaceEquations
-from .functionals import TipFunctionals
-from .half_plane import HalfPlane
-from .influence import ElementSet, influence, reuse
-from .iterative import FACTORABLE, NotSolved, compressed, is_compressed
-from .jumps import closing, strain_weights
-from .kept_rows import KeptRows
-from .loads import BodyLoad
-from .mesh import Mesh, mesh, outline_edges
-from .placing import OFF
-from .rock import outlined
+from ..model.blocks.polygon import area_moments
+from .adaptivity import finer, for_target
+from .counters import Work
+from .crack_contact.face_contact import settle_faces
+from .crack_contact.face_laws import SMOOTH, FaceLaws, FaceMemory, all_smooth, check_laws
+from .crack_contact.frictional_contact import FaceEquations
+from .fracture.chord_error import with_halved_chords
+from .fracture.target_error import met
+from .fracture.tip_elements import tip_elements
+from .fracture.weight_functions import TipFunctionals
+from .iterative.boundary_gmres import is_iterated
+from .iterative.crack_gmres import FACTORABLE, compressed, is_compressed
+from .iterative.gmres import NotSolved
+from .loads.body_loads import BodyLoad
+from .loads.load_vectors import Applied, apply, check_equilibrium
+from .loads.supports import Holds, Support, called, marks, place, values_at
+from .loads.uniform_stress_response import EvenResponse, even_response, scales
+from .loads.unit_load_cache import UnitLoad, UnitLoads, on_elements
+from .mesh.edge_location import OFF
+from .mesh.elements import Mesh, mesh, outline_edges
+from .mesh.geometry_checks import check_cracks, check_outline, new_segments
+from .mesh.half_plane import HalfPlane
+from .mesh.point_location import outlined
 from .solution import Solution
-from .supports import Holds, Support, called, marks, place, values_at
-from .tip_elements import tip_elements
-from .unit_loads import UnitLoad, UnitLoads, on_elements
-from .validity import check_cracks, check_outline, new_segments
-from .work import Work
+from .system.bordered_factor import SMALLEST, Bordered
+from .system.boundary_system import BoundarySystem
+from .system.displacement_jumps import closing, strain_weights
+from .system.influence_matrix import ElementSet, influence, reuse
+from .system.row_store import KeptRows
+from .system.schur_complement import CrackSystem
 
 _log = logging.getLogger(__name__)
 
@@ -58,7 +60,7 @@ class Body:
     ``loops``: (n, 2) arrays, the outline counter-clockwise, then holes clockwise; [] is the infinite plane. ``holes``:
     more of them, which may run either way, in the infinite plane too. ``half_plane``: the rock is that below a free
     surface instead of all of the plane; cracks may end at it. ``cracks``: those of this body. ``previous``: an earlier
-    body of which whatever is unchanged, element by element, is reused, factors included (`bordered`): growth costs the
+    body of which whatever is unchanged, element by element, is reused, factors included (`bordered_factor`): growth costs the
     rows and columns of the new elements. ``face_laws``: what crack faces do to each other (`face_laws`), the ``law`` of
     a crack segment counts in them. ``counts`` tells what making it took, ``work`` what was done since by all bodies
     that share it. Raises ValueError naming the item on geometry that is no body, numpy.linalg.LinAlgError when cracks
@@ -144,11 +146,11 @@ class Body:
                 "solved for: ask for a larger target_error, or draw the surface as a side of a large block"
             )
         self._functionals: tuple[tuple, TipFunctionals] | None = None
-        #: Bodies with trial kinks (`trial_kinks`): length → number of the direction → body.
+        #: Bodies with trial kinks (`f_criterion`): length → number of the direction → body.
         self.trials: dict[float, dict[int, Body]] = {}
-        #: How cracks answer to an even stress, by the states of their faces (`even_stress`).
+        #: How cracks answer to an even stress, by the states of their faces (`uniform_stress_response`).
         self.even: dict[bytes, EvenResponse] = {}
-        #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`bases`).
+        #: Where faces stand on bases, and how unit tractions move them by the states of the cracks (`rigid_bases`).
         self.on_bases: dict[bytes, object] = {}
         self._assemble(previous, holds, many)
 
@@ -182,8 +184,22 @@ class Body:
 
     @cached_property
     def rounder(self) -> Body | None:
-        """See `chords.rounder`."""
-        return rounder(self)
+        """The same body with every chord of a curved wall halved (`with_halved_chords`); None where all are straight."""
+        halved = with_halved_chords(self)
+        if halved is None:
+            return None
+        loops, cracks, supports = halved
+        n_outlines = int(self.outlined)
+        return Body(
+            loops[:n_outlines],
+            cracks,
+            self.material,
+            self.settings,
+            holes=loops[n_outlines:],
+            supports=supports,
+            face_laws=self.face_laws,
+            half_plane=self.half_plane,
+        )
 
     def _in_half_plane(self, edges: np.ndarray) -> np.ndarray:
         """``edges`` (m, 2, 2) and a piece of the free surface. Raises ValueError on what does not stand below it."""

@@ -18,13 +18,13 @@ import numpy as np
 
 from ..model import TIP, Cracks, DdmSettings, Event, GrowthSettings, Material
 from .body import Body
-from .growth import Growth, advance
-from .initiation import Birth, bear, births
-from .loads import BodyLoad
-from .path import Memory, corrected
+from .fracture.f_criterion import check_criterion, judged
+from .growth.initiation import Birth, bear, births
+from .growth.path_correction import Memory, corrected
+from .growth.tie_tolerance import reached
+from .growth.tip_advance import Growth, advance
+from .loads.body_loads import BodyLoad
 from .solution import Solution
-from .ties import reached
-from .trial_kinks import check_criterion, judged
 
 #: Under a controlled load, tips driven within this part of the most driven one grow with it: K at a graded kink is
 #: right to some 1e-3, and of two tips that are images of one another both should go.

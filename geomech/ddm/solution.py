@@ -10,21 +10,21 @@ import numpy as np
 
 from ..conventions import normal_of
 from ..model import OPEN, SLIP, STICK, CrackFaces
-from . import shapes
-from .applied import Applied, apply
-from .beside_ends import ElementEnds
-from .boundary import middle_of
-from .contact import FaceAnswer
-from .face_laws import FaceStates, Released
-from .friction import stored_by_fillings
-from .influence import add_fields
-from .placing import OFF, onto_boundary, sides_for
-from .reactions import Reactions, reactions
-from .rock import onto_rock
+from .crack_contact.face_contact import FaceAnswer
+from .crack_contact.face_laws import FaceStates, Released
+from .crack_contact.frictional_contact import stored_by_fillings
+from .kernels import shape_functions
+from .loads.load_vectors import Applied, apply
+from .loads.reactions import Reactions, reactions
+from .mesh.edge_location import OFF, onto_boundary, sides_for
+from .mesh.field_points import ElementEnds
+from .mesh.point_location import onto_rock
+from .system.boundary_system import middle_of
+from .system.influence_matrix import add_fields
 
 if TYPE_CHECKING:
-    from .body import Body
-    from .loads import BodyLoad
+    from .interfaces import CrackedBody
+    from .loads.body_loads import BodyLoad
 
 
 #: A residual above this is told to the log.
@@ -43,7 +43,7 @@ class Solution:
 
     def __init__(
         self,
-        body: Body,
+        body: CrackedBody,
         applied: Applied,
         eliminated: np.ndarray,
         answer: FaceAnswer,
@@ -160,9 +160,9 @@ class Solution:
 
     @cached_property
     def tip_errors(self) -> np.ndarray:
-        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, against a finer mesh (`estimate`): as much work
+        """(n_tips, 2) estimated errors of K_I and K_II, Pa √m, against a finer mesh (`sif_error_estimate`): as much work
         again."""
-        from .estimate import tip_errors
+        from .fracture.sif_error_estimate import tip_errors
 
         return tip_errors(self)
 
@@ -398,7 +398,7 @@ def _kelvin_constant(
     The kernels have −y²/r² for his x²/r² = 1 − y²/r², which moves every element by a constant along itself; without it
     the plane would not be at rest far away.
     """
-    whole = 0.5 * density @ shapes.moments()[shapes.ORDINARY, : density.shape[2]]
+    whole = 0.5 * density @ shape_functions.moments()[shape_functions.ORDINARY, : density.shape[2]]
     along = end - start
     across = np.column_stack([-along[:, 1], along[:, 0]])
     moved = (along * whole[:, :1]).sum(axis=0)

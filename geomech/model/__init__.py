@@ -1,18 +1,26 @@
 """Plain arrays that the solvers share: blocks, cracks, materials, joint laws, loads, the state of a run."""
 
-from .blocks import Blocks
-from .bolt import BOLT, GROUND, Bolt, CrossesNoJoint, grouted_bolt
-from .corners import corner_lengths
-from .cracks import Cracks
-from .damping import rayleigh_coefficients
-from .endless import EndlessRock, Fluid
-from .history import History, Wave, baseline_corrected, read_record
-from .imposed_motion import UNKNOWNS, BaseMotion, BlockMotion, PointMotion
-from .in_situ import InSituStress
-from .joint import JointLaw, Roughness
-from .loads import EdgeTraction, Excavation, LinearProfile, Loads, PointLoad, ViscousBoundary, WaterTable
+from .blocks.block_arrays import Blocks
+from .blocks.block_motion import Motion
+from .blocks.corners import corner_lengths
+from .cracks.crack_arrays import Cracks
+from .cracks.whole_network import whole_network
+from .joints.bolt import BOLT, GROUND, Bolt, CrossesNoJoint, grouted_bolt
+from .joints.joint_law import JointLaw, Roughness
+from .loads.applied_loads import (
+    EdgeTraction,
+    Excavation,
+    LinearProfile,
+    Loads,
+    PointLoad,
+    ViscousBoundary,
+    WaterTable,
+)
+from .loads.damping import rayleigh_coefficients
+from .loads.history import History, Wave, baseline_corrected, read_record
+from .loads.in_situ import InSituStress
+from .loads.prescribed_motion import UNKNOWNS, BaseMotion, BlockMotion, PointMotion
 from .material import Material
-from .motion import Motion
 from .problem import (
     CHANGES,
     LARGEST_CORNER,
@@ -26,7 +34,7 @@ from .problem import (
     counted,
 )  # fmt: skip
 from .state import CONTACT, OPEN, SLIP, STICK, TIP, CrackFaces, Cycle, Event, Shortened, Skip, State
-from .whole_network import whole_network
+from .unbounded_rock import EndlessRock, Fluid
 
 __all__ = [
     "BOLT",

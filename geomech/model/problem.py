@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .blocks import Blocks
-from .cracks import Cracks
-from .endless import EndlessRock
-from .in_situ import InSituStress
-from .joint import JointLaw
-from .loads import Loads
+from .blocks.block_arrays import Blocks
+from .cracks.crack_arrays import Cracks
+from .joints.joint_law import JointLaw
+from .loads.applied_loads import Loads
+from .loads.in_situ import InSituStress
 from .material import Material
 from .numbers import Number, refuse_numbers
+from .unbounded_rock import EndlessRock
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class DdaSettings:
     largest displacement in a step, in units of half the diagonal of the domain, however it lies: how finely a motion is
     to be followed. What contacts need is looked after besides: two blocks near each other move against each other by a
     tenth of √(√A √A′) in a step, and turn by 0.15, A and A′ their areas, and a step in which anything goes into or through
-    a block is made again (`dda.approach`, `dda.crossings`). ``equilibrium`` says when a run seeks
-    static equilibrium (`dda.equilibrium`): "" never, "start" before it begins, "loads" at every load of a static run
+    a block is made again (`dda.step_control.relative_motion`, `dda.step_control.continuous_collision`). ``equilibrium`` says when a run seeks
+    static equilibrium (`dda.statics.pseudo_time_equilibrium`): "" never, "start" before it begins, "loads" at every load of a static run
     too; ``unbalanced_tolerance`` is its unbalanced force over the mean force. Raises ValueError naming the setting
     that is none of its numbers (`_DDA_NUMBERS`) or words.
     """

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .blocks import Blocks
-from .bolt import BOLT
-from .cracks import Cracks
-from .motion import Motion
+from .blocks.block_arrays import Blocks
+from .blocks.block_motion import Motion
+from .cracks.crack_arrays import Cracks
+from .joints.bolt import BOLT
 
 #: Contact and crack-face states.
 OPEN, STICK, SLIP = 0, 1, 2

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from .checkpointing import Checkpoints
-from .histories import Histories
-from .joint_histories import JointHistories
+from .checkpoints.checkpoint_schedule import Checkpoints
+from .console.progress import Progress
 from .observer import Group, Observer
-from .progress import Progress
 from .reading import Run
-from .record import RunLog, SceneCopy
 from .run_folder import RunFolder
-from .series import Series
-from .summary import Summary
+from .run_record import RunLog, SceneCopy
+from .tables.histories import Histories
+from .tables.joint_histories import JointHistories
+from .tables.summary import Summary
+from .vtk.series import Series
 
 __all__ = [
     "Checkpoints",
@@ -38,7 +38,7 @@ __all__ = [
 
 def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observer]:
     """The observers of an ordinary run. ``scene`` (a loaded scene, or None for the defaults) gives its ``output`` table
-    (``every``, ``joints``, ``interior``, ``interior_every``, ``configuration``, ``checkpoint_every``) and its
+    (``every``, ``joints``, ``interior_fields``, ``interior_every``, ``configuration``, ``checkpoint_every``) and its
     ``resolved()`` form."""
     output = getattr(scene, "output", None)
     resolved = None if scene is None else scene.resolved()

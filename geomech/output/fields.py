@@ -145,6 +145,7 @@ TIPS: dict[str, str] = {
     "K_eq": "Pa √m",
     "angle_deg": "°, from the crack's direction, counter-clockwise",
     "grown_m": "m, in this cycle",
+    "crack_name": "as in the scene",
 }
 
 #: Columns of ``joints.csv``: a row a joint and cycle. A joint goes by the name of its edges, else by that of its law.

@@ -19,7 +19,7 @@ from typing import Any, Self
 
 from geomech.model import counted
 
-from . import checkpoint
+from .checkpoints import checkpoint_file
 
 #: In the run folder.
 FILE = "run.lock"
@@ -56,7 +56,7 @@ def _results(folder: Path) -> str | None:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         if isinstance(summary, dict) and summary.get("cycles"):
             return f"a run of {counted(int(summary['cycles']), 'cycle')} ({str(summary.get('end', 'ended'))[:60]})"
-    if checkpoint.found(folder / checkpoint.FOLDER):
+    if checkpoint_file.found(folder / checkpoint_file.FOLDER):
         return "a run that was broken off, with a checkpoint"
     return None
 

@@ -25,10 +25,10 @@ def draw(
     What is not said here the scene's ``[render]`` table says, and where that is silent too, stress yy, 800 pixels and a
     movie. Raises ValueError for a run without a cycle, KeyError for an unknown stress component, RenderingUnavailable
     where VTK can open no window."""
-    from .look import final_cycle, look
+    from .curves.plots import plots
     from .movie import movie as draw_movie
-    from .picture import picture
-    from .plots import plots
+    from .pictures.look import final_cycle, look
+    from .pictures.picture import picture
 
     if not len(run.history):
         raise ValueError(

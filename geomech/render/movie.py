@@ -8,10 +8,10 @@ import numpy as np
 
 from geomech.output.reading import Run
 
-from .field import agreeing
-from .legend import INK, SOFT_INK, crack_colours
-from .look import Look, final_cycle, spanning
-from .picture import IDLE, OLD_CRACK, ROCK_OUTLINE, Painter
+from .pictures.field import agreeing
+from .pictures.legend import INK, SOFT_INK, crack_colours
+from .pictures.look import Look, final_cycle, spanning
+from .pictures.picture import IDLE, OLD_CRACK, ROCK_OUTLINE, Painter
 
 #: A frame in which cracks grew stays so much longer than one of loading.
 LINGER = 2.0

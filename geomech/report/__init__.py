@@ -16,15 +16,15 @@ def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> P
     by default ``report.html`` in ``folder``, or ``runs.html`` where runs are below it: there a study leaves its own
     ``report.html``."""
     if not runs:
-        from .of_benchmark import page_of_benchmark
+        from .benchmark_page import page_of_benchmark
 
         made = page_of_benchmark(folder)
     elif len(runs) == 1:
-        from .of_run import page_of_run
+        from .run_page import page_of_run
 
         made = page_of_run(runs[0])
     else:
-        from .of_runs import page_of_runs
+        from .comparison_page import page_of_runs
 
         made = page_of_runs(runs, folder)
     below = any(run.folder.resolve() != folder.resolve() for run in runs)

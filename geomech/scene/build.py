@@ -26,16 +26,16 @@ from ..model import (
     rayleigh_coefficients,
 )
 from ..shapes.parts import JOINT
-from .actions import actions_of, force_history, in_situ_of, profile_of, traction_history
-from .checks import carrier, gauge_carriers, material_of
+from .assembly.fixed_blocks import first_velocities, fixed_blocks, held_unknowns
+from .assembly.joint_laws import joint_law
+from .assembly.load_functions import actions_of, force_history, in_situ_of, profile_of, traction_history
+from .checks.check import Check
+from .checks.cross_checks import carrier, gauge_carriers, material_of
+from .checks.edges import contact_names, joint_names
 from .drawing import Drawing
-from .edges import contact_names, joint_names
-from .endless import endless_of
-from .errors import Check
-from .held_blocks import first_velocities, fixed_blocks, held_unknowns
-from .joints import joint_law
 from .tables import SceneTables
 from .tables.rock import MaterialTable
+from .unbounded_rock import endless_of
 
 #: Contacts of more blocks are watched only where that is asked for: in a wall, they change at every load.
 MOST_WATCHED = 30

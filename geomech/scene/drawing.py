@@ -14,15 +14,15 @@ from ..model import Blocks, Cracks
 from ..shapes import EdgeLine, Flaw, Joint, Mark, ShapeError, Trace, Zone, assemble, rectangle, straight_crack
 from ..shapes.curves import Chords, ended_on
 from ..shapes.parts import JOINT
+from .assembly.field_files import read_traces
 from .errors import Fault
-from .field_files import read_traces
 from .locator import Path
 from .tables.geometry import CrackShape, Geometry
 from .validation import nearest
 from .world import local_origin, moved_section
 
 if TYPE_CHECKING:
-    from .jointing import Jointed
+    from .assembly.jointing import Jointed
 
 #: What warnings of mended joints begin with.
 MENDED = "mended while cutting"
@@ -272,7 +272,7 @@ def _assembled(
         if not (geometry.joints or geometry.joint_sets or parts.joints):
             blocks, cracks = assemble(parts.zones, parts.traces, parts.edges, geometry.tolerance_m)
             return replace(drawing, blocks=blocks, cracks=cracks)
-        from .jointing import jointed, within
+        from .assembly.jointing import jointed, within
 
         blocks, _ = assemble(parts.zones, (), parts.edges, geometry.tolerance_m)
         for k, only in parts.only_in.items():

@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
-
-if TYPE_CHECKING:
-    from .drawing import Drawing
-    from .locator import Path
-    from .tables import SceneTables
+from collections.abc import Sequence
+from typing import NamedTuple
 
 
 class Fault(NamedTuple):
@@ -58,21 +52,3 @@ class SceneError(ValueError):
     def __init__(self, errors: list[Fault]) -> None:
         self.errors = list(errors)
         super().__init__("\n".join(str(error) for error in self.errors))
-
-
-@dataclass(frozen=True, eq=False)
-class Check:
-    """What the checks see: tables (a section is None where it is faulty), the names in the file, the drawing."""
-
-    tables: SceneTables
-    data: dict[str, Any]
-    drawing: Drawing | None
-    place: Callable[[Path], str]
-    faults: list[Fault]
-    warnings: list[Fault]
-
-    def refuse(self, path: Path, message: str, way_out: str) -> None:
-        self.faults.append(Fault(self.place(path), message, way_out))
-
-    def warn(self, path: Path, message: str, way_out: str) -> None:
-        self.warnings.append(Fault(self.place(path), message, way_out))

@@ -8,13 +8,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..model import Blocks, Cracks, History, counted
-from .actions import deepest_pond, force_history, said_of_pond, traction_history
-from .checks import material_of
+from .assembly.fixed_blocks import holds
+from .assembly.load_functions import deepest_pond, force_history, said_of_pond, traction_history
+from .checks.cross_checks import material_of
 from .drawing import Drawing
-from .endless import rising_history
-from .held_blocks import holds
 from .tables import SceneTables
 from .tables.loads import Rising
+from .unbounded_rock import rising_history
 
 #: Longer lists are cut after so many lines.
 SHOWN = 8

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..model import Blocks, Cracks
-from ..model.polygon import crossing_edges, signed_area
-from .network import crack_network
+from ..model.blocks.polygon import crossing_edges, signed_area
+from .block_cutting.crack_traces import crack_network
 from .parts import EdgeLine, Flaw, ShapeError, Trace, Zone, extent_of, grid_decimals
 
 #: Drawing tolerance in units of the drawing's largest side: crack ends nearer than this to an outline, a crack or

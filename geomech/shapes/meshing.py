@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Cracks
-from ..model.polygon import signed_area
-from .gmsh_session import gmsh_session
+from ..model.blocks.polygon import signed_area
+from .gmsh_models.session import gmsh_session
 
 
 @dataclass(frozen=True, eq=False)

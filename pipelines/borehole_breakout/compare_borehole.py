@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from borehole import ABOVE, FRICTION, GREATER, LESSER, RADIUS, ROCK, WEAK_IN_SHEAR, azimuths, last_network
 
-from geomech.reference.borehole import breakdown_pressure, breakout_ratio
-from geomech.reference.cracked_hole import factor
+from geomech.reference.cracks.cracked_hole import factor
+from geomech.reference.openings.borehole import breakdown_pressure, breakout_ratio
 
 #: The hoop stress of a polygon of 72 sides is right to 0.4 %; azimuths to half a side.
 STRESS_TOLERANCE, AZIMUTH_TOLERANCE_DEG = 0.005, 2.5

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geomech.ddm.criteria import maximum_tangential_stress
-from geomech.model import Cracks, Cycle, whole_network
-from geomech.reference import brazilian_disc as published
-from geomech.report.part import Part
+from geomech.ddm.fracture.criteria import maximum_tangential_stress
+from geomech.model import Cracks, Cycle
+from geomech.model.cracks import whole_network
+from geomech.reference.specimens import brazilian_disc as published
+from geomech.report.study_part import Part
 
 
 @dataclass

@@ -6,7 +6,7 @@
 import sys
 from pathlib import Path
 
-from geomech.render.paths import crack_paths
+from geomech.render.curves.paths import crack_paths
 from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))

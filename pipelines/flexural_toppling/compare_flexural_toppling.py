@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from geomech.model import Cycle
-from geomech.reference import flexural_toppling as published
+from geomech.reference.slopes import flexural_toppling as published
 
 #: K of slender columns is right to 3e-3 with this mesh; with a coarse one ("topples") to 0.02, and its steps are 0.01
 #: long.

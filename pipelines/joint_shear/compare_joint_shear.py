@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geomech.ddm.criteria import maximum_tangential_stress
+from geomech.ddm.fracture.criteria import maximum_tangential_stress
 from geomech.model import Cycle
-from geomech.reference import rock_bridges as published
-from geomech.report.part import Part
+from geomech.reference.slopes import rock_bridges as published
+from geomech.report.study_part import Part
 
 MPA = 1e6
 

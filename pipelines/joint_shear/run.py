@@ -6,7 +6,7 @@
 import sys
 from pathlib import Path
 
-from geomech.render.studies import against
+from geomech.render.curves.studies import against
 from geomech.study import watched_runs
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from geomech.model import Cycle, Problem
-from geomech.model.joint_sums import joint_sums
-from geomech.reference.base_shaking import sliding_block
+from geomech.model.joints.joint_sums import joint_sums
+from geomech.reference.blocks.base_shaking import sliding_block
 
 #: Dip of the plane, and the friction angle on it, as the scene has them.
 DIP, PLANE = np.radians(22.0), "plane"

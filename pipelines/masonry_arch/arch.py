@@ -8,7 +8,7 @@ import numpy as np
 
 from geomech import dda
 from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
-from geomech.reference import masonry
+from geomech.reference.blocks import masonry
 
 RADIUS = 10.0  # mean radius, m
 #: Stiff stone, and joints too rough to slide: limit analysis knows neither strain nor sliding.

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from arch import Seen
 
-from geomech.reference import masonry
+from geomech.reference.blocks import masonry
 
 INK, STONE, BASE, THRUST, HINGE = "#2f3136", "#d8d2c4", "#a9a9a4", "#1f6f8b", "#c8553d"
 

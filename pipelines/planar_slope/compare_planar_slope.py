@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from geomech.model import Cycle, Problem
-from geomech.reference import rock_bridges as published
-from geomech.report.part import Part
+from geomech.reference.slopes import rock_bridges as published
+from geomech.report.study_part import Part
 
 G = 9.81
 

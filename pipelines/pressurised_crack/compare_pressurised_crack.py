@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from geomech.model import Cracks
-from geomech.reference.crack_arrays import near_surface
-from geomech.reference.surface_crack import thin_layer
+from geomech.reference.cracks.crack_arrays import near_surface
+from geomech.reference.cracks.surface_crack import thin_layer
 
 #: Depths above this are within reach of the independent solution, whose kernels peak like 1/depth².
 RESOLVED = 0.05

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from geomech.ddm.criteria import maximum_tangential_stress
+from geomech.ddm.fracture.criteria import maximum_tangential_stress
 from geomech.model import Cycle
-from geomech.reference import single_flaw as published
-from geomech.report.part import Part
+from geomech.reference.specimens import single_flaw as published
+from geomech.report.study_part import Part
 
 MPA = 1e6
 #: Wing lengths that the report lists, in half-lengths of the flaw.

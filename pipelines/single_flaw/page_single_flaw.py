@@ -11,11 +11,11 @@ import numpy as np
 from compare_single_flaw import MPA, Wings, parts, settings
 
 from geomech.output import Run
-from geomech.reference import single_flaw as published
-from geomech.render.paths import crack_paths
-from geomech.render.studies import against
-from geomech.report.of_run import add_curves, add_pictures, add_time, key_results
+from geomech.reference.specimens import single_flaw as published
+from geomech.render.curves.paths import crack_paths
+from geomech.render.curves.studies import against
 from geomech.report.page import Page
+from geomech.report.run_page import add_curves, add_pictures, add_time, key_results
 
 #: What the sixth of a flaw's half-length is to a wing: shorter ones feel the corner they leave.
 SHORTEST = published.HALF_LENGTH / 6
@@ -39,7 +39,8 @@ def write_page(runs: Mapping[str, Wings], places: Mapping[str, Path], out: Path)
         grown = {name: {name: wings.last.cracks} for name, wings in runs.items() if len(wings.load)}
         if grown:
             page.figures(
-                [(crack_paths(grown, drawings / "paths.svg", 6), "Paths (Figures 11, 12 and 14), mm.")], whole=len(grown) > 3
+                [(crack_paths(grown, drawings / "paths.svg", 6), "Paths (Figures 11, 12 and 14), mm.")],
+                whole=len(grown) > 3,
             )
         for part in parts(wings):
             part.add_to(page)

@@ -8,7 +8,7 @@ import numpy as np
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
-from geomech.reference.block_on_incline import MODES
+from geomech.reference.blocks.block_on_incline import MODES
 
 INCLINE = np.radians(30.0)
 GRAVITY = 9.81

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.reference.block_on_incline import MODES, failure_mode, toe_holds_above
+from geomech.reference.blocks.block_on_incline import MODES, failure_mode, toe_holds_above
 
 COLOURS = dict(zip(MODES, ("#8aa4a0", "#d9a441", "#c8553d", "#8d6a9f")))
 

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from geomech import ddm
-from geomech.ddm.criteria import maximum_tangential_stress
-from geomech.model import Cracks, Cycle, DdmSettings, Problem, whole_network
-from geomech.reference import rock_bridges as published
-from geomech.report.part import Part
+from geomech.ddm.fracture.criteria import maximum_tangential_stress
+from geomech.model import Cracks, Cycle, DdmSettings, Problem
+from geomech.model.cracks import whole_network
+from geomech.reference.slopes import rock_bridges as published
+from geomech.report.study_part import Part
 
 G = 9.81
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geomech.reference import toppling_slope as published
+from geomech.reference.slopes import toppling_slope as published
 
 COLOURS = {"slides": "#d9a441", "topples": "#c8553d", "stands": "#8aa4a0"}
 INK, BASE = "#2f3136", "#e6e3dc"

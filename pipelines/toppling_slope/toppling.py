@@ -8,7 +8,7 @@ import numpy as np
 
 from geomech import dda
 from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
-from geomech.reference import toppling_slope as published
+from geomech.reference.slopes import toppling_slope as published
 
 #: Stiff rock: the published calculation knows rigid blocks, and the columns lean by their elastic give.
 ROCK = Material("rock", youngs_modulus=1e11, poissons_ratio=0.25, density=2500.0)

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from geomech.model import Cycle
-from geomech.reference import roof_block as published
-from geomech.render.plots import COLOURS, figure_of
+from geomech.reference.openings import roof_block as published
+from geomech.render.curves.plots import COLOURS, figure_of
 
 #: The bridge is a fortieth of the parting, not of half-planes, and the roof above it bends a little: measured 0.1 to
 #: 0.4 %. In motion cracks answer to their block's mean stress, without the mean strain of what bends them open
-#: (`geomech.coupling.by_mean_stress`), and the roof's contacts share its load by 0.2 % otherwise: 0.3 and 0.6 %.
+#: (`geomech.coupling.crack_compliance.mean_stress_response`), and the roof's contacts share its load by 0.2 % otherwise: 0.3 and 0.6 %.
 FORCE_TOLERANCE, IN_MOTION = 0.005, 0.008
 #: The bending of the roof shears the bridge (K_II/K_I 0.05 to 0.15): it breaks at up to 1.5 (K_II/K_I)² below the load
 #: at which K_I alone would do it (`maximum tangential stress`), which statics and K_I know nothing of.

@@ -9,8 +9,8 @@ import numpy as np
 from compare_two_cracks import MPA, Watch, by_angle, coalescence_angle_deg
 from first_step import FACES, READINGS, SETTINGS, first_step
 
-from geomech.reference.two_cracks import PHI_DEG
-from geomech.report.part import Part
+from geomech.reference.specimens.two_cracks import PHI_DEG
+from geomech.report.study_part import Part
 
 #: Beginnings of variants' names that are runs of the four specimens with something else → what that is.
 FAMILIES = {

@@ -9,9 +9,10 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from geomech.model import Cracks, Cycle, Problem, whole_network
-from geomech.reference import two_cracks as published
-from geomech.report.part import Part
+from geomech.model import Cracks, Cycle, Problem
+from geomech.model.cracks import whole_network
+from geomech.reference.specimens import two_cracks as published
+from geomech.report.study_part import Part
 
 MPA = 1e6
 #: φ → load of coalescence of open slots, MPa, that finer increments tend to: found by increments of 0.25 mm that shorten

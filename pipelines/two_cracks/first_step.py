@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from geomech.pipeline import cycles
-from geomech.reference import two_cracks as published
+from geomech.reference.specimens import two_cracks as published
 from geomech.scene import load_scene
 
 #: What is compared → what it changes of the scene.

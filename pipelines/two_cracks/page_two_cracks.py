@@ -12,10 +12,10 @@ from compare_settings import FAMILIES, LADDERS, family, first_steps, of_family, 
 from compare_two_cracks import MPA, Watch, by_angle, parts
 
 from geomech.output import Run
-from geomech.reference import two_cracks as published
-from geomech.render.paths import crack_paths
-from geomech.render.studies import against
-from geomech.report.of_runs import add_compared_curves, add_ends
+from geomech.reference.specimens import two_cracks as published
+from geomech.render.curves.paths import crack_paths
+from geomech.render.curves.studies import against
+from geomech.report.comparison_page import add_compared_curves, add_ends
 from geomech.report.page import Page
 
 #: Parts of the comparison that have a figure.

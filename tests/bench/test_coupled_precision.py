@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from geomech.bench import boundary_stress, pass_tolerance
-from geomech.coupling import balance
+from geomech.bench.accuracy import boundary_stress, pass_tolerance
+from geomech.coupling import load_pass
 
 
 def test_orders_bring_the_error_down_with_tractions_of_faces_only(monkeypatch):
@@ -19,10 +19,10 @@ def test_orders_bring_the_error_down_with_tractions_of_faces_only(monkeypatch):
 
 
 def test_tighter_passes_are_more_and_nearer_to_the_answer(monkeypatch):
-    before = balance.COMPLIANCE_TOLERANCE, balance.NO_ANSWER
+    before = load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER
     monkeypatch.setattr(pass_tolerance, "TOLERANCES", (1e3, before[0], 1e-8))
     once, usual, tight = pass_tolerance.points()
-    assert (balance.COMPLIANCE_TOLERANCE, balance.NO_ANSWER) == before
+    assert (load_pass.COMPLIANCE_TOLERANCE, load_pass.NO_ANSWER) == before
     assert once.passes == pass_tolerance.STEPS < usual.passes < tight.passes
     assert once.method == pass_tolerance.ONE_PASS and tight.method == pass_tolerance.METHOD
     assert once.error > 10 * usual.error > 10 * tight.error

@@ -25,7 +25,7 @@ def one_topic(monkeypatch, tmp_path):
         return Measured.of("a table", errors={"k": 1e-3}, times={"t": 0.02})
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("geomech.cli.bench.topic", lambda name: measure)
+    monkeypatch.setattr("geomech.cli.verbs.bench.topic", lambda name: measure)
     monkeypatch.setattr(figures, "yardstick", lambda: 0.1)
     return tmp_path
 

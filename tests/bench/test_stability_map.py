@@ -2,10 +2,10 @@
 
 import pytest
 
-from geomech.bench import stability_scenes as scenes
-from geomech.bench.stability_grid import OF_BLOCKS, RIGHT, Map
+from geomech.bench.robustness import stability_scenes as scenes
+from geomech.bench.robustness.stability_grid import OF_BLOCKS, RIGHT, Map
 from geomech.model import Material
-from geomech.render.stability_map import draw
+from geomech.render.benchmarks.stability_map import draw
 
 
 def test_a_cell_tells_penetration_drift_and_cuts_and_is_drawn(tmp_path):

@@ -7,8 +7,8 @@ import pytest
 
 from geomech import ddm
 from geomech.coupling import cycles
-from geomech.coupling.balance import balanced
-from geomech.coupling.cracked_blocks import CrackedBlocks
+from geomech.coupling.coupled_state import CrackedBlocks
+from geomech.coupling.load_pass import balanced
 from geomech.model import (
     Blocks,
     Cracks,

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.bench import boundary_stress
+from geomech.bench.accuracy import boundary_stress
 from geomech.coupling import cycles
-from geomech.coupling.tractions import boundary_load
+from geomech.coupling.load_transfer.boundary_tractions import boundary_load
 from geomech.dda import EDGE_FORCE, POINT_FORCE
-from geomech.ddm.point_loads import KelvinLoad
+from geomech.ddm.kernels.point_forces import KelvinLoad
 from geomech.model import CONTACT, SLIP, Blocks, Motion
 
 CORNERS = np.array([[0.03, 0.06], [-0.03, 0.06], [-0.03, -0.06], [0.03, -0.06]])

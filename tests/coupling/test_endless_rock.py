@@ -12,8 +12,8 @@ import geomech
 from geomech import ddm
 from geomech.model import Cracks, GrowthSettings
 from geomech.output import SceneCopy
-from geomech.reference.crack_arrays import near_surface
-from geomech.reference.fracture import slanted
+from geomech.reference.cracks.crack_arrays import near_surface
+from geomech.reference.cracks.fracture import slanted
 from geomech.scene import SceneError, load_scene
 
 ROCK = """

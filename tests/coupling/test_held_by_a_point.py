@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.coupling.bodies import _check_pinches
+from geomech.coupling.load_transfer.elastic_bodies import _check_pinches
 from geomech.model import Blocks
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])

@@ -5,10 +5,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from geomech.bench.random_slopes import scene_text
-from geomech.coupling import tractions
+from geomech.bench.slopes.random_slopes import scene_text
 from geomech.coupling.cycle import Coupling
-from geomech.ddm.loads import resultants
+from geomech.coupling.load_transfer import boundary_tractions
+from geomech.ddm.loads.body_loads import resultants
 from geomech.scene import load_scene
 
 
@@ -18,9 +18,9 @@ def asked(tmp_path_factory):
     path = tmp_path_factory.mktemp("slope") / "slope.toml"
     path.write_text(scene_text(48), encoding="utf-8")
     problem, calls = load_scene(path).problem(), []
-    found = tractions.boundary_loads
+    found = boundary_tractions.boundary_loads
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tractions, "boundary_loads", lambda *given: calls.append(given) or found(*given))
+        patch.setattr(boundary_tractions, "boundary_loads", lambda *given: calls.append(given) or found(*given))
         for cycle in Coupling(problem).cycles():
             if cycle.load_step == 3:
                 break
@@ -29,7 +29,7 @@ def asked(tmp_path_factory):
 
 
 def same(a, b):
-    for of in fields(tractions.BoundaryLoad):
+    for of in fields(boundary_tractions.BoundaryLoad):
         mine, others = getattr(a, of.name), getattr(b, of.name)
         np.testing.assert_equal(mine, others)
 
@@ -37,19 +37,19 @@ def same(a, b):
 def test_loads_do_not_depend_on_what_else_is_asked_for(asked):
     """To the bit: a block's pieces, body force, even stress and imbalance are its own."""
     numbers, *rest = asked
-    together = tractions.boundary_loads(numbers, *rest)
+    together = boundary_tractions.boundary_loads(numbers, *rest)
     per_block = (4, 8, 10, 11, 12, 15)  # positions of rotation, density, acceleration, spin, reaction, overstress
     for k in range(len(numbers)):
         own = [of[k : k + 1] if at in per_block and of is not None else of for at, of in enumerate(asked)][1:]
-        same(together[k], tractions.boundary_loads(numbers[k : k + 1], *own)[0])
+        same(together[k], boundary_tractions.boundary_loads(numbers[k : k + 1], *own)[0])
 
 
 def test_what_finds_no_room_is_found_again(asked, monkeypatch):
     """Rows for which there was no room are counted, and all is found anew with as much as it takes."""
-    with_room, tried = tractions._with_room, []
-    whole = tractions.boundary_loads(*asked)
-    monkeypatch.setattr(tractions, "_with_room", lambda given, room: tried.append(room) or with_room(given, 1))
-    for mine, others in zip(whole, tractions.boundary_loads(*asked), strict=True):
+    with_room, tried = boundary_tractions._with_room, []
+    whole = boundary_tractions.boundary_loads(*asked)
+    monkeypatch.setattr(boundary_tractions, "_with_room", lambda given, room: tried.append(room) or with_room(given, 1))
+    for mine, others in zip(whole, boundary_tractions.boundary_loads(*asked), strict=True):
         same(mine, others)
     assert tried and len(whole[0].segments) > 1
 
@@ -57,7 +57,7 @@ def test_what_finds_no_room_is_found_again(asked, monkeypatch):
 def test_what_is_in_equilibrium_stays_so(asked):
     """Body force and pieces of every block have no resultant and no moment to round-off."""
     numbers, blocks = asked[:2]
-    for b, load in zip(numbers.tolist(), tractions.boundary_loads(*asked)):
+    for b, load in zip(numbers.tolist(), boundary_tractions.boundary_loads(*asked)):
         area, centroid, second = blocks.area_moments(b)
         force, moment, size = resultants(load.segments, load.tractions, centroid)
         turned = load.body_force_gradient @ second

@@ -8,7 +8,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from geomech.coupling import bodies, cycles, side_by_side
+from geomech.coupling import cycles, parallel_map
+from geomech.coupling.load_transfer import elastic_bodies
 from geomech.ddm import Body
 from geomech.model import (
     Blocks,
@@ -73,10 +74,10 @@ def results(problem: Problem) -> tuple[list[np.ndarray], dict[str, int], list[st
 
 
 def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
-    monkeypatch.setattr(bodies, "LARGE", 0)
+    monkeypatch.setattr(elastic_bodies, "LARGE", 0)
     found = {}
     for threads in (1, 2, 3):
-        monkeypatch.setattr(side_by_side, "THREADS", threads)
+        monkeypatch.setattr(parallel_map, "THREADS", threads)
         found[threads] = results(plates(friction=False))
     assert "split" in found[1][2]
     for threads in (2, 3):
@@ -90,7 +91,7 @@ def test_leaving_out_what_has_not_changed_changes_nothing(monkeypatch, friction)
     kept, work, events = results(plates(friction))
     with monkeypatch.context() as always:
         always.setattr(Body, "found_again", lambda *of: None)
-        always.setattr(bodies, "_same_question", lambda *of: False)
+        always.setattr(elastic_bodies, "_same_question", lambda *of: False)
         done, all_work, all_events = results(plates(friction))
     assert work["bodies_kept"] > work["bodies"] - 4 > 0
     assert work["solutions_kept"] > 0 and work["compliances_kept"] > 0
@@ -123,5 +124,5 @@ def test_the_first_of_several_failures_is_told():
         return item
 
     with pytest.raises(ValueError, match="2"):
-        side_by_side.side_by_side(work, list(range(5)), threads=3)
-    assert side_by_side.side_by_side(lambda k: k * k, range(4), threads=2) == [0, 1, 4, 9]
+        parallel_map.side_by_side(work, list(range(5)), threads=3)
+    assert parallel_map.side_by_side(lambda k: k * k, range(4), threads=2) == [0, 1, 4, 9]

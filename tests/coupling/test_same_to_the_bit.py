@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geomech.bench.random_slopes import scene_text
+from geomech.bench.slopes.random_slopes import scene_text
 from geomech.coupling.cycle import Coupling
-from geomech.dda.blas_threads import alike, blas_threads, limits
+from geomech.dda.linear_solver.blas_threads import alike, blas_threads, limits
 from geomech.scene import load_scene
 
 

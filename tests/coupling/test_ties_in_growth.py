@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from geomech.coupling import cycles
-from geomech.coupling.births import born_first
-from geomech.coupling.tip_speed import TipSpeed
-from geomech.ddm import initiation
+from geomech.coupling.growth.crack_birth import born_first
+from geomech.coupling.growth.tip_speed_limit import TipSpeed
+from geomech.ddm.growth import initiation
 from geomech.model import (
     TIP,
     Blocks,

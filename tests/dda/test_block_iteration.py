@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from geomech.bench import block_cost, block_iteration, block_scenes
-from geomech.bench.block_iteration import block_jacobi, factored_anew, two_levels
+from geomech.bench.cost import block_cost, block_scenes
+from geomech.bench.peers import block_iteration
+from geomech.bench.peers.block_iteration import block_jacobi, factored_anew, two_levels
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +16,7 @@ def equations():
 
 
 def test_other_solutions_are_those_of_the_direct_solver(monkeypatch, equations):
-    monkeypatch.setattr("geomech.bench.block_iteration.DOMAIN", 60)
+    monkeypatch.setattr("geomech.bench.peers.block_iteration.DOMAIN", 60)
     solver, data, right, centroid, area = equations
     expected = solver.solve(data, right)
     for found in (

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from geomech.dda.contact_states import check_states, reserves
+from geomech.dda.joint_laws.coulomb_return import check_states, reserves
 from geomech.model import OPEN, SLIP, STICK
 
 

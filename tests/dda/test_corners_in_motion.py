@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from geomech import dda
-from geomech.dda.moments import block_moments
+from geomech.dda.kinematics.simplex_integration import block_moments
 from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 ROCK = Material("rock", 10e9, 0.25, density=2600.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.dda.loads import LoadMap, generalised
+from geomech.dda.loads.load_vectors import LoadMap, generalised
 from geomech.model import (
     Blocks,
     DdaSettings,

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.bench import block_scenes
-from geomech.dda import assembly, block_solver, dissection, open_close, patches
+from geomech.bench.cost import block_scenes
 from geomech.dda import system as stepping
-from geomech.dda.block_solver import BlockSolver
-from geomech.dda.multifrontal import Factors
+from geomech.dda.linear_solver import assembly, block_solver, nested_dissection
+from geomech.dda.linear_solver.block_solver import BlockSolver
+from geomech.dda.linear_solver.multifrontal import Factors
+from geomech.dda.open_close import block_patches, iteration
 from geomech.model import Blocks, State
 
 
@@ -19,8 +20,8 @@ from geomech.model import Blocks, State
 def alive(monkeypatch):
     """As of 100 000 blocks: how many `Factors` are alive whenever some are made, and whether these are single."""
     for module, name, value in (
-        (block_solver, "SINGLE", 0), (dissection, "KEPT", 0), (assembly, "DENSE_BLOCKS", 0), (open_close, "MANY", 0),
-        (stepping, "MANY", 0), (patches, "_MOST", 0),  # of 100 000, those of a patch are none beside the others
+        (block_solver, "SINGLE", 0), (nested_dissection, "KEPT", 0), (assembly, "DENSE_BLOCKS", 0), (iteration, "MANY", 0),
+        (stepping, "MANY", 0), (block_patches, "_MOST", 0),  # of 100 000, those of a patch are none beside the others
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     made, told, factor = weakref.WeakSet(), [], Factors.factor

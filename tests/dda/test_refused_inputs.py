@@ -30,7 +30,7 @@ from geomech.model import (
     WaterTable,
     grouted_bolt,
 )
-from geomech.model.history import Wave
+from geomech.model.loads.history import Wave
 
 NAN, INF = math.nan, math.inf
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.bench.drawn_slopes import drawn, problem_of
-from geomech.bench.sliding_scenes import Slope
-from geomech.dda.contact_springs import RESOLVED, SOFTEST, penalties, resolved
+from geomech.bench.slopes.drawn_slopes import drawn, problem_of
+from geomech.bench.slopes.sliding_scenes import Slope
+from geomech.dda.joint_laws.penalty_springs import RESOLVED, SOFTEST, penalties, resolved
 from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material
 
 ROCK = Material("rock", 20e9, 0.25, density=2600.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.bench import block_scenes
-from geomech.bench.block_scenes import JOINT, ROCK, WEIGHT
-from geomech.dda import assembly
+from geomech.bench.cost import block_scenes
+from geomech.bench.cost.block_scenes import JOINT, ROCK, WEIGHT
+from geomech.dda.linear_solver import assembly
 from geomech.model import SLIP, Blocks, DdaSettings, History, JointLaw, Loads, Material, State
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geomech.dda import assembly
+from geomech.dda.linear_solver import assembly
 
 N_BLOCKS, N_CONTACTS = 30, 150
 

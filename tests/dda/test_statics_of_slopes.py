@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.bench import block_scenes
+from geomech.bench.cost import block_scenes
 from geomech.conventions import normal_of
 from geomech.model import OPEN, Bolt, JointLaw, State
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from geomech.dda.loads import LoadMap
+from geomech.dda.loads.load_vectors import LoadMap
 from geomech.model import Blocks, History, Loads, WaterTable
-from geomech.model.ground import below_ground, lowest_over, ponds
+from geomech.model.loads.ground import below_ground, lowest_over, ponds
 from geomech.scene import load_scene
-from geomech.shapes.rock_outline import ground_of
+from geomech.shapes.block_cutting.rock_outline import ground_of
 
 GAMMA = 9810.0
 #: A wedge on a plane that falls to the right, from a vertical crack at x = 10 to a face that it leaves at (50, 10).
@@ -115,8 +115,8 @@ end_time_s = 1
 
 
 def test_a_scene_says_where_water_is_ponded_and_follows_the_ground_where_asked(tmp_path):
-    from geomech.output.block_system import write_block_system
-    from geomech.render.block_map import draw_block_map
+    from geomech.output.block_model.block_system import write_block_system
+    from geomech.render.pictures.block_map import draw_block_map
 
     path = tmp_path / "slope.toml"
     path.write_text(SCENE)

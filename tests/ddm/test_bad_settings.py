@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
-from geomech.reference.fracture import THREE_ARMED_STAR
+from geomech.reference.cracks.fracture import THREE_ARMED_STAR
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=1e6)
 

@@ -11,32 +11,32 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from geomech.ddm import influence as matrices
-from geomech.ddm import shapes
-from geomech.ddm.influence import ElementSet, add_fields, influence, line_influence
+from geomech.ddm.kernels import shape_functions
+from geomech.ddm.system import influence_matrix as matrices
+from geomech.ddm.system.influence_matrix import ElementSet, add_fields, influence, line_influence
 
 NU = 0.23
 MIDDLE = (0.3125, 0.0)
 
 
 def first(kind, z):
-    if kind == shapes.ORDINARY:
+    if kind == shape_functions.ORDINARY:
         return mp.log((z + 1) / (z - 1))
-    if kind == shapes.TIP_BOTH:
+    if kind == shape_functions.TIP_BOTH:
         return mp.pi * (z - mp.sqrt(z - 1) * mp.sqrt(z + 1))
-    if kind == shapes.TIP_END:
-        return -first(shapes.TIP_START, -z)
+    if kind == shape_functions.TIP_END:
+        return -first(shape_functions.TIP_START, -z)
     v = mp.sqrt((1 + z) / 2)
     return v * mp.log((v + 1) / (v - 1)) - 2
 
 
 def moment(kind, j):
     even = 1 if j % 2 == 0 else 0
-    if kind == shapes.ORDINARY:
+    if kind == shape_functions.ORDINARY:
         return mp.mpf(2 * even) / (j + 1)
-    if kind == shapes.TIP_BOTH:
+    if kind == shape_functions.TIP_BOTH:
         return even * mp.beta(mp.mpf(j + 1) / 2, mp.mpf(3) / 2)
-    sign = (-1) ** j if kind == shapes.TIP_END else 1
+    sign = (-1) ** j if kind == shape_functions.TIP_END else 1
     # ∫ (2s − 1)^j √s 2 ds
     return sign * sum(mp.binomial(j, i) * 2**i * (-1) ** (j - i) * 2 / (i + mp.mpf(3) / 2) for i in range(j + 1))
 
@@ -103,7 +103,7 @@ def points():
     return np.array(out)
 
 
-@pytest.mark.parametrize(("kind", "force"), [*((kind, False) for kind in range(4)), (shapes.ORDINARY, True)])
+@pytest.mark.parametrize(("kind", "force"), [*((kind, False) for kind in range(4)), (shape_functions.ORDINARY, True)])
 @pytest.mark.parametrize("order", [0, 4, 5, 10])
 def test_fields_of_one_element(kind, order, force):
     """1e-10 of stress and displacement, each as a whole, from every monomial, from 1e-12 to 1e6 lengths away (worst

@@ -160,7 +160,9 @@ def test_a_solution_is_scaled_instead_of_solved_again():
         scaled = one.scaled(load.scaled(2.5), 2.5)
         points = np.array([[0.6, 0.1], [-0.3, 0.7]])
         for name in ("k_i", "k_ii"):
-            np.testing.assert_allclose(scaled.tips[name], other.tips[name], atol=1e-12 * np.abs(other.tips["k_ii"]).max())
+            np.testing.assert_allclose(
+                scaled.tips[name], other.tips[name], atol=1e-12 * np.abs(other.tips["k_ii"]).max()
+            )
         for mine, solved in zip(scaled.fields(points), other.fields(points)):
             np.testing.assert_allclose(mine, solved, rtol=1e-11)
         assert scaled.residual == pytest.approx(other.residual, rel=1e-3, abs=1e-12)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from geomech.ddm.face_laws import all_smooth
+from geomech.ddm.crack_contact.face_laws import all_smooth
 from geomech.model import JointLaw, Roughness
 
 

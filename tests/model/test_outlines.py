@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geomech.model import Blocks
-from geomech.model.polygon import crossing_edges
+from geomech.model.blocks.polygon import crossing_edges
 
 STAR = np.array([[np.cos(a), np.sin(a)] for a in np.pi / 2 + 4 * np.pi / 5 * np.arange(5)])
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from geomech.model import Blocks, Cracks, Material
-from geomech.output.interior import InteriorMeshes
+from geomech.output.vtk.interior_fields import InteriorMeshes
 from geomech.shapes import meshing
 
 

@@ -30,9 +30,13 @@ def test_joints_that_fragments_turned_into_outlines_are_counted_as_those_that_cu
     """Three joints in a square, two across it that cross, one that ends on the first: as lines, and as what
     BooleanFragments makes of them."""
     c, s = math.cos(angle), math.sin(angle)
-    points = np.array([[0, 0], [10, 0], [10, 8], [0, 8], [0, 3], [10, 5], [3, 0], [4, 8], [7, 4.4], [8, 8]], dtype=float)
+    points = np.array(
+        [[0, 0], [10, 0], [10, 8], [0, 8], [0, 3], [10, 5], [3, 0], [4, 8], [7, 4.4], [8, 8]], dtype=float
+    )
     x, y = (points @ np.array([[c, s], [-s, c]])).T
-    text = 'SetFactory("OpenCASCADE");' + "".join(f"Point({k})={{{a!r},{b!r},0}};" for k, (a, b) in enumerate(zip(x.tolist(), y.tolist()), 1))
+    text = 'SetFactory("OpenCASCADE");' + "".join(
+        f"Point({k})={{{a!r},{b!r},0}};" for k, (a, b) in enumerate(zip(x.tolist(), y.tolist()), 1)
+    )
     text += "Line(1)={1,2};Line(2)={2,3};Line(3)={3,4};Line(4)={4,1};Curve Loop(1)={1,2,3,4};Plane Surface(1)={1};"
     text += "Line(5)={5,6};Line(6)={7,8};Line(7)={9,10};"
     (tmp_path / "lines.geo").write_text(text + 'Physical Surface("rock")={1};Physical Curve("joint:j")={5,6,7};\n')

@@ -7,10 +7,20 @@ from pathlib import Path
 import numpy as np
 
 from geomech.coupling import cycles
-from geomech.model import Blocks, Cracks, DdaSettings, History, JointLaw, Loads, Material, Problem, RunSettings
+from geomech.model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+)
 from geomech.output import Run, Summary
-from geomech.output.progress import NO_ANSWER, closing_lines
-from geomech.report.of_run import key_results
+from geomech.output.console.progress import NO_ANSWER, closing_lines
+from geomech.report.run_page import key_results
 
 
 def slides(friction_deg: float) -> Problem:

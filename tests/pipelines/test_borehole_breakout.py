@@ -15,7 +15,7 @@ sys.path.insert(0, str(FOLDER))
 import compare_borehole
 from borehole import GREATER, LESSER, RADIUS, ROCK, azimuths, steps
 
-from geomech.reference.borehole import breakdown_pressure, breakout_ratio
+from geomech.reference.openings.borehole import breakdown_pressure, breakout_ratio
 
 
 def test_the_study_runs_and_is_what_was_published(tmp_path):

@@ -11,7 +11,7 @@ import pytest
 
 from geomech.cli import DONE, main
 from geomech.output import Run
-from geomech.reference import flexural_toppling as published
+from geomech.reference.slopes import flexural_toppling as published
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "flexural_toppling"
 FEW_FILES = ("--set", "output.interior=false", "--set", "output.every=1000")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from geomech.cli import DONE, main
-from geomech.reference import rock_bridges as published
+from geomech.reference.slopes import rock_bridges as published
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "joint_shear"
 sys.path.insert(0, str(FOLDER))

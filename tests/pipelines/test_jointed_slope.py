@@ -11,7 +11,7 @@ import pytest
 from geomech import load_scene
 from geomech.cli import DONE, main
 from geomech.output import Run
-from geomech.reference.base_shaking import sliding_block
+from geomech.reference.blocks.base_shaking import sliding_block
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "jointed_slope"
 sys.path.insert(0, str(FOLDER))

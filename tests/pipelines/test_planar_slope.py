@@ -11,8 +11,8 @@ import pytest
 
 from geomech.cli import DONE, main
 from geomech.output import Run
-from geomech.reference import rock_bridges as published
-from geomech.reference.rock_slopes import plane_failure_factor
+from geomech.reference.slopes import rock_bridges as published
+from geomech.reference.slopes.rock_slopes import plane_failure_factor
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "planar_slope"
 sys.path.insert(0, str(FOLDER))

@@ -14,7 +14,7 @@ from geomech import ddm, load_scene
 from geomech.cli import DONE, main
 from geomech.model import Cracks
 from geomech.output import Run
-from geomech.reference import single_flaw as published
+from geomech.reference.specimens import single_flaw as published
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "single_flaw"
 sys.path.insert(0, str(FOLDER))

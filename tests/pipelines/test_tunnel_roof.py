@@ -11,7 +11,7 @@ import pytest
 
 from geomech.cli import DONE, main
 from geomech.output import Run
-from geomech.reference import roof_block
+from geomech.reference.openings import roof_block
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "tunnel_roof"
 sys.path.insert(0, str(FOLDER))

@@ -16,8 +16,8 @@ from geomech import cycles
 from geomech.cli import DONE, main
 from geomech.model import Cracks
 from geomech.output import Run
-from geomech.reference import two_cracks as published
-from geomech.render.walls import Walls
+from geomech.reference.specimens import two_cracks as published
+from geomech.render.pictures.walls import Walls
 from geomech.scene import load_scene
 
 FOLDER = Path(__file__).parents[2] / "pipelines" / "two_cracks"

@@ -22,7 +22,7 @@ from geomech.model import (
     Problem,
     RunSettings,
 )
-from geomech.output.condition import energy_summary
+from geomech.output.tables.motion_state import energy_summary
 from geomech.report.energy_tables import BLOCKS, GIVEN, TAKEN, add_energy
 from geomech.report.page import Page
 

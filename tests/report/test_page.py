@@ -16,7 +16,7 @@ import synthetic_run as made
 from geomech.cli import BAD_INPUT, DONE, main
 from geomech.output import Histories, Run, Series, Summary
 from geomech.report import write_page
-from geomech.report.of_runs import differences
+from geomech.report.comparison_page import differences
 from geomech.report.page import Page, written
 
 #: A picture of one black pixel.

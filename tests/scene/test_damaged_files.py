@@ -11,7 +11,8 @@ import pytest
 from scene_texts import GOOD
 
 from geomech.scene import SceneError, load_scene
-from geomech.shapes import FieldFileError, GmshModelError, apart, read_field_file, read_gmsh_model
+from geomech.shapes import FieldFileError, GmshModelError, read_field_file, read_gmsh_model
+from geomech.shapes.gmsh_models import isolated_reader
 
 ROOT = Path(__file__).parents[2]
 HEAD = """
@@ -75,7 +76,7 @@ def loaded(folder: Path, suffix: str, data: bytes) -> None:
 @pytest.mark.parametrize("suffix", [".brep", ".step", ".msh", ".dxf"])
 @pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 60), marks=pytest.mark.slow)])
 def test_damaged_files_are_refused_or_read(files, tmp_path, suffix, seeds, monkeypatch):
-    monkeypatch.setattr(apart, "SECONDS", 3)
+    monkeypatch.setattr(isolated_reader, "SECONDS", 3)
     loaded(tmp_path, suffix, files[suffix])
     for seed in seeds:
         try:
@@ -88,7 +89,7 @@ def test_a_file_that_ends_its_reader_is_refused(tmp_path, monkeypatch):
     """As a missing line makes OpenCASCADE read beyond what there is."""
     path = tmp_path / "model.brep"
     path.write_bytes(b"")
-    monkeypatch.setattr(apart, "_CHILD", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    monkeypatch.setattr(isolated_reader, "_CHILD", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     with pytest.raises(GmshModelError, match=r"model\.brep cannot be read: it ends its reader \(SIGSEGV\)"):
         read_gmsh_model(path)
 
@@ -97,17 +98,17 @@ def test_a_file_that_takes_too_long_or_too_much_is_refused(files, tmp_path, monk
     path = tmp_path / "model.geo"
     (tmp_path / "part.brep").write_bytes(files[".brep"])
     path.write_text('Merge "part.brep";\nFor k In {1:1e9}\na = k;\nEndFor\n')
-    monkeypatch.setattr(apart, "SECONDS", 1)
+    monkeypatch.setattr(isolated_reader, "SECONDS", 1)
     with pytest.raises(GmshModelError, match=r"model\.geo cannot be read within 1 s of processor time"):
         read_gmsh_model(path)
     limited = "import resource; resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30)); bytearray(1 << 31)"
-    monkeypatch.setattr(apart, "_CHILD", limited)
+    monkeypatch.setattr(isolated_reader, "_CHILD", limited)
     with pytest.raises(GmshModelError, match=r"part\.brep cannot be read within 4 GiB of memory"):
         read_gmsh_model(tmp_path / "part.brep")
 
 
 def test_what_the_reader_finds_is_what_is_found_here(files, tmp_path, monkeypatch):
-    from geomech.shapes.gmsh_model import read_here
+    from geomech.shapes.gmsh_models.model_files import read_here
 
     for suffix in (".brep", ".step", ".msh"):
         path = tmp_path / f"model{suffix}"
@@ -190,6 +191,6 @@ def test_other_names_of_variants_are_as_free_as_before(tmp_path):
 def test_a_plain_script_is_read_in_this_process(tmp_path, monkeypatch):
     """Scenes with a .geo do not pay for another process."""
     (tmp_path / "model.geo").write_text(DRAWN)
-    monkeypatch.setattr(apart, "model_apart", None)
+    monkeypatch.setattr(isolated_reader, "model_apart", None)
     assert len(read_gmsh_model(tmp_path / "model.geo").zones) == 2
     assert os.environ.get("GEOMECH_TRUST_MODELS", "") in ("", "0")

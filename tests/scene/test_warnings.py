@@ -32,7 +32,10 @@ def warnings(tmp_path):
 
 
 def test_warnings_that_differ_in_names_and_numbers_are_one_line():
-    same = [Fault("a:1", f"bolt '{name}' crosses no joint at {x:g}", "mend it") for name, x in (("p", 1), ("q", -2e3), ("r", 4))]
+    same = [
+        Fault("a:1", f"bolt '{name}' crosses no joint at {x:g}", "mend it")
+        for name, x in (("p", 1), ("q", -2e3), ("r", 4))
+    ]
     other = [Fault("a:2", "bolt 's' crosses no joint at 5", "mend it"), Fault("a:1", "something else", "mend it")]
     merged = one_a_cause([*same, *other, same[0]])
     assert [fault.message for fault in merged] == [
@@ -99,7 +102,9 @@ def test_a_slope_with_a_free_back_is_told(warnings, mirrored):
 
     for base, told in ((OPEN, True), (HELD, False)):
         text = SLOPE.format(base=base)
-        found = [fault for fault in warnings(turned(text) if mirrored else text) if "back of the slope" in fault.message]
+        found = [
+            fault for fault in warnings(turned(text) if mirrored else text) if "back of the slope" in fault.message
+        ]
         assert len(found) == told
         for fault in found:
             assert "over 30 m" in fault.message and "fixed" in fault.way_out

@@ -9,8 +9,8 @@ import pytest
 from geomech.scene import load_scene
 from geomech.shapes import cut, read_field_file, read_gmsh_model
 from geomech.shapes.curves import Chords, ended_on
-from geomech.shapes.field_lines import drawing_of_lines, named_lines
 from geomech.shapes.parts import Joint, Zone
+from geomech.shapes.traces.field_lines import drawing_of_lines, named_lines
 
 #: Directions of joints about a tunnel, rad: none of them meets a corner of its chords.
 WAYS = (0.35, 0.9, 1.45, 2.0, 2.55)
@@ -27,7 +27,9 @@ def turned(points, seed: int) -> np.ndarray:
 def tunnel(seed: int, joints: bool = True) -> str:
     """A square of 24 m about a circular hole of 3 m radius, five radial joints from its wall to the rim."""
     radial = [(r * math.cos(a), r * math.sin(a)) for a in WAYS for r in (3.0, 40.0)]
-    points = turned([(0, 0), (3, 0), (0, 3), (-3, 0), (0, -3), (-12, -12), (12, -12), (12, 12), (-12, 12), *radial], seed)
+    points = turned(
+        [(0, 0), (3, 0), (0, 3), (-3, 0), (0, -3), (-12, -12), (12, -12), (12, 12), (-12, 12), *radial], seed
+    )
     text = [f"Point({k})={{{x!r},{y!r},0}};" for k, (x, y) in enumerate(points.tolist(), 1)]
     text += ["Circle(1)={2,1,3};Circle(2)={3,1,4};Circle(3)={4,1,5};Circle(4)={5,1,2};"]
     text += ["Line(5)={6,7};Line(6)={7,8};Line(7)={8,9};Line(8)={9,6};"]
@@ -102,7 +104,7 @@ def arch(seed: int) -> tuple[list, list]:
 @pytest.mark.parametrize("kind", [".geo", ".step", ".brep"])
 @pytest.mark.parametrize("seed", range(2))
 def test_an_arch_falls_apart_into_its_voussoirs(tmp_path, seed, kind):
-    from geomech.shapes.gmsh_session import gmsh_session
+    from geomech.shapes.gmsh_models.session import gmsh_session
 
     corners, joints = arch(seed)
     if kind == ".geo":
@@ -156,7 +158,9 @@ def test_dxf_curves_are_met_by_what_ends_on_them(tmp_path, seed, shape):
     document.units = 6
     space = document.modelspace()
     (centre,) = turned([(0, 0)], seed)
-    space.add_lwpolyline(turned([(-12, -12), (12, -12), (12, 12), (-12, 12)], seed), close=True, dxfattribs={"layer": "zone-rock"})
+    space.add_lwpolyline(
+        turned([(-12, -12), (12, -12), (12, 12), (-12, 12)], seed), close=True, dxfattribs={"layer": "zone-rock"}
+    )
     hole = {"layer": "hole"}
     if shape == "circle":
         space.add_circle(centre, 3, dxfattribs=hole)
@@ -188,7 +192,9 @@ def test_joints_end_on_a_curved_joint_from_either_side(tmp_path, seed):
     ways = np.array([0.5, 0.9, 1.3, 1.8, 2.2, 2.6])
     inner = [(r * math.cos(a), r * math.sin(a)) for a in ways[::2] for r in (0.5, 6.0)]
     outer = [(r * math.cos(a), r * math.sin(a)) for a in ways[1::2] for r in (6.0, 14.0)]
-    points = turned([(-8, -1), (8, -1), (8, 9), (-8, 9), (0, 0), (8, 0), (-8, 0), (6, 0), (-6, 0), *inner, *outer], seed)
+    points = turned(
+        [(-8, -1), (8, -1), (8, 9), (-8, 9), (0, 0), (8, 0), (-8, 0), (6, 0), (-6, 0), *inner, *outer], seed
+    )
     text = [f"Point({k})={{{x!r},{y!r},0}};" for k, (x, y) in enumerate(points.tolist(), 1)]
     (crown,) = turned([(0, 6)], seed).tolist()
     text += [f"Point(90)={{{crown[0]!r},{crown[1]!r},0}};Circle(9)={{8,5,90}};Circle(10)={{90,5,9}};"]

@@ -7,7 +7,7 @@ import pytest
 
 from geomech.scene import SceneError, load_scene
 from geomech.shapes import cut, read_gmsh_model
-from geomech.shapes.gmsh_session import gmsh_session
+from geomech.shapes.gmsh_models.session import gmsh_session
 
 #: A rock of 4 × 3 m with a square hole, a joint from rim to rim, one that ends in rock, and a crack.
 MODEL = """

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import geomech
-from geomech.reference import masonry, toppling_slope
+from geomech.reference.blocks import masonry
+from geomech.reference.slopes import toppling_slope
 from geomech.scene import load_scene
 from geomech.shapes import cut, read_gmsh_model
 

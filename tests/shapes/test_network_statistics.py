@@ -10,7 +10,7 @@ import pytest
 import shapely
 from scipy.stats import kstest
 
-from geomech.reference.joint_networks import (
+from geomech.reference.blocks.joint_networks import (
     cells_of_poisson_lines,
     fisher_mean_resultant,
     scan_line_spacing,
@@ -18,15 +18,15 @@ from geomech.reference.joint_networks import (
     trace_length_of_discs,
 )
 from geomech.shapes import Joint, Zone, cut
-from geomech.shapes import expected_statistics as expected
-from geomech.shapes.fracture_statistics import (
+from geomech.shapes.joint_networks import expected_statistics as expected
+from geomech.shapes.joint_networks.fracture_statistics import (
     Topology,
     block_sizes,
     line_statistics,
     passing_curve,
     set_statistics,
 )
-from geomech.shapes.joint_sets import (
+from geomech.shapes.joint_networks.joint_sets import (
     FisherAngle,
     Law,
     discs,
@@ -252,7 +252,7 @@ def test_a_parallel_set_is_as_dense_at_its_edge_as_elsewhere(spacing, deviation)
 @pytest.mark.parametrize(("law", "deviation"), [("lognormal", 8.0), ("exponential", 0.0), ("normal", 1.5)])
 def test_traces_and_gaps_are_as_persistent_at_the_edge_as_elsewhere(law, deviation):
     """The joint part of the first 2 m of each line, where the set begins, against length / (length + gap)."""
-    from geomech.shapes.joint_sets import _intervals
+    from geomech.shapes.joint_networks.joint_sets import _intervals
 
     length, gap, rng = Law(4.0, deviation, law), Law(2.0, 0.5 * deviation, law), np.random.default_rng(3)
     share = []

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import shapely
 
-from geomech.output.joint_statistics import joint_statistics
+from geomech.output.tables.joint_statistics import joint_statistics
 from geomech.scene import load_scene
 from geomech.shapes import Joint, Zone, cut
-from geomech.shapes.rock_outline import rock_of
+from geomech.shapes.block_cutting.rock_outline import rock_of
 
 MAPS = Path(__file__).parent / "maps"
 
@@ -83,7 +83,9 @@ def test_the_rock_of_many_blocks_has_no_seams():
     rng = np.random.default_rng(5)
     angle = np.linspace(0, 2 * np.pi, 60)[:-1]
     outer = np.stack([np.cos(angle), np.sin(angle)], axis=1) * rng.uniform(0.8, 1.2, 59)[:, None]
-    lines = [np.stack([p - 5 * way, p + 5 * way]) for p, way in zip(rng.uniform(-1, 1, (40, 2)), rng.normal(size=(40, 2)))]
+    lines = [
+        np.stack([p - 5 * way, p + 5 * way]) for p, way in zip(rng.uniform(-1, 1, (40, 2)), rng.normal(size=(40, 2)))
+    ]
     ring = shapely.Polygon(outer, [0.3 * outer])
     blocks = cut([Zone("rock", (outer, 0.3 * outer))], [Joint("joint:a", tuple(lines))]).blocks
     polygons = [shapely.Polygon(own[0], own[1:]) for own in map(blocks.loops, range(blocks.n_blocks))]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.estimate import factors, largest
+from geomech.ddm.fracture.tip_factors import factors, largest
 from geomech.model import Cracks, Material
-from geomech.reference import dislocations
-from geomech.reference.dislocations import Arm
+from geomech.reference.cracks import dislocations
+from geomech.reference.cracks.dislocations import Arm
 
 ROCK = Material("rock", 17e9, 0.21)
 PRESSURE = ddm.BodyLoad(crack_pressure=1.0)

@@ -7,7 +7,7 @@ import logging
 import numpy as np
 import pytest
 
-from geomech.bench.debris import DIP, LENGTH, avalanche, drum, follow
+from geomech.bench.robustness.debris import DIP, LENGTH, avalanche, drum, follow
 
 
 def checked(system, loads, seconds, caplog):

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.estimate import factors, largest
+from geomech.ddm.fracture.tip_factors import factors, largest
 from geomech.model import Cracks, DdmSettings, JointLaw, Material
-from geomech.reference import fracture, two_cracks
+from geomech.reference.cracks import fracture
+from geomech.reference.specimens import two_cracks
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 MIXED = ddm.BodyLoad(remote_stress=[0.3, 1.0, 0.4])
@@ -260,9 +261,9 @@ def test_a_blade_that_was_refused_settles():
 
 def test_faces_that_find_no_state_over_a_good_part_of_their_crack_are_refused_by_name(monkeypatch):
     """What the blade leaves undecided is a good part here as soon as it is anything."""
-    from geomech.ddm import contact
+    from geomech.ddm.crack_contact import face_contact
 
-    monkeypatch.setattr(contact, "UNDECIDED", 0.0)
+    monkeypatch.setattr(face_contact, "UNDECIDED", 0.0)
     body = blade(-0.5974489, (-2.28365, 3.879603), order=3, elements_per_crack=2, elements_per_side=2)
     with pytest.raises(ddm.NotConverged, match=r"'crack 0' beside \(-0.597449, 4\) .* over .* m: give it an aperture"):
         body.solve(pressed((-366683.0, 652447.0), (652447.0, -957072.0)))
@@ -271,12 +272,12 @@ def test_faces_that_find_no_state_over_a_good_part_of_their_crack_are_refused_by
 def test_faces_that_do_not_settle_name_the_crack_and_what_hangs_by_a_thread(monkeypatch):
     """A rough crack that leaves 0.3 mm of rock in a block of 2.5 m: what is beyond it rattles, and some loads do not
     settle."""
-    from geomech.ddm import friction
+    from geomech.ddm.crack_contact import frictional_contact
 
     rock = np.array([[10.01109119, 2.59700496], [10.98137512, 3.941], [8.71520101, 3.941], [8.5057194, 3.64990237]])
     cracks = Cracks.from_polylines([np.array([[8.66522603, 3.87155429], [9.64094426, 2.85639803]])], aperture=0.0)
     cracks = replace(cracks, surface=np.array([True, False]))
-    monkeypatch.setattr(friction, "_PASSES", 1)
+    monkeypatch.setattr(frictional_contact, "_PASSES", 1)
     settings = DdmSettings(order=3, elements_per_crack=2, elements_per_side=2)
     body = ddm.Body([rock], cracks, ROCK, settings, face_laws=(JointLaw("rough", friction_angle=0.36),))
     load = ddm.BodyLoad(remote_stress=[-1e5, -3e5, 1e5])

@@ -6,13 +6,23 @@ import numpy as np
 import pytest
 
 from geomech import dda, ddm
-from geomech.bench import fuzzed_slopes, limited_runs, seed_rows
-from geomech.bench.fuzzed_slopes import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Watched, outcome, watched
-from geomech.bench.random_slopes import scene_text
-from geomech.bench.refusals import REASONS, reason_of
-from geomech.bench.slope_invariants import INVARIANTS
+from geomech.bench.slopes import fuzzed_slopes, limited_runs, seed_rows
+from geomech.bench.slopes.fuzzed_slopes import (
+    LONG,
+    REFUSED,
+    REPORTED,
+    RIGHT,
+    VERDICTS,
+    WRONG,
+    Watched,
+    outcome,
+    watched,
+)
+from geomech.bench.slopes.random_slopes import scene_text
+from geomech.bench.slopes.refusals import REASONS, reason_of
+from geomech.bench.slopes.slope_invariants import INVARIANTS
 from geomech.coupling import Coupling
-from geomech.ddm.growth import advance
+from geomech.ddm.growth.tip_advance import advance
 from geomech.model import TIP, Blocks, Cracks, GrowthSettings, Material, Motion
 from geomech.scene import load_scene
 

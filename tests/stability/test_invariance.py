@@ -22,7 +22,7 @@ from geomech.model import (
     Problem,
     RunSettings,
 )
-from geomech.reference.two_cracks import crack_ends
+from geomech.reference.specimens.two_cracks import crack_ends
 
 W, H, OVER, THICK, CRACK = 0.03, 0.06, 0.005, 0.01, 0.01
 RATE = 0.2e6

@@ -56,9 +56,7 @@ def trough(seed: int, n: int = 9) -> tuple[dda.BlockSystem, State]:
     """Polygons that fall spinning into a trough with walls that lean."""
     rng = np.random.default_rng(seed)
     rim = np.array([[-5.5, 8.0], [-2.5, 0.0], [2.5, 0.0], [5.5, 8.0]])
-    walls = [
-        np.array([a, b, b + [0.0, -1.0], a + [0.0, -1.0]])[::-1] for a, b in itertools.pairwise(rim)
-    ]
+    walls = [np.array([a, b, b + [0.0, -1.0], a + [0.0, -1.0]])[::-1] for a, b in itertools.pairwise(rim)]
     centres = np.column_stack([np.tile([-1.4, 0.0, 1.4], n)[:n], 1.5 + 1.4 * (np.arange(n) // 3)])
     blocks = Blocks.from_polygons(
         walls + [drawn(rng, "polygon") + centre for centre in centres], fixed=[True] * 3 + [False] * n

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from geomech.bench.stability import thin_maps
-from geomech.bench.stability_grid import REFUSED, RIGHT, WRONG
+from geomech.bench.robustness.stability import thin_maps
+from geomech.bench.robustness.stability_grid import REFUSED, RIGHT, WRONG
 
 #: Maps that take long.
 LONG = ("flying in a ring, rigid", "rings in rings", "thrown on a spike, rigid", "sticks on sticks")

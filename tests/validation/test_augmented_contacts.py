@@ -20,7 +20,7 @@ from geomech.model import (
     PointLoad,
     State,
 )
-from geomech.reference import block_motion as exact
+from geomech.reference.blocks import block_motion as exact
 
 GRAVITY = 9.81
 YOUNGS_MODULUS = 10e9

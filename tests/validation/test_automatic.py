@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.automatic import for_target
-from geomech.ddm.estimate import factors, largest
+from geomech.ddm.adaptivity import for_target
+from geomech.ddm.fracture.tip_factors import factors, largest
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import fracture, two_cracks
+from geomech.reference.cracks import fracture
+from geomech.reference.specimens import two_cracks
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 MIXED = ddm.BodyLoad(remote_stress=[0.3, 1.0, 0.4])
@@ -213,7 +214,9 @@ def test_a_target_that_no_mesh_meets_is_refused():
     """Closed faces that part somewhere on an element: K gains a digit an order, not more."""
     cracks = Cracks.from_polylines([np.array([[-1, 0], [0, 0.1], [1, 0]])])
     bending = ddm.BodyLoad(remote_stress=[1.0, 0.1, -0.4])
-    with pytest.raises(ddm.TargetMissed, match=r"not to the target_error of 1.0e-11; the worst are at the tip at") as one:
+    with pytest.raises(
+        ddm.TargetMissed, match=r"not to the target_error of 1.0e-11; the worst are at the tip at"
+    ) as one:
         ddm.Body([], cracks, ROCK, DdmSettings(target_error=1e-11)).solve(bending)
     with pytest.raises(ddm.TargetMissed) as other:
         ddm.solve_to([], cracks, ROCK, bending, 1e-11)

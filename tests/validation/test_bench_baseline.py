@@ -11,17 +11,17 @@ from pathlib import Path
 
 import pytest
 
-from geomech.bench import (
-    accuracy,
-    block_cost,
+from geomech.bench.accuracy import (
     block_schemes,
     boundary_stress,
     load_steps,
     pass_tolerance,
-    stability,
+    published_values,
     work_precision,
 )
+from geomech.bench.cost import block_cost
 from geomech.bench.figures import ERROR, EXACT, TIME, Measured, changes, compared, less_accurate, read, write
+from geomech.bench.robustness import stability
 
 BASELINE = Path(__file__).parent / "bench_baseline.json"
 #: The cheap ones among the maps of stability.
@@ -38,7 +38,7 @@ def errors_of(measured):
 @pytest.mark.parametrize(
     ("topic", "measured"),
     [
-        ("accuracy", accuracy.table),
+        ("accuracy", published_values.table),
         ("boundary", errors_of(boundary_stress.quick_errors)),
         ("coupling", errors_of(pass_tolerance.errors)),
         ("dda", errors_of(block_cost.errors)),
@@ -70,7 +70,9 @@ def test_any_stored_error_that_grows_threefold_is_a_failure():
         stored = before["topics"][topic][ERROR]
         assert any(value > FAR for value in stored.values()), topic
         for worse in (name for name, value in stored.items() if 3.0 * value > EXACT):
-            now = Measured.of("", errors={name: value * (3.0 if name == worse else 1.0) for name, value in stored.items()})
+            now = Measured.of(
+                "", errors={name: value * (3.0 if name == worse else 1.0) for name, value in stored.items()}
+            )
             found = less_accurate(changes(before, {topic: now}, before["yardstick_s"]))
             assert [row.name for row in found] == [worse]
 

@@ -4,19 +4,18 @@ problems."""
 import numpy as np
 import pytest
 
-from geomech.bench import (
-    constant_elements,
+from geomech.bench.accuracy import (
     crack_accuracy,
     crack_problems,
-    finite_elements,
     growth_paths,
-    growth_run,
     precision_table,
     work_precision,
 )
-from geomech.bench.precision_table import Point, extrapolated, own_time, time_to
+from geomech.bench.accuracy.precision_table import Point, extrapolated, own_time, time_to
+from geomech.bench.cost import growth_cost
+from geomech.bench.peers import constant_elements, finite_elements
 from geomech.model import DdmSettings
-from geomech.render.work_precision import draw
+from geomech.render.benchmarks.work_precision import draw
 
 without_scikit_fem = pytest.mark.skipif(not finite_elements.available(), reason="scikit-fem is not installed")
 
@@ -86,7 +85,7 @@ def test_interaction_integrals_do_not_depend_on_their_disc():
 
 def test_growth_by_increments_gives_what_fresh_bodies_give():
     """1e-12: the matrices are the same, what differs is how they were put together."""
-    found = growth_run.measure(12)
+    found = growth_cost.measure(12)
     assert found["difference"] < 1e-12
 
 
@@ -160,7 +159,9 @@ def test_table_and_picture(tmp_path):
     for order in (2, 4):
         for n in (10, 40):
             told = {"curve": f"p = {order}", "parts": (0.01 / n, 0.02 / n)}
-            points.append(Point(growth_paths.PROBLEM, precision_table.OURS, n, 90 * n, 0.02 / n, 1e-3 * n * order, **told))
+            points.append(
+                Point(growth_paths.PROBLEM, precision_table.OURS, n, 90 * n, 0.02 / n, 1e-3 * n * order, **told)
+            )
     points += [Point(growth_paths.PROBLEM, precision_table.FEM, n, 900 * n, 0.06 / n, 1e-2 * n) for n in (10, 40)]
     goals = precision_table.goals_of(points)
     rows = {row["method"]: row for row in goals["time at one error over this solver's"]}

@@ -5,10 +5,10 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import bent_beam, cracked_hole
-from geomech.reference.brazilian_disc import whole_disc
-from geomech.reference.holes import kirsch_stress
-from geomech.reference.plates import THREE_POINT_BENDING, three_point_bending
+from geomech.reference.cracks import bent_beam, cracked_hole
+from geomech.reference.cracks.plates import THREE_POINT_BENDING, three_point_bending
+from geomech.reference.openings.holes import kirsch_stress
+from geomech.reference.specimens.brazilian_disc import whole_disc
 
 ROCK = Material("rock", youngs_modulus=10e9, poissons_ratio=0.25)
 NONE = Cracks.from_polylines([])

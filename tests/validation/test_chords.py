@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.chords import _halved_load, chord_errors, sagittas
-from geomech.ddm.estimate import factors
+from geomech.ddm.fracture.chord_error import _halved_load, chord_errors, sagittas
+from geomech.ddm.fracture.tip_factors import factors
 from geomech.model import Cracks, DdmSettings, Material
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)

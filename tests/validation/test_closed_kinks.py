@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.automatic import for_target
-from geomech.ddm.estimate import factors, largest
+from geomech.ddm.adaptivity import for_target
+from geomech.ddm.fracture.tip_factors import factors, largest
 from geomech.model import Cracks, DdmSettings, Material
 
 ROCK = Material("rock", 1.0, 0.25)

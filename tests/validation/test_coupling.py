@@ -20,7 +20,7 @@ from geomech.model import (
     Problem,
     RunSettings,
 )
-from geomech.reference.two_cracks import crack_ends
+from geomech.reference.specimens.two_cracks import crack_ends
 
 ROCK = Material("rock", 17e9, 0.21, 2200.0, 2e6)
 STEEL = Material("steel", 200e9, 0.3, 7800.0)

@@ -1,7 +1,7 @@
 """What the benchmark of coupling counts."""
 
-from geomech.bench.coupling_cost import of_wall
-from geomech.coupling.cannot_grow import STOOD
+from geomech.bench.cost.coupling_cost import of_wall
+from geomech.coupling.crack_compliance.growth_screening import STOOD
 
 
 def test_standing_cracks_cost_solutions_only():

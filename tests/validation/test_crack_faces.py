@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import SLIP, STICK, Cracks, DdmSettings, JointLaw, Material
-from geomech.reference import fracture
+from geomech.reference.cracks import fracture
 
 ROCK = Material("rock", 50e9, 0.25)
 FRICTION, COHESION = 0.4, 1e6

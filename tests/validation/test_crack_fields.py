@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.bench import crack_problems
+from geomech.bench.accuracy import crack_problems
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import crack_fields, fracture
+from geomech.reference.cracks import crack_fields, fracture
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 REMOTE = np.array([0.3e6, 1e6, 0.4e6])

@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import branched, crack_arrays
+from geomech.reference.cracks import branched, crack_arrays
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 ROOT = math.sqrt(math.pi)

@@ -1,4 +1,4 @@
-"""Blocks on a shaken base: Newmark's sliding block, Housner's rocking block; `geomech.reference.base_shaking`."""
+"""Blocks on a shaken base: Newmark's sliding block, Housner's rocking block; `geomech.reference.blocks.base_shaking`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from block_problems import GRAVITY, WEIGHT, march, moved, rectangle, settled, system_of, turned
 
 from geomech.model import BaseMotion, History, Loads, Material, State
-from geomech.reference import base_shaking as exact
+from geomech.reference.blocks import base_shaking as exact
 
 
 def shaken(times: np.ndarray, base: np.ndarray, frame: str = "base") -> Loads:
@@ -177,7 +177,9 @@ def test_rocking_loses_at_impacts_what_housner_says():
         rows = rocked(system, State.at_rest(system.blocks), WEIGHT, 1.5, dt, tilt)
         errors.append(np.abs(rows[:, 1] - np.interp(rows[:, 0], times, expected)).max() / tilt)
     order = np.log(errors[0] / errors[1]) / np.log(4)
-    print(f"rocking through two impacts, error of θ/θ₀ at dt = 8, 2 ms: {errors[0]:.3f} {errors[1]:.3f}, order {order:.1f}")
+    print(
+        f"rocking through two impacts, error of θ/θ₀ at dt = 8, 2 ms: {errors[0]:.3f} {errors[1]:.3f}, order {order:.1f}"
+    )
     # A landing takes a step, and its contact gives: first order in dt, and what the elastic block keeps of the shock.
     assert errors[1] < 0.06
     assert errors[1] < 0.5 * errors[0]

@@ -7,7 +7,7 @@ import pytest
 from block_problems import march, system_of
 
 from geomech import dda
-from geomech.dda.moments import block_moments
+from geomech.dda.kinematics.simplex_integration import block_moments
 from geomech.model import Loads, Material, State
 
 DENSITY = 2500.0

@@ -12,8 +12,8 @@ from block_problems import GRAVITY, WEIGHT, moved, rectangle, system_of, turned
 
 from geomech import dda
 from geomech.model import Material, State
-from geomech.reference import block_motion as exact
-from geomech.reference import masonry
+from geomech.reference.blocks import block_motion as exact
+from geomech.reference.blocks import masonry
 
 STONE = Material("stone", 1e11, 0.2, density=2500.0)
 

@@ -7,7 +7,7 @@ import pytest
 from block_problems import GRAVITY, WEIGHT, rectangle, turned
 
 from geomech import dda
-from geomech.dda.reduced_strength import reduced
+from geomech.dda.statics.reduced_strength import reduced
 from geomech.model import (
     GROUND,
     BaseMotion,
@@ -21,7 +21,7 @@ from geomech.model import (
     Material,
     Roughness,
 )
-from geomech.reference import rock_slopes, toppling_slope
+from geomech.reference.slopes import rock_slopes, toppling_slope
 
 DIP = np.radians(35)
 ROCK = Material("rock", 50e9, 0.0, density=2600.0)

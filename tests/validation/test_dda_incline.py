@@ -1,5 +1,5 @@
 """Blocks on an incline: held to the friction angle, sliding, stacked, toppling;
-`geomech.reference.block_on_incline`."""
+`geomech.reference.blocks.block_on_incline`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from block_problems import GRAVITY, WEIGHT, march, moved, rectangle, settled, sy
 from scipy.integrate import solve_ivp
 
 from geomech.model import JointLaw, Material, State
-from geomech.reference import block_motion
-from geomech.reference import block_on_incline as exact
+from geomech.reference.blocks import block_motion
+from geomech.reference.blocks import block_on_incline as exact
 
 SLOPE = np.radians(30)
 DOWN = -np.array([np.cos(SLOPE), np.sin(SLOPE)])

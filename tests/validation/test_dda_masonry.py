@@ -1,4 +1,4 @@
-"""Masonry that stands by its shape: arches at their limit thickness, voussoir beams; `geomech.reference.masonry`."""
+"""Masonry that stands by its shape: arches at their limit thickness, voussoir beams; `geomech.reference.blocks.masonry`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import pytest
 from block_problems import GRAVITY, WEIGHT, moved, rectangle, system_of
 
 from geomech import dda
+from geomech.dda.joint_laws.penalty_springs import PENALTY_RATIO
 from geomech.model import History, JointLaw, Loads, Material, State
-from geomech.reference import masonry
+from geomech.reference.blocks import masonry
 
 STONE = Material("stone", 1e11, 0.2, density=2500.0)
 RADIUS = 10.0
@@ -95,7 +96,7 @@ def test_beam_of_two_blocks(youngs_modulus):
     )
     state, _ = settle(system, 15)
     weight = 2500 * GRAVITY
-    spring = dda.contact_springs.PENALTY_RATIO * stone.plane_modulus
+    spring = PENALTY_RATIO * stone.plane_modulus
     thrust, sag = masonry.two_block_beam(span, thickness, weight, stone.compliance(), spring)
     got = state.contacts["normal_force"][np.isin(state.contacts["other"], (0, 1))].max()
     crown = -(state.vertices - system.blocks.vertices)[10, 1]

@@ -1,4 +1,4 @@
-"""Blocks in motion against closed forms (`geomech.reference.block_motion`)."""
+"""Blocks in motion against closed forms (`geomech.reference.blocks.block_motion`)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from geomech import dda
 from geomech.model import Blocks, DdaSettings, EdgeTraction, History, JointLaw, Loads, Material, State
-from geomech.reference import block_motion as exact
+from geomech.reference.blocks import block_motion as exact
 
 GRAVITY = 9.81
 
@@ -263,7 +263,9 @@ def test_two_stacked_blocks_slide_together_when_only_the_lower_joint_is_weak():
     state = march(system, State.at_rest(blocks), WEIGHT, 0.4, 1e-3)
     moved = (state.vertices - blocks.vertices) @ -np.array([np.cos(angle), np.sin(angle)])
     expected = 0.5 * exact.incline_acceleration(angle, np.radians(20)) * 0.4**2
-    print(f"two stacked blocks: {moved[4:8].mean() / expected - 1:.1e}, apart {moved[8:].mean() - moved[4:8].mean():.1e} m")
+    print(
+        f"two stacked blocks: {moved[4:8].mean() / expected - 1:.1e}, apart {moved[8:].mean() - moved[4:8].mean():.1e} m"
+    )
     # Elastic shear of the pair as the weight comes on: a few µm of 0.23 m.
     assert moved[4:8].mean() == pytest.approx(expected, rel=1e-4)
     assert moved[8:].mean() == pytest.approx(moved[4:8].mean(), abs=1e-5)
@@ -319,7 +321,9 @@ def test_a_wall_comes_to_rest_and_carries_its_weight():
     rows = state.contacts[state.contacts["other"] == 0]
     weight = 2600.0 * GRAVITY * 6 * 2.5
     carried = rows["normal_force"].sum() / weight - 1
-    print(f"wall at rest: weight carried {carried:+.1e}, kinetic energy {kinetic[-1] / max(kinetic):.1e} of the largest")
+    print(
+        f"wall at rest: weight carried {carried:+.1e}, kinetic energy {kinetic[-1] / max(kinetic):.1e} of the largest"
+    )
     assert rows["normal_force"].sum() == pytest.approx(weight, rel=1e-3)
     assert kinetic[-1] < 1e-3 * max(kinetic)
     assert max(kinetic[100:]) <= max(kinetic[:100])

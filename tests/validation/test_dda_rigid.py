@@ -20,7 +20,7 @@ from geomech.model import (
     Problem,
     State,
 )
-from geomech.reference import block_motion as exact
+from geomech.reference.blocks import block_motion as exact
 
 RIGID = Material("stone", 10e9, 0.25, density=2600.0, rigid=True)
 

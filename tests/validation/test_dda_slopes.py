@@ -8,7 +8,7 @@ from block_problems import GRAVITY, WEIGHT, march, moved, rectangle, settled, sy
 
 from geomech import dda
 from geomech.model import OPEN, History, JointLaw, Loads, Material, State, WaterTable
-from geomech.reference import rock_slopes, toppling_slope
+from geomech.reference.slopes import rock_slopes, toppling_slope
 
 
 def limit(stands, low: float, high: float, steps: int = 14) -> float:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.dda.contact_springs import PENALTY_RATIO
+from geomech.dda.joint_laws.penalty_springs import PENALTY_RATIO
 from geomech.model import Blocks, DdaSettings, History, JointLaw, Loads, Material, State
-from geomech.reference.block_on_springs import creep_of_a_sudden_weight
+from geomech.reference.blocks.block_on_springs import creep_of_a_sudden_weight
 
 GRAVITY, DENSITY = 9.81, 2600.0
 ROCK = Material("rock", 10e9, 0.25, density=DENSITY)

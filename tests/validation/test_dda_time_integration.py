@@ -9,8 +9,18 @@ import pytest
 
 from geomech import dda
 from geomech.conventions import rotate_stress
-from geomech.model import OPEN, Blocks, DdaSettings, History, JointLaw, Loads, Material, State, rayleigh_coefficients
-from geomech.reference import block_motion as exact
+from geomech.model import (
+    OPEN,
+    Blocks,
+    DdaSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    State,
+    rayleigh_coefficients,
+)
+from geomech.reference.blocks import block_motion as exact
 
 SCHEMES = {
     "Shi": (0.5, 1.0),

@@ -1,4 +1,4 @@
-"""Waves along a row of blocks against `geomech.reference.block_chain`: dispersion, speed, reflection, energy."""
+"""Waves along a row of blocks against `geomech.reference.blocks.block_chain`: dispersion, speed, reflection, energy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from block_problems import march, moved, rectangle, system_of
 
 from geomech import dda
 from geomech.model import JointLaw, Loads, Material, State
-from geomech.reference import block_chain as exact
+from geomech.reference.blocks import block_chain as exact
 
 E, DENSITY, JOINT = 10e9, 2600.0, 20e9  # Pa, kg/m³, Pa/m; blocks of 1 m
 CHAIN = (1.0, DENSITY, JOINT, E)  # length, mass, joint and axial stiffness

@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import crack_fields
+from geomech.reference.cracks import crack_fields
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 REMOTE = np.array([0.3e6, 1e6, 0.4e6])

@@ -7,7 +7,8 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import fracture, two_cracks
+from geomech.reference.cracks import fracture
+from geomech.reference.specimens import two_cracks
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21, density=2600.0)
 OPEN = math.inf

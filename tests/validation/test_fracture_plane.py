@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import fracture
+from geomech.reference.cracks import fracture
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 OPEN = math.inf

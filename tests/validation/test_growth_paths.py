@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import brentq
 
 from geomech import ddm
-from geomech.ddm.criteria import kink_factors, maximum_tangential_stress
+from geomech.ddm.fracture.criteria import kink_factors, maximum_tangential_stress
 from geomech.model import Cracks, DdmSettings, GrowthSettings, Material
-from geomech.reference.single_flaw import wing_horii_nemat_nasser
+from geomech.reference.specimens.single_flaw import wing_horii_nemat_nasser
 
 ROCK = Material("rock", 17e9, 0.21, k_ic=1e6)
 HALF = 10e-3

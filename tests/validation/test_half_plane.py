@@ -9,8 +9,9 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, GrowthSettings, JointLaw, Material
-from geomech.reference import crack_arrays, dislocations, fracture, holes, shallow_tunnel
-from geomech.reference.dislocations import Arm
+from geomech.reference.cracks import crack_arrays, dislocations, fracture
+from geomech.reference.cracks.dislocations import Arm
+from geomech.reference.openings import holes, shallow_tunnel
 
 ROCK = Material("rock", youngs_modulus=40e9, poissons_ratio=0.25, k_ic=1e6)
 SURFACE = ddm.HalfPlane()

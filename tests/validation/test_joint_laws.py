@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from geomech import dda
-from geomech.dda.curved_joints import rough_strength
+from geomech.dda.joint_laws.nonlinear_laws import rough_strength
 from geomech.model import (
     BlockMotion,
     Blocks,
@@ -24,7 +24,7 @@ from geomech.model import (
     Roughness,
     State,
 )
-from geomech.reference import block_motion, joints
+from geomech.reference.blocks import block_motion, joints
 
 YOUNGS_MODULUS, POISSON = 50e9, 0.25
 #: Two penalty springs hold the block on the joint.

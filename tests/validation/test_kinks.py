@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.criteria import CRITERIA, kink_factors
+from geomech.ddm.fracture.criteria import CRITERIA, kink_factors
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import branched
+from geomech.reference.cracks import branched
 
 ROCK = Material("rock", 1e10, 0.25)
 

@@ -20,8 +20,8 @@ from geomech.model import (
     Problem,
     RunSettings,
 )
-from geomech.reference.plates import CENTRE_CRACK_PLATE
-from geomech.reference.two_cracks import crack_ends
+from geomech.reference.cracks.plates import CENTRE_CRACK_PLATE
+from geomech.reference.specimens.two_cracks import crack_ends
 
 ROCK = Material("rock", 17e9, 0.21, 2200.0, 1e6)
 STIFF = Material("stiff", 200e9, 0.3, 7800.0, rigid=True)

@@ -7,7 +7,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import crack_arrays
+from geomech.reference.cracks import crack_arrays
 
 ROCK = Material("rock", youngs_modulus=10e9, poissons_ratio=0.25)
 

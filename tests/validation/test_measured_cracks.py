@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm.criteria import CRITERIA
+from geomech.ddm.fracture.criteria import CRITERIA
 from geomech.model import Cracks, GrowthSettings, JointLaw, Material
-from geomech.reference import slanted_crack as plates
-from geomech.reference.single_flaw import wing_horii_nemat_nasser
+from geomech.reference.specimens import slanted_crack as plates
+from geomech.reference.specimens.single_flaw import wing_horii_nemat_nasser
 
 PLEXIGLAS = Material("plexiglas", 3e9, plates.POISSONS_RATIO, k_ic=1e6)
 ROCK = Material("rock", 17e9, 0.21, k_ic=1e6)
@@ -88,6 +88,6 @@ def test_wings_of_a_closed_crack_with_friction_grow_into_the_load():
         )
     assert steps[0].tips["angle"] == pytest.approx(math.acos(1 / 3), abs=0.02)
     assert (np.diff(loads) > 0).all()
-    # The path is smooth and so are its chords, though κ of `ddm.path` rises to 7.
+    # The path is smooth and so are its chords, though κ of `ddm.growth.path_correction` rises to 7.
     assert (np.diff(directions) < 0).all() and directions[-1] == pytest.approx(90, abs=3)
     assert ratios[2] == pytest.approx(1.0, abs=0.06) and ratios[-1] == pytest.approx(0.6, abs=0.03)

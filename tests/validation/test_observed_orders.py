@@ -13,7 +13,7 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, JointLaw, Material
-from geomech.reference import boundary_collocation, branched, crack_arrays, fracture, plates
+from geomech.reference.cracks import boundary_collocation, branched, crack_arrays, fracture, plates
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 ORDERS = (2, 4, 6, 8)

@@ -7,7 +7,8 @@ import pytest
 
 from geomech import ddm
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import boundary_collocation, brazilian_disc, crack_arrays, cracked_hole, fracture, plates
+from geomech.reference.cracks import boundary_collocation, crack_arrays, cracked_hole, fracture, plates
+from geomech.reference.specimens import brazilian_disc
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 
@@ -121,7 +122,9 @@ def test_brazilian_disc(ratio, degrees):
     errors = [np.abs(k - exact).max() / math.sqrt(ratio / math.pi) for k in (*found, limit)]
     order = np.log2(errors[0] / errors[1])
     listed = ", ".join(f"{e:.1e}" for e in errors)
-    print(f"Brazilian disc a/R {ratio}, {degrees}°: with {sizes} facets and extrapolated {listed}, observed order {order:.2f}")
+    print(
+        f"Brazilian disc a/R {ratio}, {degrees}°: with {sizes} facets and extrapolated {listed}, observed order {order:.2f}"
+    )
     assert 1.9 < order < 2.1 and errors[2] < 3e-4
 
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from geomech import ddm
-from geomech.ddm import shapes
+from geomech.ddm.kernels import shape_functions
 from geomech.model import Cracks, DdmSettings, Material
-from geomech.reference import fracture
+from geomech.reference.cracks import fracture
 
 ROCK = Material("rock", youngs_modulus=17e9, poissons_ratio=0.21)
 PAPER = {"order": 2, "nodes": "equal"}
@@ -26,9 +26,9 @@ def test_shape_functions_are_the_published_ones():
     + 2)/8 with nodes at −2, 0 and 2, ξ in sub-element half lengths; the tip element carries √r, r√r and r²√r."""
     xi = np.linspace(-3, 3, 13)
     published = np.column_stack([xi * (xi - 2) / 8, -(xi**2 - 4) / 4, xi * (xi + 2) / 8])
-    assert np.allclose(shapes.at("equal", 2, shapes.ORDINARY, xi / 3), published, atol=1e-14)
+    assert np.allclose(shape_functions.at("equal", 2, shape_functions.ORDINARY, xi / 3), published, atol=1e-14)
     r = np.linspace(0.01, 2, 9)
-    tip = shapes.at("equal", 2, shapes.TIP_START, r - 1)
+    tip = shape_functions.at("equal", 2, shape_functions.TIP_START, r - 1)
     basis = np.column_stack([r**0.5, r**1.5, r**2.5])
     fitted = np.linalg.lstsq(basis, tip, rcond=None)[0]
     assert np.abs(basis @ fitted - tip).max() < 1e-13

@@ -25,7 +25,7 @@ from geomech.model import (
     Material,
     State,
 )
-from geomech.reference import rock_slopes
+from geomech.reference.slopes import rock_slopes
 
 ROCK = Material("rock", 20e9, 0.25, density=2600.0)
 GEOMETRY = Path(__file__).parents[2] / "geometry"
@@ -55,7 +55,15 @@ def above_a_floor(drop: float, **way) -> tuple[Blocks, Loads]:
 
 @pytest.mark.parametrize(
     ("drop", "way"),
-    [(0.0, {}), (0.0, {"mirror": True}), (0.01, {"turn": 0.3}), (0.1, {}), (0.5, {}), (0.7, {"mirror": True}), (3.0, {})],
+    [
+        (0.0, {}),
+        (0.0, {"mirror": True}),
+        (0.01, {"turn": 0.3}),
+        (0.1, {}),
+        (0.5, {}),
+        (0.7, {"mirror": True}),
+        (3.0, {}),
+    ],
 )
 def test_a_floor_below_the_plane_holds_nothing(drop, way):
     blocks, loads = above_a_floor(drop, **way)
@@ -151,7 +159,8 @@ def test_sharp_toes_in_the_corner_of_a_bilinear_plane(steep_deg, flat_deg, cohes
     assert found.factor == pytest.approx(low, rel=2e-3)
     if not cohesion:
         assert low == pytest.approx(
-            math.tan(friction) / math.tan(rock_slopes.two_block_friction((weight[1], steep), (weight[0], flat))), rel=1e-6
+            math.tan(friction) / math.tan(rock_slopes.two_block_friction((weight[1], steep), (weight[0], flat))),
+            rel=1e-6,
         )
         assert found.other_factor > 1.1 * low
     assert {toe.block for toe in found.toes} == {2}

@@ -6,17 +6,17 @@ import math
 import numpy as np
 import pytest
 
-from geomech.ddm.criteria import kink_factors
-from geomech.reference import (
+from geomech.ddm.fracture.criteria import kink_factors
+from geomech.reference.cracks import (
     boundary_collocation,
     branched,
-    brazilian_disc,
     crack_arrays,
     cracked_hole,
     fracture,
     plates,
 )
-from geomech.reference.dislocations import Arm, stress_intensity
+from geomech.reference.cracks.dislocations import Arm, stress_intensity
+from geomech.reference.specimens import brazilian_disc
 
 
 def uniform(*stress):

@@ -110,8 +110,9 @@ class DdaTable(Table):
 
 class DdmTable(Table):
     target_error: Annotated[float, Field(gt=0, lt=1)] | None = Field(
-        None, description="relative error of K asked for; order, elements and grading then follow from it, every solution is "
-        "compared with that of a finer mesh, and a run ends where no mesh meets it"
+        None,
+        description="relative error of K asked for; order, elements and grading then follow from it, every solution is "
+        "compared with that of a finer mesh, and a run ends where no mesh meets it",
     )
     order: Annotated[int, Field(ge=0, le=12)] = Field(4, description="polynomial order of the elements")
     nodes: Literal["chebyshev", "gauss", "equal"] = Field("chebyshev", description="collocation points of an element")

@@ -1,0 +1,1 @@
+"""Benchmarks of accuracy: run time against error, and published values."""

@@ -1,0 +1,1 @@
+"""Benchmarks of cost: what steps, kernels, growth, output and start-up take."""

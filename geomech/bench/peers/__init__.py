@@ -1,0 +1,1 @@
+"""Other methods that the solvers are compared with."""

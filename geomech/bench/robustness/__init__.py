@@ -1,0 +1,1 @@
+"""Where the solvers stay right: maps over contrasts, slivers, steps and speeds."""

@@ -1,0 +1,110 @@
+"""A grid of small scenes with a reference each, and what became of them.
+
+Every cell is right (within the bound said), refused with a reason, reported (beyond the bound, and a warning says so),
+or wrong.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+from ... import dda
+from .stability_scenes import Outcome
+
+RIGHT, REPORTED, REFUSED, WRONG = "right", "reported", "refused", "wrong"
+
+#: What cells of blocks, and of cracks, tell besides their error.
+OF_BLOCKS = {
+    "penetration": "worst penetration, over the block's size",
+    "drift": "energy drift, over all that was turned over",
+    "cuts": "steps cut",
+}
+OF_CRACKS = {"condition": "condition number", "residual": "residual"}
+QUANTITIES = {**OF_CRACKS, **OF_BLOCKS}
+
+
+@dataclass(frozen=True)
+class Cell:
+    map: str
+    row: str
+    column: str
+    verdict: str
+    error: float
+    penetration: float
+    gain: float
+    drift: float
+    cuts: float
+    condition: float
+    residual: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Map:
+    """A grid of scenes: ``scene(row, column)`` for every pair of values; right where its error is below ``bound``."""
+
+    title: str
+    measure: str
+    row_name: str
+    rows: Sequence[float]
+    column_name: str
+    columns: Sequence[float]
+    bound: float
+    scene: Callable[[float, float], Outcome]
+
+    def cells(self) -> Iterator[Cell]:
+        for row in self.rows:
+            for column in self.columns:
+                verdict, found, reason = self._judged(row, column)
+                yield Cell(self.title, f"{row:g}", f"{column:g}", verdict, **asdict(found), reason=reason)
+
+    def _judged(self, row: float, column: float) -> tuple[str, Outcome, str]:
+        heard = _Warnings()
+        log = logging.getLogger("geomech")
+        log.addHandler(heard)
+        try:
+            found = self.scene(row, column)
+        except (ValueError, dda.NotConverged) as refusal:
+            return REFUSED, Outcome(math.nan), str(refusal)
+        finally:
+            log.removeHandler(heard)
+        if found.error <= self.bound:
+            return RIGHT, found, ""
+        return (REPORTED, found, heard.first) if heard.first else (WRONG, found, "")
+
+
+class _Warnings(logging.Handler):
+    """Keeps the first warning it hears."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.first = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.first = self.first or record.getMessage()
+
+
+def table(grid: Map, cells: Sequence[Cell]) -> Iterator[str]:
+    yield f"{grid.title}: {grid.measure} (right below {grid.bound:g}); {grid.row_name} down, {grid.column_name} across"
+    yield " " * 10 + "".join(f"{value:>11g}" for value in grid.columns)
+    for k, row in enumerate(grid.rows):
+        mine = cells[k * len(grid.columns) : (k + 1) * len(grid.columns)]
+        marks = (
+            f"{c.error:.1e}" + ("!" if c.verdict == WRONG else "") if c.verdict != REFUSED else "refused" for c in mine
+        )
+        yield f"{row:>10g}" + "".join(f"{mark:>11}" for mark in marks)
+    for verdict in (REFUSED, REPORTED):
+        for reason in sorted({c.reason for c in cells if c.verdict == verdict})[:2]:
+            yield f"    {verdict}: {reason}"
+    ran = [c for c in cells if c.verdict != REFUSED]
+    told = []
+    for quantity, name in QUANTITIES.items():
+        known = [value for value in (getattr(c, quantity) for c in ran) if not math.isnan(value)]
+        if known and quantity == "cuts":
+            told.append(f"{sum(known):g} steps cut")
+        elif known:
+            told.append(f"{name.split(',')[0]} {max(known):.1e}")
+    yield "    largest " + ", ".join(told)

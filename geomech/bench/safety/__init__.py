@@ -1,0 +1,1 @@
+"""Random slopes with a known factor of safety."""

@@ -1,0 +1,85 @@
+"""The reasons for which a slope may be refused. What is refused with any other message is counted as wrong."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ... import dda, ddm
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Errors of ``kind`` whose message has ``pattern``: ``name`` in tables and pictures, ``meaning`` in a sentence;
+    ``drawn``: only before anything has moved or grown."""
+
+    name: str
+    kind: type[Exception]
+    pattern: str
+    meaning: str
+    drawn: bool = False
+
+
+REASONS = (
+    Reason(
+        "sharp corner drawn",
+        ValueError,
+        r"meet at \(\S+, \S+\) at less than 10°|folds back on itself|leaves the boundary at \(\S+, \S+\) at less than "
+        r"3°",
+        "cracks as cut meet each other or a surface too sharply to be resolved: they are named, with the place",
+        drawn=True,
+    ),
+    Reason(
+        "in-situ stress not found",
+        dda.NoInSituEquilibrium,
+        r"after \d+ (steps|cuts)",
+        "the search for rest under the stress asked for did not end: force out of balance, or contact, are named",
+    ),
+    Reason(
+        "contact states not found",
+        dda.NotConverged,
+        r"the block step at t = \S+ s failed after \d+ cuts",
+        "contacts find no consistent states at any length of the step: the contact, or how far a vertex moves, is "
+        "named",
+    ),
+    Reason(
+        "block crushed",
+        dda.NotConverged,
+        r"is crushed to nothing at t = ",
+        "a block's loads are beyond its stiffness: it would have no area",
+    ),
+    Reason(
+        "strained beyond elasticity",
+        dda.NotConverged,
+        r"is strained by \S+ % at t = \S+ s: no linear elastic body",
+        "a block that hangs by a thread, or is loaded beyond its stiffness, is no linear elastic body: it is named",
+    ),
+    Reason(
+        "rock that holds by a point",
+        dda.NotConverged,
+        r"cracks leave rock that holds by a single point at \(",
+        "a splinter has come loose inside a block at its very surface: the block and the place are named",
+    ),
+    Reason(
+        "no common strain",
+        dda.NotConverged,
+        r"find no common strain in \d+ passes",
+        "blocks and the cracks in them agree on no strain at any length of the step: the blocks are named",
+    ),
+    Reason(
+        "crack faces not found",
+        ddm.NotConverged,
+        r"crack faces did not settle|are open in no state that holds",
+        "the faces of a block's cracks find no consistent states: the block is named",
+    ),
+)
+
+
+def reason_of(error: Exception, begun: bool = True) -> str | None:
+    """The name of the reason that ``error`` gives, before or (``begun``) after the first cycle; None: it is none of
+    `REASONS`."""
+    for reason in REASONS:
+        fits = type(error) is reason.kind and not (begun and reason.drawn)
+        if fits and re.search(reason.pattern, str(error)):
+            return reason.name
+    return None

@@ -1,0 +1,68 @@
+"""Rows of many seeds, one a line of a file: seeds that the same program has run before are not run again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+#: Parts of the package that a slope's run depends on.
+PARTS = ("model", "shapes", "scene", "dda", "ddm", "coupling")
+
+
+def rows_of_seeds(
+    seeds: Sequence[int],
+    path: Path,
+    work: Callable[[int], dict[str, Any]],
+    of: str,
+    start: Callable[[], None] | None = None,
+    workers: int | None = None,
+) -> list[dict[str, Any]]:
+    """``work`` of each of the ``seeds``, a row with "seed", in their order; one on each core (``workers``).
+
+    Rows are kept in ``path`` with ``of``, the digest of the program (`program`) and of what else they depend on.
+    ``start`` runs first in each worker, as to compile kernels. ``work`` and ``start`` are pickled.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    known = {row["seed"]: row for row in read_rows(path) if row.get("program") == of}
+    missing = [seed for seed in seeds if seed not in known]
+    if missing:
+        # BLAS with a thread on every core in each worker would make the slopes wait for one another.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        spawn = multiprocessing.get_context("spawn")
+        cores = workers or len(os.sched_getaffinity(0))
+        with ProcessPoolExecutor(cores, spawn, start) as pool, path.open("a") as out:
+            for done in as_completed([pool.submit(work, seed) for seed in missing]):
+                row = done.result() | {"program": of}
+                known[row["seed"]] = row
+                out.write(json.dumps(row) + "\n")
+                out.flush()
+    return [known[seed] for seed in seeds]
+
+
+def program(modules: Iterable[str], also: str = "") -> str:
+    """A digest of the sources that a slope's run depends on, of these ``modules`` of the benchmarks, and of what
+    ``also`` says."""
+    package, digest = Path(__file__).parents[2], hashlib.sha256(also.encode())
+    here = [path for name in modules for path in sorted((package / "bench").rglob(f"{name}.py"))]
+    for path in [*here, *sorted(path for part in PARTS for path in (package / part).rglob("*.py"))]:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def read_rows(path: Path) -> Iterator[dict[str, Any]]:
+    """The rows of a file; lines that were cut off as they were written are left out."""
+    if not path.exists():
+        return
+    for line in path.read_text(encoding="utf-8").splitlines():
+        try:
+            row = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        if isinstance(row, dict) and "seed" in row:
+            yield row

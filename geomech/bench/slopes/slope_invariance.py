@@ -1,0 +1,396 @@
+"""Random slopes (`random_slopes`) run again where nothing of the outcome may change: in shorter steps, mirrored,
+rotated, shifted, with joints listed in another order, and with noise on the vertices.
+
+Joints are drawn once (`drawn_slopes`), so that all variants have the same blocks. Over the whole run in steps of dt,
+dt/2 and dt/4, the moved share of the rock and the work of gravity on it (`moved_mass`) are compared. Over the first
+steps, with friction as drawn and without any, every block's displacement and the energies are compared with those of
+the slope as drawn. A slope is `RIGHT`, `REPORTED` (beyond a bound, and a warning of one of the two runs compared says
+that its result is not to be relied on), `REFUSED` (as drawn already, for a named reason), `LONG` (some run was not
+finished, the others agree) or `WRONG`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ...model import Problem
+from ...output.tables.summary import write_json
+from ..figures import Measured
+from .drawn_slopes import (
+    Isometry,
+    Scene,
+    can_be_moved,
+    drawn,
+    frictionless,
+    moved,
+    problem_of,
+    reordered,
+    with_noise,
+)
+from .limited_runs import LONG, REFUSED, REPORTED, RIGHT, VERDICTS, WRONG, Ended, Heard, limited
+from .moved_mass import BlockDisplacements, moving_from
+from .random_slopes import scene_text
+from .seed_rows import program, rows_of_seeds
+from .slope_invariants import INVARIANTS
+
+#: Processor seconds that each of the runs of a slope may take.
+LIMIT = 30.0
+#: Where the rows, the JSON and the picture go.
+FOLDER = Path("outputs/bench_slopes")
+#: The step is divided by these.
+DIVISIONS = (1, 2, 4)
+#: Steps over which variants of the geometry are compared, and s, the step of those without friction: blocks then fall
+#: by some 0.4 mm, against which 1e-12 of the extent is below a tenth of the bound.
+FIRST, FRICTIONLESS_STEP = 3, 3e-3
+#: Works are compared over the larger of what gravity does, and what it would do on this share of the rock over the
+#: displacement from which rock counts as moving: what does next to nothing is not magnified.
+LEAST_SHARE = 0.01
+#: Of a vertex, over the extent of the blocks: round-off of coordinates.
+NOISE = 1e-12
+#: Centroids of a block in two variants are nearer to each other than this share of the extent: parts of a block that
+#: cracks have cut lie where the cracks run, and how far apart is compared.
+SAME_BLOCK = 1e-2
+#: m: how far a shifted slope lies from where it was drawn.
+FAR = 1e4
+
+VARIANTS: dict[str, Isometry | None] = {
+    "mirror": Isometry.mirrored(),
+    "rotation": Isometry.rotated(math.radians(10)),
+    "shift": Isometry.shifted((FAR, FAR)),
+    "order": None,
+    "noise": None,
+}
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What a quantity may differ by, and what it is relative to."""
+
+    bound: float
+    meaning: str
+
+
+BOUNDS = {
+    "share, dt": Bound(3e-2, "moved share of the rock in steps of dt and dt/2, off that in steps of dt/4"),
+    "work, dt": Bound(3e-2, "the same of the work of gravity on what moves, over the latter"),
+    **{
+        f"{name}{label}": Bound(bound, f"{meaning}{of}: displacement of any block over the largest, or energy")
+        for label, bound, of in ((", friction", 1e-3, ""), (", smooth", 1e-6, ", without friction"))
+        for name, meaning in (
+            ("mirror", "mirrored"),
+            ("rotation", "rotated by 10°"),
+            ("shift", f"shifted by {FAR:g} m each way"),
+            ("order", "joints listed in another order"),
+            ("noise", f"noise of {NOISE:g} of the extent on every vertex"),
+        )
+    },
+}
+#: Words of warnings by which a run says that its result is not to be relied on.
+WARNED = ("nothing holds", *sorted({words for invariant in INVARIANTS.values() for words in invariant.told}))
+_MODULES = (
+    "drawn_slopes", "limited_runs", "moved_mass", "random_slopes", "refusals", "slope_invariance", "slope_invariants",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Invariance:
+    """What became of a ``seed``: ``moved`` share of the rock and ``work`` of gravity, J/m, in steps of dt, dt/2 and
+    dt/4 (nan: not finished); ``scatter`` by name of a `Bound`; ``faults`` (in silence) and ``reported`` (a warning says
+    so) as lines; ``left_out``: variants that were not compared, and why."""
+
+    seed: int
+    verdict: str
+    blocks: int = 0
+    threshold: float = 0.0
+    moved: tuple[float, ...] = ()
+    work: tuple[float, ...] = ()
+    scatter: dict[str, float] = field(default_factory=dict)
+    faults: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    reason: str = ""
+    seconds: float = 0.0
+
+    @property
+    def worst(self) -> dict[str, float]:
+        """As the picture asks for it."""
+        return self.scatter
+
+    @property
+    def why(self) -> str:
+        return "; ".join((*self.faults, *self.reported, *self.left_out)[:2])
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """How a run ``ended``, and where it has brought the blocks: None if it did not come to its end."""
+
+    ended: Ended
+    at: BlockDisplacements | None = None
+    energies: np.ndarray | None = None  # J/m: work of gravity; kinetic, elastic, contact energy
+
+    @property
+    def warned(self) -> bool:
+        return any(words in line for line in self.ended.warnings for words in WARNED)
+
+    @property
+    def how(self) -> str:
+        what = self.ended.reason or self.ended.message.strip().rpartition("\n")[2]
+        return f"{self.ended.verdict}: {what}"
+
+
+def invariance(seed: int, seconds: float = LIMIT, text: str | None = None) -> Invariance:
+    """The slope of a ``seed`` (or of ``text``) in all variants, each run for at most so many processor ``seconds``."""
+    try:
+        scene = drawn(scene_text(seed) if text is None else text)
+        first = problem_of(scene)
+    except ValueError as error:
+        refusal = error
+        ended = limited(lambda heard: _raise(refusal), seconds)
+        return Invariance(seed, ended.verdict, reason=ended.reason or ended.message.strip())
+    compared = _Compared(seed, scene, seconds)
+    threshold = moving_from(first)
+    compared.steps(first, threshold)
+    if compared.refused:
+        return compared.outcome(first, threshold)
+    dt = first.dda.time_step
+    compared.geometry(scene, FIRST * dt, ", friction")
+    compared.geometry(frictionless(scene, FRICTIONLESS_STEP), FIRST * FRICTIONLESS_STEP, ", smooth")
+    return compared.outcome(first, threshold)
+
+
+class _Compared:
+    """The runs of a slope, as they are compared one by one."""
+
+    def __init__(self, seed: int, scene: Scene, seconds: float) -> None:
+        self.seed, self.scene, self.seconds = seed, scene, seconds
+        self.scatter: dict[str, float] = {}
+        self.faults: list[str] = []
+        self.reported: list[str] = []
+        self.left_out: list[str] = []
+        self.moved: list[float] = []
+        self.work: list[float] = []
+        self.refused = ""
+        self.long = False
+        self.spent = 0.0
+
+    def steps(self, first: Problem, threshold: float) -> None:
+        """The whole run in steps of dt, dt/2 and dt/4."""
+        runs = []
+        for division in DIVISIONS:
+            run = self._run(replace(first, dda=replace(first.dda, time_step=first.dda.time_step / division)))
+            if run.ended.verdict == REFUSED and division == DIVISIONS[0]:
+                self.refused = run.ended.reason
+                return
+            runs.append(run)
+            self.moved.append(math.nan if run.at is None else run.at.share(threshold))
+            self.work.append(math.nan if run.at is None else run.at.work(threshold))
+        finest = runs[-1]
+        for division, run, share, work in zip(DIVISIONS[:-1], runs, self.moved, self.work):
+            label = "dt" if division == 1 else f"dt/{division}"
+            if not self._both(f"steps of {label}", run, finest):
+                continue
+            least = LEAST_SHARE * finest.at.weight() * threshold
+            self._take("share, dt", abs(share - self.moved[-1]), label, run, finest)
+            self._take("work, dt", abs(work - self.work[-1]) / max(abs(self.work[-1]), least), label, run, finest)
+
+    def geometry(self, scene: Scene, end: float, label: str) -> None:
+        """The first steps of ``scene``, until ``end`` s, as drawn and in every variant."""
+        base_problem = _until(problem_of(scene), end)
+        base = self._run(base_problem)
+        for name, by in VARIANTS.items():
+            rng = np.random.default_rng([self.seed, len(name)])
+
+            if by is not None and not can_be_moved(scene, by):
+                self._leave_out(f"{name}{label}: water lies level")
+                continue
+            if name == "noise":
+                problem = with_noise(base_problem, NOISE, rng)
+            else:
+                problem = _until(problem_of(reordered(scene, rng) if by is None else moved(scene, by)), end)
+            run = self._run(problem)
+            if not self._both(f"{name}{label}", base, run):
+                continue
+            off = _difference(base, run, by or Isometry())
+            if off is None:
+                self._fault(f"{name}{label}: other blocks", base, run)
+            else:
+                self._take(f"{name}{label}", off, "", base, run)
+
+    def outcome(self, first: Problem, threshold: float) -> Invariance:
+        verdict = RIGHT
+        if self.refused:
+            verdict = REFUSED
+        elif self.faults:
+            verdict = WRONG
+        elif self.reported:
+            verdict = REPORTED
+        elif self.long:
+            verdict = LONG
+        return Invariance(
+            self.seed, verdict, int((~first.blocks.fixed).sum()), threshold, tuple(self.moved), tuple(self.work),
+            self.scatter, tuple(self.faults), tuple(self.reported), tuple(self.left_out), self.refused, self.spent,
+        )  # fmt: skip
+
+    def _run(self, problem: Problem) -> _Run:
+        from ...coupling import cycles
+
+        last = None
+
+        def run(heard: Heard) -> Iterator[None]:
+            nonlocal last
+            for last in cycles(problem):
+                yield
+
+        ended = limited(run, self.seconds)
+        self.spent += ended.seconds
+        self.long |= ended.verdict == LONG
+        if ended.verdict != RIGHT or last is None:
+            return _Run(ended)
+        told = last.statistics
+        energies = [told.get(f"{name}_energy", 0.0) for name in ("kinetic", "elastic", "contact")]
+        at = BlockDisplacements.of(problem, last.blocks, last.state)
+        return _Run(ended, at, np.array([told.get("gravity_work", 0.0), *energies]))
+
+    def _both(self, what: str, one: _Run, other: _Run) -> bool:
+        """Whether both came to their end; one refused, or in error, where the other is not, is told of."""
+        ends = {run.ended.verdict for run in (one, other)}
+        if ends == {RIGHT}:
+            return True
+        if LONG in ends:
+            self._leave_out(f"{what}: not finished in {self.seconds:g} s")
+        elif WRONG in ends:
+            self.faults.append(f"{what}: {(one if one.ended.verdict == WRONG else other).how}")
+        elif RIGHT in ends:
+            self.reported.append(f"{what}: one {(one if one.ended.verdict == REFUSED else other).how}")
+        else:
+            self._leave_out(f"{what}: both refused")
+        return False
+
+    def _leave_out(self, what: str) -> None:
+        self.left_out.append(what)
+
+    def _take(self, name: str, value: float, where: str, *runs: _Run) -> None:
+        self.scatter[name] = max(self.scatter.get(name, 0.0), value)
+        if not value <= BOUNDS[name].bound:
+            self._fault(f"{name} {value:.2g}{f' ({where})' if where else ''}", *runs)
+
+    def _fault(self, what: str, *runs: _Run) -> None:
+        (self.reported if any(run.warned for run in runs) else self.faults).append(what)
+
+
+def _raise(error: Exception) -> Iterator[None]:
+    raise error
+    yield
+
+
+def _until(problem: Problem, end: float) -> Problem:
+    return replace(problem, run=replace(problem.run, end_time=end))
+
+
+def _difference(base: _Run, run: _Run, by: Isometry) -> float | None:
+    """The largest difference of a block's displacement over the largest displacement, of its place over the extent, or
+    of an energy over the largest energy, whichever is most; None: they are not the same blocks."""
+    from scipy.spatial import cKDTree
+
+    one, other = base.at, run.at
+    if len(one.area) != len(other.area):
+        return None
+    extent = float(np.ptp(one.centre, axis=0).max()) + math.sqrt(float(one.area.max()))
+    distance, at = cKDTree(by.back(other.centre)).query(one.centre)
+    if len(set(at.tolist())) < len(at) or not (distance < SAME_BLOCK * extent).all():
+        return None
+    back = other.displacement[at] @ by.matrix
+    off = np.hypot(*(back - one.displacement).T).max(), np.abs(run.energies - base.energies).max()
+    size = np.hypot(*one.displacement.T).max(), np.abs(base.energies).max()
+    shares = [float(each / of) if of > 0 else 0.0 for each, of in zip(off, size)]
+    return max(*shares, float(distance.max()) / extent)
+
+
+def measure_invariance(
+    seeds: Sequence[int], seconds: float = LIMIT, folder: Path = FOLDER, workers: int | None = None
+) -> Measured:
+    """Every one of the ``seeds``, one on each core (``workers``), as text; rows, JSON and a picture go to ``folder``.
+    Seeds that the same program has run before, as the rows there tell, are not run again."""
+    from ...render.benchmarks.slope_outcomes import draw
+
+    rows = rows_of_seeds(
+        seeds, folder / "invariance.jsonl", partial(_row_of_run, seconds), program(_MODULES, f"{seconds:g} s"),
+        compile_kernels, workers,
+    )  # fmt: skip
+    names = {each.name for each in fields(Invariance)}
+    every = [Invariance(**{name: value for name, value in row.items() if name in names}) for row in rows]
+    write_json(folder / "invariance.json", [asdict(each) for each in every])
+    picture = draw(
+        every, VERDICTS, {name: each.bound for name, each in BOUNDS.items()}, folder / "invariance.png",
+        title=f"What {len(every)} random slopes become in other steps, places and orders (their seeds)",
+        meaning={
+            RIGHT: "the same in all variants", REPORTED: "not the same, and a warning says so",
+            REFUSED: "refused as drawn", LONG: "the same as far as finished", WRONG: "not the same, in silence",
+        },
+    )  # fmt: skip
+    places = ", ".join(map(str, (folder / "invariance.json", "invariance.jsonl", picture.name)))
+    found = table(every)
+    return Measured(f"{found.text}\n{places}", found.figures)
+
+
+def compile_kernels() -> None:
+    """Run slopes that are not measured, so that none that is has to wait for a compiler."""
+    from .fuzzed_slopes import LIGHT, watched
+
+    for seed in LIGHT:
+        watched(seed, 600.0)
+
+
+def _row_of_run(seconds: float, seed: int) -> dict:
+    return asdict(invariance(seed, seconds))
+
+
+def table(every: Sequence[Invariance]) -> Measured:
+    """A line a seed, the worst of every quantity beside its bound, and the share of slopes that are wrong."""
+    lines = [
+        "moved: share of the rock that goes farther than 1 mm (in short runs, a tenth of free fall), in steps of dt, "
+        "dt/2, dt/4;",
+        "scatter: share and gravity work off those of dt/4; the worst of mirror, rotation, shift, order and noise "
+        f"over the first {FIRST} steps",
+        "seed  verdict  blocks   moved, dt    dt/2    dt/4   work J/m  share,dt   work,dt  geometry    smooth  seconds"
+        "  why",
+    ]
+    for each in every:
+        moved_shares = [*each.moved, math.nan, math.nan, math.nan][:3]
+        work = each.work[-1] if each.work else math.nan
+        worst = [_worst_of(each, lambda name: name == f"{what}, dt") for what in ("share", "work")]
+        worst += [_worst_of(each, lambda name: name.endswith(end)) for end in (", friction", ", smooth")]
+        lines.append(
+            f"{each.seed:4d}  {each.verdict:8s}{each.blocks:6d}    "
+            + "".join(f"{share:8.4f}" for share in moved_shares)
+            + f"{work:11.3g}"
+            + "".join(f"{value:10.1e}" for value in worst)
+            + f"{each.seconds:9.1f}  {(each.why or each.reason)[:120]}"
+        )
+    counts = Counter(each.verdict for each in every)
+    lines += ["", f"{len(every)} slopes: " + "  ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS)]
+    lines.append("what must not change, worst of the slopes that are right, of all, beyond the bound in, and the bound")
+    for name, each in BOUNDS.items():
+        values = [one.scatter[name] for one in every if name in one.scatter]
+        right = max((one.scatter.get(name, 0.0) for one in every if one.verdict == RIGHT), default=0.0)
+        beyond = sum(not value <= each.bound for value in values)
+        lines.append(
+            f"  {name:18s}{right:9.1e} {max(values, default=0.0):9.1e} {beyond:4d}/{len(values):<4d}{each.bound:9.0e}  "
+            f"{each.meaning}"
+        )
+    return Measured.of(
+        "\n".join(lines),
+        errors={"share of slopes that do not stay the same, in silence": counts[WRONG] / max(1, len(every))},
+    )
+
+
+def _worst_of(each: Invariance, named: Callable[[str], bool]) -> float:
+    return max((value for name, value in each.scatter.items() if named(name)), default=math.nan)

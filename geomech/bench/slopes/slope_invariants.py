@@ -1,0 +1,194 @@
+"""What must hold of any scene, held against every cycle of a run, and how near each came to its bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import dda
+from ...dda.contact_detection.initial_overlap import REFUSED, deepest_overlap
+from ...dda.energy_balance import GAIN
+from ...dda.step_control.continuous_collision import ROUNDED_OVERLAP
+from ...ddm.mesh.point_location import inside
+from ...model import OPEN, Cycle, Problem
+
+
+@dataclass(frozen=True)
+class Invariant:
+    """``bound`` of a quantity that is relative to what ``meaning`` says; a run that goes beyond it is wrong, unless a
+    warning with one of the words ``told`` says so: in this step or the one before, or (``lasting``) in any before."""
+
+    meaning: str
+    bound: float
+    told: tuple[str, ...] = ()
+    lasting: bool = True
+
+
+#: A block and cracks that do not agree strain too much, lie in their neighbours, and are out of balance by their
+#: strain.
+_HANGS, _STRAINED = "no common strain", "beyond the elastic range"
+#: Faces in a blade of rock, of which the crack solver says where, over which length and by how much they miss their
+#: laws.
+_UNSETTLED = "left with a violation"
+
+INVARIANTS = {
+    "area": Invariant("area of all blocks, as drawn or parted, off what it was", 1e-9),
+    "strain": Invariant("strain of a block: rock in the elastic range has less", 1e-2, (_STRAINED,)),
+    "overlap": Invariant(
+        "depth of a block in another, over the smaller one's size (rounded corners: 3e-3 more)",
+        REFUSED,
+        (_HANGS, _STRAINED),
+    ),
+    "motion": Invariant("equations of motion of all blocks, over the largest force", 1e-6),
+    # Beyond the strain, see `Invariants._balance`.
+    "balance": Invariant(
+        "loads of a cracked block out of balance, over their size", 1e-5, (_HANGS, _STRAINED, "out of balance")
+    ),
+    "agreement": Invariant(
+        "strain of a block's cracks found and assumed, over the block's", 1e-1, (_HANGS,), lasting=False
+    ),
+    "energy": Invariant(
+        "energy not accounted for, over what was turned over (steps of a hundredth of the height leave up to 1e-2)",
+        GAIN,
+        ("without work", _STRAINED),
+    ),
+    "budget": Invariant(
+        "the same of blocks and cracks together", GAIN, ("not accounted for", "without work", _STRAINED)
+    ),
+    "toughness": Invariant(
+        "K_eq over K_Ic, less 1, of tips that stand in statics (event steps: to 1e-6)",
+        1e-5,
+        ("tips still grow",),
+        lasting=False,
+    ),
+    "faces": Invariant("overlap of crack faces, over the largest opening or slip", 1e-6, (_UNSETTLED,), lasting=False),
+    "pull": Invariant(
+        "pull between closed crack faces beyond their bond, over the pressure", 1e-6, (_UNSETTLED,), lasting=False
+    ),
+}
+
+
+class Invariants:
+    """The cycles so far: ``worst`` of every quantity, ``faults`` of what went beyond its bound without a word, and
+    those that a warning ``told`` of. ``heard`` gives the warnings so far."""
+
+    def __init__(self, problem: Problem, heard: Callable[[], list[str]]) -> None:
+        self.heard = heard
+        self.worst = dict.fromkeys(INVARIANTS, 0.0)
+        self.faults: list[str] = []
+        self.told: list[str] = []
+        self._static = problem.dda.dynamic_factor == 0.0
+        # Corners that pass each other within their rounding lie in each other by a part of it.
+        self._rounded = ROUNDED_OVERLAP * problem.dda.corner_rounding
+        self._tough = np.array([material.k_ic for material in problem.materials])
+        self._bond = max(law.tensile_strength for law in problem.face_laws)
+        self._stop_at = problem.run.stop_at
+        self._time = self._area = 0.0
+        self._strain = 0.0
+        self._standing: tuple[int, float, str] | None = None
+        # How many warnings there had been at the last cycle, and at the one before.
+        self._heard_at = (0, 0)
+
+    def check(self, cycle: Cycle) -> None:
+        broken = [*_nowhere(cycle), *_strayed(cycle)]
+        if not cycle.state.time >= self._time:
+            broken.append(f"time goes back from {self._time:g} to {cycle.state.time:g} s")
+        self._time = cycle.state.time
+        self.faults += [f"cycle {cycle.number}: {what}" for what in broken]
+        if broken:
+            return
+        for of in (self._blocks, self._balance, self._growth, self._crack_faces):
+            for name, value, where in of(cycle):
+                self._take(name, value, f"cycle {cycle.number}: {where}")
+        self._heard_at = (self._heard_at[1], len(self.heard()))
+
+    def end(self) -> None:
+        """After the last cycle of a run that came to its end: tips stand in it."""
+        for name, value, where in self._stood():
+            self._take(name, value, f"at the end: {where}")
+
+    def _take(self, name: str, value: float, where: str) -> None:
+        self.worst[name] = max(self.worst[name], value)
+        invariant = INVARIANTS[name]
+        bound = invariant.bound + {"balance": self._strain, "overlap": self._rounded}.get(name, 0.0)
+        if value > bound:
+            lines = self.heard()[0 if invariant.lasting else self._heard_at[0] :]
+            said = any(words in line for words in invariant.told for line in lines)
+            (self.told if said else self.faults).append(f"{where}: {name} {value:.2g}")
+
+    def _blocks(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
+        blocks, vertices = cycle.blocks, cycle.state.vertices
+        area = blocks.areas().sum()
+        self._area = self._area or area
+        yield "area", abs(area / self._area - 1), "all blocks"
+        gradient = cycle.motion.gradient
+        stretch = 0.5 * np.abs(gradient.transpose(0, 2, 1) @ gradient - np.eye(2)).max(axis=(1, 2))
+        b = int(np.argmax(stretch))
+        self._strain = max(self._strain, float(stretch[b]))
+        yield "strain", float(stretch[b]), blocks.names[b]
+        moments = dda.block_moments(np.ascontiguousarray(vertices), blocks.next_vertex, blocks.vertex_start)
+        a, b, _, share = deepest_overlap(blocks, vertices, moments)
+        yield "overlap", share, f"{blocks.names[a]} and {blocks.names[b]}"
+
+    def _balance(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
+        told = cycle.statistics
+        yield "motion", told.get("unbalanced", 0.0), "the blocks"
+        # Contacts that are pressed in, or stand apart, act off the outlines by as much; strained blocks, by their
+        # corners' angles. (Found: up to 0.5 of the strain at the start of the step.)
+        yield "balance", told.get("traction_imbalance", 0.0), "cracked blocks"
+        yield "agreement", told.get("compliance_mismatch", 0.0), "cracked blocks"
+        # As the budget counts it: works, or what is stored where next to nothing moves.
+        works, stores = ("gravity_work", "load_work", "crack_work", "friction_loss"), ("kinetic", "elastic", "contact")
+        turned = sum(abs(told.get(name, 0.0)) for name in works)
+        turned = max(turned, sum(told.get(f"{name}_energy", 0.0) for name in stores))
+        if turned > 0:
+            yield "energy", abs(told.get("energy_residual", 0.0)) / turned, "the blocks"
+        yield "budget", abs(told.get("budget_residual", 0.0)), "blocks and cracks"
+
+    def _growth(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
+        # Whether the tips of a cycle stand is known when the next one is that of another load.
+        if self._standing is not None and cycle.growth_pass == 0:
+            yield from self._stood()
+        self._standing = None
+        if not (self._static and len(cycle.tips)) or any(event.kind in self._stop_at for event in cycle.events):
+            return
+        over = cycle.tips["k_eq"] / self._tough[cycle.blocks.material[cycle.tips["block"]]] - 1
+        worst = int(np.argmax(over))
+        self._standing = max(0.0, float(over[worst])), f"tip of crack {int(cycle.tips['crack'][worst])}"
+
+    def _stood(self) -> Iterator[tuple[str, float, str]]:
+        if self._standing is not None:
+            yield "toughness", *self._standing
+
+    def _crack_faces(self, cycle: Cycle) -> Iterator[tuple[str, float, str]]:
+        faces = cycle.faces
+        shut = np.zeros(0, bool) if faces is None else np.isfinite(cycle.cracks.aperture[faces.segment])
+        if not shut.any():
+            return
+        # The nodes of collocation: between them polynomials may dip.
+        opening, normal, state = faces.opening[shut, 1:-1], faces.traction[shut, 1:-1, 0], faces.state[shut, 1:-1]
+        aperture = cycle.cracks.aperture[faces.segment[shut]][:, None]
+        scale = max(float(np.abs(faces.opening).max()), float(np.abs(faces.slip).max()), 1e-12)
+        yield "faces", max(0.0, -float((opening + aperture).min())) / scale, "crack faces"
+        pressed = float(np.abs(normal).max())
+        if (state != OPEN).any() and pressed > 0:
+            yield "pull", max(0.0, float(normal[state != OPEN].max()) - self._bond) / pressed, "closed crack faces"
+
+
+def _nowhere(cycle: Cycle) -> Iterator[str]:
+    state, faces = cycle.state, cycle.faces
+    if not all(np.isfinite(values).all() for values in (state.vertices, state.velocity, state.stress)):
+        yield "a block is nowhere"
+    names = ("k_i", "k_ii", "k_eq", "angle")
+    if len(cycle.tips) and not all(np.isfinite(cycle.tips[name]).all() for name in names):
+        yield "a stress intensity factor is not finite"
+    if faces is not None and not (np.isfinite(faces.opening).all() and np.isfinite(faces.traction).all()):
+        yield "a crack face is nowhere"
+
+
+def _strayed(cycle: Cycle) -> Iterator[str]:
+    for tip in cycle.tips:
+        if not inside(cycle.blocks.loops(int(tip["block"])), tip["point"][None]).all():
+            yield f"a tip of crack {tip['crack']} at {tip['point']} lies outside {cycle.blocks.names[tip['block']]}"

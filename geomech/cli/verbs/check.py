@@ -1,0 +1,37 @@
+"""``geomech check``: every error of a scene at once, or what the scene holds."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..messages import say_warnings
+from ..scenes import scene_arguments, scenes_asked
+from ..verb import DONE, Verbs, add_verb
+
+
+def declare(verbs: Verbs) -> None:
+    check = add_verb(
+        verbs, "check", _check, "read a scene, build its geometry and say every error in it at once",
+        "geomech check pipelines/two_cracks\ngeomech check scene.toml --set growth.criterion=g",
+    )  # fmt: skip
+    scene_arguments(check)
+    check.add_argument("--keys", action="store_true", help="list every key a scene may have, and what it means")
+
+
+def _check(options: argparse.Namespace) -> int:
+    from ...model import counted
+    from ...scene import load_scene
+
+    first = load_scene(options.scene, options.overrides, None)
+    if options.keys:
+        print(first.describe_keys())
+        return DONE
+    scenes = scenes_asked(first, options)
+    say_warnings(scenes.values())
+    for scene in scenes.values():
+        problem = scene.problem()
+        tips = f" with {counted(len(problem.cracks.tips), 'tip')}" if problem.cracks.n_cracks else ""
+        print("\n".join([f"{problem.title}: {problem.inventory}{tips}: no errors", *scene.overview()]))
+    if first.variants and not options.variants:
+        print(f"variants: {', '.join(first.variants)}")
+    return DONE

@@ -1,0 +1,34 @@
+"""``geomech doctor``: what this machine lacks, and how to mend it."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..verb import DONE, FAILED, Verbs, add_verb
+
+
+def declare(verbs: Verbs) -> None:
+    doctor = add_verb(
+        verbs, "doctor", _doctor, "check this machine: libraries, rendering, caches; say how to mend what is missing",
+        "geomech doctor\ngeomech doctor --warm",
+    )  # fmt: skip
+    doctor.add_argument(
+        "--warm", action="store_true", help="compile the kernels that ordinary scenes call on, before the first does"
+    )
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from ...doctor import examine
+
+    if options.warm:
+        from ...doctor import warm
+        from ..messages import tell_compiling
+
+        tell_compiling()
+        warm()
+    checks = examine()
+    for check in checks:
+        print(f"{'ok  ' if check.good else 'FAIL'} {check.name:<12} {check.found}")
+        if not check.good:
+            print(f"     {'':<12} → {check.mend}")
+    return DONE if all(check.good for check in checks) else FAILED

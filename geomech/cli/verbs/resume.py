@@ -1,0 +1,48 @@
+"""``geomech resume``: a run goes on from its last checkpoint."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..messages import say, tell_compiling
+from ..scenes import trust_argument
+from ..verb import DONE, BadInput, Verbs, add_verb
+from .run import prepare_for_a_run
+
+
+def declare(verbs: Verbs) -> None:
+    resume = add_verb(
+        verbs, "resume", _resume, "go on with a run that was interrupted, killed, or is to last longer, from its last "
+                                  "checkpoint",
+        "geomech resume outputs/two_cracks/phi_30\ngeomech resume outputs/slope --set run.end_time_s=20",
+    )  # fmt: skip
+    resume.description += (
+        " What is written is bit for bit what the run would have left uninterrupted. A run ends its cycle and stores "
+        "itself on Ctrl-C or SIGTERM; a second one ends it at once. A run that a "
+        "script has put in the background ignores Ctrl-C and ends on SIGTERM (`kill`)."
+    )
+    resume.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    resume.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key that does not change what has happened: run.end_time_s, run.stop_at, output.every … "
+        "(may be repeated)",
+    )  # fmt: skip
+    resume.add_argument("--quiet", action="store_true", help="say nothing but errors")
+    trust_argument(resume)
+
+
+def _resume(options: argparse.Namespace) -> int:
+    prepare_for_a_run()
+    if not options.quiet:
+        tell_compiling()
+    from ...resumption import Finished, NotResumable, resume
+
+    try:
+        resume(options.run, options.overrides, quiet=options.quiet, tell=say)
+    except Finished as nothing_left:
+        say(f"{options.run}: {nothing_left}")
+    except NotResumable as error:
+        told = str(error)
+        raise BadInput(told if str(options.run) in told else f"{options.run}: {told}") from error
+    return DONE

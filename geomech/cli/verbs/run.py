@@ -1,0 +1,111 @@
+"""``geomech run``: a scene, all variants of it, or a pipeline folder with a script of its own."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..messages import say_warnings, tell_compiling
+from ..scenes import default_folder, scene_arguments, scenes_asked, variants_asked
+from ..verb import DONE, BadInput, Verbs, add_verb, check_folder
+
+
+def declare(verbs: Verbs) -> None:
+    run = add_verb(
+        verbs, "run", _run, "run a scene, or a pipeline folder, and write its run folder",
+        "geomech run pipelines/two_cracks --variant phi_30\n"
+        "geomech run scene.toml --out outputs/soft --set materials.rock.youngs_modulus_pa=5e9",
+    )  # fmt: skip
+    scene_arguments(run)
+    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default outputs/NAME[/VARIANT])")
+    run.add_argument(
+        "--overwrite", action="store_true", help="replace what an earlier run has left in the run folder (else refused)"
+    )
+    run.add_argument("--quiet", action="store_true", help="say nothing but errors")
+
+
+def _run(options: argparse.Namespace) -> int:
+    check_folder("--out", options.out)
+    prepare_for_a_run()
+    if not options.quiet:
+        tell_compiling()
+    from ...pipeline import overwriting
+
+    with overwriting(options.overwrite):
+        return _run_all(options)
+
+
+def _run_all(options: argparse.Namespace) -> int:
+    place: Path = options.scene
+    if place.is_dir() and (place / "run.py").is_file():
+        return _run_script(place, options)
+
+    from ...output import standard_observers
+    from ...pipeline import refuse_results, run
+    from ...scene import load_scene
+
+    # Every variant is read before the first one runs: an error in the last should not cost an hour.
+    scenes = scenes_asked(load_scene(place, options.overrides, None), options)
+    if not options.quiet:
+        say_warnings(scenes.values())
+    base = options.out or default_folder(place)
+    # One variant with --out goes into exactly that folder.
+    alone = options.out and len(scenes) == 1
+    folders = {name: base if name is None or alone else base / name for name in scenes}
+    refuse_results(folders.values())
+    for name, scene in scenes.items():
+        run(scene, out=folders[name], observers=standard_observers(scene, quiet=options.quiet))
+    return DONE
+
+
+def _run_script(place: Path, options: argparse.Namespace) -> int:
+    """Hand a pipeline's own script what the command line says, its variants by name."""
+    variants = options.variants
+    if (place / "scene.toml").is_file():
+        from ...scene import load_scene
+
+        first = load_scene(place, options.overrides, None)
+        variants = variants_asked(first, variants)
+        if not options.quiet:
+            say_warnings(scenes_asked(first, options).values())
+    elif "all" in variants:
+        raise BadInput(f"{place} holds no scene.toml that says what its variants are: name them")
+    script = _load_script(place / "run.py")
+    result = script.main(
+        place, options.out or default_folder(place), overrides=options.overrides, variants=variants, quiet=options.quiet
+    )
+    return DONE if result is None else int(result)
+
+
+def _load_script(path: Path) -> Any:
+    import importlib.util
+
+    spec = importlib.util.spec_from_file_location(f"geomech_pipeline_{path.parent.name}", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not hasattr(module, "main"):
+        raise BadInput(f"{path} has no main(folder, out, overrides, variants, quiet)")
+    return module
+
+
+def prepare_for_a_run() -> None:
+    """Let SIGTERM and SIGHUP end this process as Ctrl-C does, and spare it the searches for reference loops that a
+    run pays for in vain."""
+    import atexit
+    import gc
+    import signal
+    import threading
+
+    if threading.current_thread() is threading.main_thread():
+        # A batch system's SIGTERM and the SIGHUP of a terminal that is gone end a run as Ctrl-C does, with its summary
+        # written. `nohup` ignores the latter.
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.default_int_handler)
+    # A cycle makes thousands of short-lived arrays and no reference loops worth speaking of: looking for loops every
+    # 700 of them costs a twentieth of a run.
+    gc.set_threshold(50_000, 20, 20)
+    # Python ends with three searches for loops in all that was ever imported, a third of a second: leave these to the
+    # operating system.
+    atexit.register(gc.freeze)

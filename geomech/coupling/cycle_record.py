@@ -1,0 +1,180 @@
+"""The record of a cycle: with the scene's leading load, its axial strain, all crack faces in one table; and of
+events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..dda.step_control.step_limits import shortened
+from ..ddm.counters import Work
+from ..model import WEIGHT, Blocks, CrackFaces, Cracks, Cycle, Event, Motion, Problem, Skip, State
+from .load_transfer.elastic_bodies import solve_bodies, tip_rows
+
+if TYPE_CHECKING:
+    from ..ddm import Body
+    from .coupled_state import CrackedBlocks
+
+
+def record(
+    now: CrackedBlocks, state: State, tips: np.ndarray, solutions: dict, events: tuple[Event, ...], growth_pass: int,
+    statistics: dict[str, float], left_out: Mapping[int, Body] = MappingProxyType({}),
+) -> Cycle:  # fmt: skip
+    """What observers see of a pass that brought the blocks to ``state`` (or of blocks that stand at it). The bodies that
+    were ``left_out`` are solved when somebody asks for what is in them."""
+    motion = now.motion(state)
+    endless = now.problem.endless
+    if endless is not None:
+        state = replace(state, stress=np.broadcast_to(endless.stress_at(state.time), state.stress.shape).copy())
+    work = vars(Work.total(now.works)) if now.works else {}
+    cycle = _Told(
+        number=now.number,
+        load_step=now.load_step,
+        growth_pass=growth_pass,
+        load=leading_load(now.problem, now.blocks, state.time, now.acted),
+        strain=axial_strain(now.gauge, motion),
+        blocks=now.blocks,
+        state=state,
+        cracks=now.cracks,
+        tips=tips,
+        bodies=solutions,
+        events=tuple(events),
+        monitors={name: motion.current(b, point) - np.asarray(point) for name, (b, point) in now.monitors.items()},
+        statistics=statistics,
+        seconds=dict(now.timed.seconds),
+        work=work,
+        skips=skips(now, work),
+        shortened=shortened(now.block_work),
+    )
+    vars(cycle)["motion"] = motion  # known here: the property need not find it again
+    del vars(cycle)["faces"]  # found when somebody asks for them
+    if left_out:
+        del vars(cycle)["tips"], vars(cycle)["bodies"]
+        vars(cycle)["_rest"] = _Rest(now, solutions, dict(left_out))
+    return cycle
+
+
+class _Told(Cycle):
+    """A cycle whose crack faces are put together, and bodies that were left out solved, when they are asked for."""
+
+    @cached_property
+    def faces(self) -> CrackFaces | None:
+        return joined_faces(self.cracks, self.bodies)
+
+    @cached_property
+    def bodies(self) -> dict[int, Any]:
+        return self._rest.bodies()
+
+    @cached_property
+    def tips(self) -> np.ndarray:
+        return self._rest.tips(self.bodies)
+
+
+class _Rest:
+    """What it takes to solve bodies that were left out of a pass as they would have been in it: ``now`` as it is, which
+    goes on."""
+
+    def __init__(self, now: CrackedBlocks, solutions: dict, left_out: dict[int, Body]) -> None:
+        self._told, self._solutions, self._left_out = now.cannot_grow, solutions, left_out
+        self._problem, self._blocks, self._nodes_of = now.problem, now.blocks, now.nodes_of
+        self._order, self._loads = list(now.bodies), {block: now.loads[block] for block in left_out}
+
+    def bodies(self) -> dict[int, Any]:
+        """block → solution of all bodies, in their order."""
+        self._told.asked += 1
+        found = solve_bodies(self._left_out, self._loads, {}, {}, names=self._blocks.names)
+        for body in self._left_out.values():
+            body.work.solutions_left_out -= 1
+        found |= self._solutions
+        return {block: found[block] for block in self._order}
+
+    def tips(self, solutions: dict[int, Any]) -> np.ndarray:
+        """Their TIP rows."""
+        return tip_rows(self._problem, self._blocks, solutions, self._nodes_of)
+
+
+def skips(now: CrackedBlocks, work: dict[str, int]) -> dict[str, Skip]:
+    """What has not been done until now, since nothing had changed, for those of which there was some. Where each piece
+    of work is timed, the first, in which kernels are loaded, is left out of its mean."""
+    blocks, seconds = now.block_work, now.timed.seconds
+    found = {
+        "pair searches": Skip(blocks.pair_searches_kept, blocks.pair_searches - 1, blocks.pair_search_s),
+        "contact searches": Skip(blocks.lone_searches),
+        "factorisations": Skip(blocks.factorisations_kept, blocks.factorisations - 1, blocks.factorisation_s),
+    }
+    if work:
+        found |= {
+            "bodies": Skip(work["bodies_kept"], work["bodies"], seconds.get("ddm assembly", 0.0)),
+            "solutions": Skip(work["solutions_kept"], work["solutions"], seconds.get("ddm solve", 0.0)),
+            "left-out solutions": Skip(work["solutions_left_out"], work["solutions"], seconds.get("ddm solve", 0.0)),
+            "scaled solutions": Skip(work["solutions_scaled"], work["solutions"], seconds.get("ddm solve", 0.0)),
+            "compliances": Skip(
+                work["compliances_kept"], work["compliances"] - 1, now.each.seconds.get("compliances", 0.0)
+            ),
+        }
+    return {name: skip for name, skip in found.items() if skip.kept}
+
+
+def event(now: CrackedBlocks, kind: str, state: State, point, detail: str) -> Event:
+    """What happened at ``state`` in the present cycle, at ``point`` (reference coordinates)."""
+    load = leading_load(now.problem, now.blocks, state.time, now.acted)
+    return Event(kind, now.number, state.time, load, (float(point[0]), float(point[1])), detail)
+
+
+def leading_load(problem: Problem, blocks: Blocks, now: float, acted: Mapping[str, float]) -> float:
+    """Normal component of the traction on the scene's leading edge, Pa, positive in compression; 0 without one. Where
+    the block of that edge is moved, what it takes counts too, over the edge's length; ``acted`` are the statistics of
+    the step. In rock without an end the load is what leads there. Where the weight leads (`WEIGHT`), that of a column
+    as high as the scene, ρ g h of the heaviest moving rock, Pa."""
+    if problem.endless is not None:
+        return problem.endless.load_at(now)
+    name = problem.load_edge
+    edges = blocks.edges_named(name) if name else []
+    if not len(edges):
+        return _weight_of_a_column(problem, now) if name == WEIGHT else 0.0
+    outward = blocks.outward_normals[edges[0]]
+    tractions = sum(
+        -float(load.history.at(now) @ outward) for load in problem.loads.edge_tractions if load.edge_name == name
+    )
+    moved = {motion.block for motion in problem.loads.block_motions} & set(blocks.vertex_block[edges].tolist())
+    force = np.array([[acted.get(f"reaction_{axis}:{blocks.names[b]}", 0.0) for axis in "xy"] for b in sorted(moved)])
+    if not len(force):
+        return tractions
+    ends = blocks.vertices[blocks.next_vertex[edges]] - blocks.vertices[edges]
+    return tractions - float(force.sum(axis=0) @ outward) / float(np.hypot(*ends.T).sum())
+
+
+def _weight_of_a_column(problem: Problem, now: float) -> float:
+    # Of the problem's blocks, not the present ones: cut and fallen blocks must not change what a load is called.
+    blocks = problem.blocks
+    moving = blocks.material[~blocks.fixed]
+    density = max((problem.materials[m].density for m in np.unique(moving).tolist()), default=0.0)
+    height = float(np.ptp(blocks.vertices[~blocks.fixed[blocks.vertex_block], 1])) if len(moving) else 0.0
+    return density * height * math.hypot(*problem.loads.gravity.at(now).tolist())
+
+
+def axial_strain(gauge, motion: Motion) -> float:
+    """Shortening of the ``gauge`` (two pairs of block and material point) over its length; nan without one."""
+    if gauge is None:
+        return float("nan")
+    (a, p), (b, q) = gauge
+    return 1 - math.dist(motion.current(b, q), motion.current(a, p)) / math.dist(q, p)
+
+
+def joined_faces(cracks: Cracks, solutions: dict) -> CrackFaces | None:
+    """The faces of all solved bodies (block → solution), segments counted in the whole network."""
+    if not solutions:
+        return None
+    faces = [
+        replace(solution.faces, segment=np.flatnonzero(cracks.block == b)[solution.faces.segment])
+        for b, solution in solutions.items()
+    ]
+    if len(faces) == 1:
+        return faces[0]
+    return CrackFaces(**{f.name: np.concatenate([getattr(each, f.name) for each in faces]) for f in fields(CrackFaces)})

@@ -1,0 +1,154 @@
+"""Growth at one load: which cracks grow or are born, what they meet, which blocks that cuts through."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...model import Event, State
+from ..coupled_state import CrackedBlocks
+from ..cycle_record import event
+from ..load_pass import Balance, toughness
+from ..load_transfer.elastic_bodies import tip_rows
+from ..load_transfer.unbounded_rock import loads_of, take_endless
+from ..splitting.block_splitting import divided, split_blocks
+from ..splitting.contact_initialisation import contacts_after, holds_together
+from ..splitting.part_initial_stress import begin_in_motion
+from ..splitting.part_mean_stress import rotated_mean_stress
+
+
+def growth_of_tips(
+    now: CrackedBlocks,
+    tips: np.ndarray,
+    enough: float = 1.0,
+    together: float = 1.0,
+    longest: np.ndarray | float = np.inf,
+):
+    """The new network (`ddm.growth.tip_advance.Growth`) when some of ``tips`` has a K_eq of ``enough`` times its toughness, else
+    None; those with ``together`` times theirs grow with it. No tip goes farther than ``longest`` (n_tips,) m, and none
+    with 0. Sets the angles that were followed."""
+    k_ic = toughness(now, tips)
+    from ...ddm.growth.path_correction import corrected
+    from ...ddm.growth.tie_tolerance import reached
+    from ...ddm.growth.tip_advance import advance
+
+    if not np.any(reached(tips["k_eq"], enough * k_ic) & (np.asarray(longest) > 0)):
+        return None
+    k_ic = together * k_ic
+
+    trial = now.bodies
+
+    def grow():
+        with now.timed("growth"):
+            return advance(now.cracks, now.limits, tips, now.problem.growth, k_ic, now.number, longest)
+
+    def look_ahead(cracks):
+        nonlocal trial
+        trial, nodes_of = now.bodies_of(cracks, trial)
+        loads = now.loads if now.problem.endless is None else loads_of(now, cracks, trial)
+        ahead = now.solve(trial, loads, now.solutions)
+        return tip_rows(now.problem, now.blocks, ahead, nodes_of)
+
+    growth = corrected(tips, grow, look_ahead, now.number, now.problem.growth.correct, now.chords)
+    if growth is not None:
+        now.bodies = trial  # most of it is what the corrected step needs
+    return growth
+
+
+def drive(now: CrackedBlocks, found: Balance) -> float:
+    """How near to growth the cracks are: the largest K_eq/K_Ic, or the largest overstress where cracks may be born;
+    growth starts at one."""
+    most = float(np.max(found.tips["k_eq"] / toughness(now, found.tips), initial=0.0))
+    if now.problem.growth.initiation:
+        from .crack_birth import born_first
+
+        with now.timed("growth"):
+            born, _ = born_first(now.blocks, now.problem.materials, found.solutions, now.problem.growth)
+        most = max([most, *(birth.overstress for birth in born[:1])])
+    return most
+
+
+def births(now: CrackedBlocks, solutions: dict, state: State, enough: float = 1.0):
+    """New cracks, and their events, where no tip grows and whole rock is strained to ``enough`` times its strength."""
+    from .crack_birth import bear_in_blocks
+
+    with now.timed("growth"):
+        growth, born = bear_in_blocks(
+            now.cracks, now.blocks, now.limits, now.problem.materials, solutions, now.problem.growth, now.number, enough
+        )
+    names = growth.cracks.names[now.cracks.n_cracks :] if growth is not None else ()
+    return growth, tuple(
+        event(now, "birth", state, birth.start, f"{name} starts in {birth.kind} ({birth.place})")
+        for name, birth in zip(names, born)
+    )
+
+
+def initiations(now: CrackedBlocks, tips: np.ndarray, state: State) -> tuple[Event, ...]:
+    """An event for every tip that grows for the first time; wings inherit their crack and end by position."""
+    events = []
+    first = {int(s): k for k, s in reversed(list(enumerate(now.cracks.segments.ravel())))}
+    for tip in tips[tips["grown"] > 0]:
+        segment = first[int(tip["node"])] // 2
+        if now.cracks.birth_cycle[segment] == 0:
+            events.append(
+                event(now, "initiation", state, tip["point"], f"{now.cracks.names[tip['crack']]} starts to grow")
+            )
+    return tuple(events)
+
+
+def part_here(now: CrackedBlocks, growth, state: State) -> list[int]:
+    """The blocks that ``growth`` (None: there is none) cuts in two, where their parts can go on from ``state``, in
+    which the pass has left them."""
+    if growth is None or not growth.joins:
+        return []
+    with now.timed("growth"):
+        cut = divided(now.blocks, growth.cracks)
+    together = len(cut) and (now.problem.dda.dynamic_factor != 0.0 or holds_together(state, cut))
+    return cut.tolist() if together else []
+
+
+def take_growth(now: CrackedBlocks, growth, state: State, solutions: dict) -> tuple[Event, ...]:
+    """Make ``growth`` the present geometry; split what it cut through. Returns the events it brought, at ``state``, the
+    end of the pass with these ``solutions``. Where the blocks stand there, the parts begin with the forces of their
+    faces."""
+    names = now.cracks.names
+    events = []
+    for join in growth.joins:
+        other = f" {names[join.other_crack]}" if join.other_crack >= 0 else " the surface"
+        events.append(event(now, join.kind, state, join.point, f"{names[join.crack]} meets{other}"))
+    split = None
+    if now.problem.endless is not None:
+        return tuple(events) + take_endless(now, growth.cracks, state)
+    if growth.joins:
+        with now.timed("growth"):
+            split = split_blocks(now.blocks, now.state, growth.cracks, _mean_stress(now.state, solutions))
+    if split is None:
+        now.take_cracks(growth.cracks)
+        return tuple(events)
+    cut = now.blocks
+    for b in np.flatnonzero(np.bincount(split.parent, minlength=now.blocks.n_blocks) > 1):
+        parts = np.flatnonzero(split.parent == b)
+        centre = now.blocks.loops(b)[0].mean(axis=0)
+        events.append(event(now, "split", state, centre, f"{now.blocks.names[b]} is cut into {len(parts)} blocks"))
+    loads, stands, begun = now.loads, now.state is state, now.state
+    stored = {block: of.crack_energy for block, of in now.felt().items()}
+    now.take_split(split)
+    if now.problem.dda.dynamic_factor != 0.0:
+        begin_in_motion(now, split, cut, begun, stored)
+    with now.timed("growth"):
+        contacts = contacts_after(
+            now.system, split, cut, solutions if stands else {}, loads, now.problem.loads, begun.contacts
+        )
+    now.state = replace(now.state, contacts=contacts)
+    return tuple(events)
+
+
+def _mean_stress(state: State, solutions: dict):
+    """block → (polygon → mean stress there, current axes), from the last solved elastic body."""
+
+    def of_block(block: int):
+        solution = solutions[block]
+        return lambda loops: rotated_mean_stress(solution, loops, float(state.rotation[block]))
+
+    return {b: of_block(b) for b in solutions}

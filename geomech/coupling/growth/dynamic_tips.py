@@ -1,0 +1,38 @@
+"""What tips do in the time of a dynamic run: they start when waves have had the time to reach them, and run no faster
+than waves do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...ddm.growth.tie_tolerance import reached
+from ...model import Blocks, Problem
+from ..load_transfer.boundary_tractions import BoundaryLoad
+from .tip_speed_limit import TipSpeed
+from .wave_arrival import WaveTime
+
+
+class TipsInTime:
+    """`TipSpeed` and `WaveTime` of the tips of ``problem``."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.speed, self.waves = TipSpeed(problem), WaveTime(problem)
+        self._k_ic = np.array([m.k_ic for m in problem.materials])
+
+    def may_go(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
+        """(n_tips,) m, how far ``tips`` may still go in the present step of ``dt`` s."""
+        return np.where(self._driven(tips, blocks, dt, loads), self.speed.left(tips, blocks, dt), 0.0)
+
+    def went(self, tips: np.ndarray) -> None:
+        """``tips`` have ``grown`` in a pass of the present step."""
+        self.speed.went(tips)
+
+    def end(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> None:
+        """The step of ``dt`` s has ended with ``tips``."""
+        self.speed.end(tips, blocks, dt, self._driven(tips, blocks, dt, loads))
+        self.waves.end(tips, blocks, dt, loads)
+
+    def _driven(self, tips: np.ndarray, blocks: Blocks, dt: float, loads: Mapping[int, BoundaryLoad]) -> np.ndarray:
+        return reached(self.waves.drive(tips, blocks, dt, loads), self._k_ic[blocks.material[tips["block"]]])

@@ -1,0 +1,260 @@
+"""The elastic bodies of cracked blocks: made from blocks and cracks, loaded with the block solver's forces, solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ... import dda
+from ...ddm.counters import Work
+from ...ddm.crack_contact.face_laws import Released
+from ...model import TIP, Blocks, Cracks, Motion, Problem, State
+from ..parallel_map import side_by_side
+from . import boundary_tractions
+from .boundary_tractions import BoundaryLoad
+
+if TYPE_CHECKING:
+    from ...ddm import Body
+
+
+def elastic_bodies(
+    problem: Problem, blocks: Blocks, cracks: Cracks, kept: dict, works: list[Work], removed: np.ndarray | None = None
+) -> tuple[dict[int, Body], dict[int, np.ndarray]]:
+    """block → body of every moving block that holds ``cracks`` (or may come to), and block → its nodes in the whole
+    network. What keeps a fixed block in place, and so what strains it, is not known; what is ``removed`` (n_blocks,) is
+    not there.
+
+    ``kept``: earlier bodies of the same blocks. Those of which nothing has changed are taken as they are, of others
+    whatever has not is reused; the rest is made side by side. ``works``: the counts of what was done, of bodies without
+    an earlier one new ones at the end.
+    """
+    every = problem.growth.initiation or problem.endless is not None
+    cracked = np.arange(blocks.n_blocks) if every else np.unique(cracks.block)
+    rigid = np.array([m.rigid for m in problem.materials], bool)
+    if problem.endless is None:
+        cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
+    if removed is not None:
+        cracked = cracked[~removed[cracked]]
+    if not len(cracked):
+        return {}, {}
+    from ... import ddm
+
+    bodies: dict[int, Body | None] = {}
+    nodes_of, to_make = {}, []
+    segments_of = _rows_of(cracks.block, cracked)
+    for b, segments in zip(cracked.tolist(), segments_of):
+        nodes_of[b] = np.unique(cracks.segments[segments])
+        own, material, old = cracks.take(segments), problem.materials[blocks.material[b]], kept.get(b)
+        if old is None:
+            works.append(Work())
+        work = works[-1] if old is None else old.work
+        if not problem.run.skip:
+            old = None
+        bodies[b] = None if old is None else old.found_again(_loops(problem, blocks, b), own, material)
+        if bodies[b] is not None:
+            work.bodies_kept += 1
+            continue
+        to_make.append((b, own, material, old, work))
+
+    def made(of: tuple) -> Body:
+        b, own, material, old, work = of
+        surface = None if problem.endless is None else problem.endless.surface
+        _check_pinches(blocks, b)
+        return ddm.Body(
+            [] if problem.endless is not None else blocks.loops(b),
+            own,
+            material,
+            problem.ddm,
+            previous=old,
+            holes=[] if problem.endless is None else _loops(problem, blocks, b),
+            face_laws=problem.face_laws,
+            work=work,
+            half_plane=None if surface is None else ddm.HalfPlane(*surface),
+        )
+
+    bodies.update(zip([of[0] for of in to_make], side_by_side(made, to_make)))
+    return bodies, nodes_of
+
+
+def _check_pinches(blocks: Blocks, block: int) -> None:
+    """Raises `dda.NotConverged` where loops of ``block`` meet in a point, as where a crack frees a splinter beside the
+    surface that it has come from: rock that hangs by a point bears no stress there that elements could resolve."""
+    loops = blocks.loops(block)
+    if len(loops) == 1:
+        return
+    vertices = np.concatenate(loops)
+    _, first, times = np.unique(vertices, axis=0, return_index=True, return_counts=True)
+    if (times > 1).any():
+        name = blocks.names[block] if blocks.names else f"block {block}"
+        x, y = vertices[first[times.argmax()]]
+        raise dda.NotConverged(
+            f"{name}: cracks leave rock that holds by a single point at ({x:.6g}, {y:.6g}): no body whose cracks can be "
+            "solved; try another growth.increment_m"
+        )
+
+
+def _loops(problem: Problem, blocks: Blocks, block: int) -> list[np.ndarray]:
+    """The loops that bound the rock of ``block``: of rock without an end its holes."""
+    return blocks.loops(block) if problem.endless is None else blocks.loops(block)[1:]
+
+
+def _rows_of(number: np.ndarray, wanted: np.ndarray) -> list[np.ndarray]:
+    """The rows of each of the ``wanted`` numbers, in order, in the time of one sorting."""
+    order = np.argsort(number, kind="stable")
+    first, last = (np.searchsorted(number[order], wanted, side) for side in ("left", "right"))
+    return [order[a:b] for a, b in zip(first.tolist(), last.tolist())]
+
+
+def boundary_loads(
+    problem: Problem, blocks: Blocks, state: State, motion: Motion, result, bodies: dict
+) -> dict[int, BoundaryLoad]:
+    """block → load of every one of ``bodies``, from the step ``result`` that began at ``state``; ``motion`` leads to
+    its vertices: on that geometry the forces are in equilibrium."""
+    forces, numbers = result.forces, np.array(list(bodies), int)
+    rigid = np.array([material.rigid for material in problem.materials], bool)
+    keep_straight = blocks.fixed | rigid[blocks.material]
+    if blocks.held is not None:
+        keep_straight = keep_straight | blocks.held.any(axis=1)
+    density = np.array([material.density for material in problem.materials])
+    loads = boundary_tractions.boundary_loads(
+        numbers,
+        blocks,
+        result.vertices,
+        motion,
+        state.rotation[numbers] + result.turn[numbers],
+        beside_acting(result.contacts, blocks.n_blocks),
+        forces.edges,
+        forces.points,
+        density[blocks.material[numbers]],
+        forces.inertia.gravity,
+        result.acceleration[numbers],
+        problem.dda.dynamic_factor * state.velocity[numbers, 2],
+        None if forces.reaction is None else forces.reaction[numbers],
+        problem.run.boundary_stress,
+        [joint.tensile_strength for joint in problem.joints],
+        None if forces.overstress is None else forces.overstress[numbers],
+        keep_straight,
+    )
+    return dict(zip(bodies, loads))
+
+
+def beside_acting(contacts: np.ndarray, n_blocks: int) -> np.ndarray:
+    """CONTACT rows of all pairs of blocks between which some contact carries force: where it may end, others tell."""
+    pair = np.minimum(contacts["block"], contacts["other"]) * n_blocks + np.maximum(
+        contacts["block"], contacts["other"]
+    )
+    acts = (contacts["normal_force"] != 0) | (contacts["shear_force"] != 0)
+    return contacts[np.isin(pair, pair[acts])]
+
+
+def solve_bodies(
+    bodies: dict,
+    loads: dict[int, BoundaryLoad],
+    warm: dict,
+    history: dict,
+    solved_from: dict | None = None,
+    skip: bool = True,
+    names: Sequence[str] = (),
+) -> dict:
+    """block → solution of its body, side by side; ``warm``: earlier solutions, whose face states are the first guess;
+    ``history``: what crack faces with friction remember of the load step before. An earlier solution of the same
+    geometry under the very same load is the answer, where ``solved_from`` (the ``history`` of ``warm``) is the same,
+    too, and nothing is to be worked out anew (``skip``). Raises what `ddm.Body.solve` raises, with the block's name, of
+    ``names``, before it."""
+    from ... import ddm
+
+    solved_from = {} if solved_from is None else solved_from
+
+    def solved(b: int):
+        body, known, load = bodies[b], warm.get(b), loads[b]
+        asked = {name: getattr(load, name) for name in _ASKED}
+        same = skip and known is not None and _same_question(body, known, asked)
+        if same and history.get(b) is solved_from.get(b):
+            body.work.solutions_kept += 1
+            return known
+        try:
+            if load.bases:
+                from ...ddm.loads.rigid_bases import Base, on_bases
+
+                bases = [Base(*base) for base in load.bases]
+                return on_bases(body, ddm.BodyLoad(**asked), bases, known, history.get(b))
+            return body.solve(ddm.BodyLoad(**asked), warm=known, history=history.get(b))
+        except (ValueError, ddm.NotConverged) as failure:
+            # (Others have more than a message, as `ddm.OutOfEquilibrium`.)
+            if type(failure) not in (ValueError, ddm.NotConverged):
+                raise
+            raise type(failure)(f"{_called(b, names)}: {failure}") from failure
+        except ddm.TargetMissed as failure:
+            raise ddm.TargetMissed(failure.solution, failure.target, f"{_called(b, names)}: ") from failure
+
+    solutions = dict(zip(bodies, side_by_side(solved, list(bodies), threads_for(bodies))))
+    if any(body.asked.target_error is not None for body in bodies.values()):
+        # Those that meet the target error may be of finer bodies.
+        bodies.update((b, solution.body) for b, solution in solutions.items())
+    return solutions
+
+
+def _called(block: int, names: Sequence[str]) -> str:
+    return names[block] if block < len(names) else f"block {block}"
+
+
+#: Unknowns of a body from which solving it on a thread of its own pays: what is smaller takes about a millisecond, most
+#: of it in the interpreter, and threads then wait for each other (a fourth slower on two cores with 400 unknowns).
+LARGE = 1000
+
+
+def threads_for(bodies: dict[int, Body]) -> int | None:
+    """On how many threads the ``bodies`` are worth being solved; None: all there are."""
+    large = sum(body.boundary.n_unknowns + body.faces.n_unknowns >= LARGE for body in bodies.values())
+    return None if large > 1 else 1
+
+
+#: What of a `BoundaryLoad` is a load.
+_ASKED = tuple(each.name for each in fields(BoundaryLoad) if each.name not in ("imbalance", "bases"))
+
+
+def _same_question(body: Body, known, asked: dict[str, np.ndarray | None]) -> bool:
+    """Whether ``body`` under the load ``asked`` has been solved as ``known``."""
+    return known.body is body and all(
+        (of is None) == (before is None) and (of is None or np.array_equal(of, before))
+        for of, before in ((asked[name], getattr(known.load, name)) for name in _ASKED)
+    )
+
+
+def inherited(history: dict, parent: np.ndarray, cracks: Cracks) -> dict:
+    """child → what the faces of its ``cracks`` remember (`ddm.FaceMemory`), from that of the parents, ``parent``
+    (n_children,). Children keep their parent's reference coordinates, and so its memory; the work done by friction so
+    far goes on with one of them, or a sum over blocks would count it twice."""
+    found, told = {}, set()
+    for child in np.unique(cracks.block).tolist():
+        block = int(parent[child])
+        if block in history:
+            found[child] = replace(history[block], work=0.0, released=Released()) if block in told else history[block]
+            told.add(block)
+    return found
+
+
+def tip_rows(problem: Problem, blocks: Blocks, solutions: dict, nodes_of: dict[int, np.ndarray]) -> np.ndarray:
+    """TIP rows of all solved bodies with the criterion's angle and K_eq, nodes counted in the whole network."""
+    if not solutions:
+        return np.empty(0, TIP)
+    from ...ddm.fracture.f_criterion import judged, judged_rows
+
+    rows, of = [], list(solutions.items())
+    for b, solution in of:
+        tips = solution.tips.copy()
+        tips["node"] = nodes_of[b][tips["node"]]
+        rows.append(tips)
+    tips = rows[0] if len(rows) == 1 else np.concatenate(rows)
+    if problem.growth.trial_kink > 0:
+        angle, k_eq = zip(*(judged(each, problem.growth, problem.materials[blocks.material[b]]) for b, each in of))
+        tips["angle"], tips["k_eq"] = np.concatenate(angle), np.concatenate(k_eq)
+        return tips
+    rock = blocks.material[tips["block"]]
+    for m in np.unique(rock).tolist():
+        own = rock == m
+        tips["angle"][own], tips["k_eq"][own] = judged_rows(tips[own], problem.growth, problem.materials[m])
+    return tips

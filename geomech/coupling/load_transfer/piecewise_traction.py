@@ -1,0 +1,314 @@
+"""Forces put on the outline of a block as tractions on pieces of its edges, each piece linear and on one edge.
+
+Compiled (`boundary_tractions` has the kernel): points and vectors are plain pairs, and what is found goes into ``found``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled import part
+from ...model import Blocks
+
+#: Of what kernels call, and nobody else.
+jit = part(error_model="numpy", nogil=True)
+
+#: Two edges belong to one joint face when their directions differ by less than this.
+FACE_ANGLE = math.radians(10.0)
+FLAT = math.sin(FACE_ANGLE)
+
+#: A face that ends within this part of its edge's length of the edge's end ends there.
+SNAP = 1e-9
+
+#: Pressures end at a multiple of this part of an edge's length. Force and moment are kept on whatever length; and the
+#: body, which knows what segments that it has met before do to it, would meet new ones every step, for faces slide by
+#: strains.
+GRID = 2.0**-12
+
+#: Contacts nearer to each other than this part of a face's length are at one place.
+SAME = 1e-6
+
+#: A point load nearer to an edge than this part of its length stands on it.
+ON_EDGE = 1e-6
+
+#: A lone contact spreads over this part of its edge (of the corner's shorter edge).
+LONE_SPREAD = 1.0 / 20.0
+
+
+#: Pieces of a face on a rigid base. A slot in a block as wide as deep, twice and three times as wide: K to 6e-4, 1e-4
+#: and 2e-3 with 24 of them, 7e-4, 2e-3 and 2 % with 16 (`tests/coupling/test_bases.py`).
+ON_BASE = 24
+
+
+class Outlines(NamedTuple):
+    """The outlines of all blocks: reference ``vertices`` and those ``now`` (n, 2), and of every vertex or edge the
+    ``following`` and the one ``before``, the first edge of its straight side (`Blocks.side_start`) and, of these, where in
+    ``chain`` the vertices along the side begin and end."""
+
+    vertices: np.ndarray
+    now: np.ndarray
+    following: np.ndarray
+    before: np.ndarray
+    side_start: np.ndarray
+    chain_first: np.ndarray
+    chain_last: np.ndarray
+    chain: np.ndarray
+
+
+class Found(NamedTuple):
+    """Rows found so far, as many as there are in ``count`` (3,): ``pieces`` (m, 8), (x, y) of the start and of the end,
+    traction (x, y) there and there; points ``inside`` and forces there (k, 4); and of pieces on ``bases``, from which to
+    which row, and the traction with a unit of pressure (j, 4). What finds no room is only counted."""
+
+    count: np.ndarray
+    pieces: np.ndarray
+    inside: np.ndarray
+    bases: np.ndarray
+
+
+def outlines(blocks: Blocks, now: np.ndarray) -> Outlines:
+    """Those of ``blocks`` whose vertices are ``now`` (n, 2)."""
+    return Outlines(
+        blocks.vertices, np.ascontiguousarray(now), blocks.next_vertex, blocks.previous_vertex, *blocks.side_chains
+    )
+
+
+@jit
+def line_of(of, start):
+    """Start, direction and length of the straight side with the first edge ``start``, reference frame."""
+    last = of.chain[of.chain_last[start] - 1]
+    sx, sy = of.vertices[start, 0], of.vertices[start, 1]
+    x, y = of.vertices[last, 0] - sx, of.vertices[last, 1] - sy
+    length = math.hypot(x, y)
+    return sx, sy, x / length, y / length, length
+
+
+@jit
+def place_along(px, py, sx, sy, ax, ay):
+    """How far from (sx, sy) along a unit (ax, ay) the point (px, py) lies, m."""
+    return (px - sx) * ax + (py - sy) * ay
+
+
+@jit
+def on_grid(place, length):
+    """The multiple of GRID times ``length`` that is nearest to ``place``."""
+    return round(place / (GRID * length)) * (GRID * length)
+
+
+@jit
+def add(found, ax, ay, bx, by, tax, tay, tbx, tby):
+    """A piece from a to b, unless nothing acts on it."""
+    if tax != 0 or tay != 0 or tbx != 0 or tby != 0:
+        add_even_so(found, ax, ay, bx, by, tax, tay, tbx, tby)
+
+
+@jit
+def add_even_so(found, ax, ay, bx, by, tax, tay, tbx, tby):
+    """A piece from a to b."""
+    k = found.count[0]
+    found.count[0] += 1
+    if k < len(found.pieces):
+        row = found.pieces[k]
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7] = ax, ay, bx, by, tax, tay, tbx, tby
+
+
+@jit
+def add_row(count, rows, kind, a, b, c, d):
+    """A row of four, of that ``kind``."""
+    k = count[kind]
+    count[kind] += 1
+    if k < len(rows):
+        rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3] = a, b, c, d
+
+
+@jit
+def add_on_side(found, of, start, low, high, tax, tay, tbx, tby):
+    """A traction that goes from a to b over ``low`` to ``high`` of a straight side: one piece an edge, for a load segment
+    lies on one edge."""
+    sx, sy, ax, ay, length = line_of(of, start)
+    first, last = of.chain_first[start], of.chain_last[start]
+    for k in range(first, last - 1):
+        here, there = of.chain[k], of.chain[k + 1]
+        mark, far = 0.0, length
+        if k > first:
+            mark = place_along(of.vertices[here, 0], of.vertices[here, 1], sx, sy, ax, ay)
+        if k + 1 < last - 1:
+            far = place_along(of.vertices[there, 0], of.vertices[there, 1], sx, sy, ax, ay)
+        a, b = max(low, mark), min(high, far)
+        if b - a > SNAP * length:
+            x0, y0, x1, y1 = sx + a * ax, sy + a * ay, sx + b * ax, sy + b * ay
+            # Bit for bit at the corner where it is there.
+            if a == mark:
+                x0, y0 = of.vertices[here, 0], of.vertices[here, 1]
+            if b == far:
+                x1, y1 = of.vertices[there, 0], of.vertices[there, 1]
+            p, q = (a - low) / (high - low), (b - low) / (high - low)
+            add(
+                found, x0, y0, x1, y1, tax + p * (tbx - tax), tay + p * (tby - tay), tax + q * (tbx - tax),
+                tay + q * (tby - tay),
+            )  # fmt: skip
+
+
+@jit
+def add_base(found, of, start, low, high, p_low, p_high, wx, wy):
+    """A pressure from ``p_low`` to ``p_high`` over ``low`` to ``high`` of a straight side, on pieces that another one may
+    take: short at the ends, where bases press most. (wx, wy) is the traction with a unit of it."""
+    sx, sy, ax, ay, length = line_of(of, start)
+    n = ON_BASE + 1
+    places, vertex = (
+        np.empty(n + of.chain_last[start] - of.chain_first[start]),
+        np.full(n + of.chain_last[start] - of.chain_first[start], -1),
+    )
+    for k in range(ON_BASE):
+        places[k] = low + math.sin(0.5 * math.pi * k / ON_BASE) ** 2 * (high - low)
+    places[ON_BASE] = high
+    for k in range(of.chain_first[start] + 1, of.chain_last[start] - 1):
+        corner = of.chain[k]
+        at = place_along(of.vertices[corner, 0], of.vertices[corner, 1], sx, sy, ax, ay)
+        if low + SNAP * length < at < high - SNAP * length:
+            j = n
+            while places[j - 1] >= at:
+                places[j], vertex[j] = places[j - 1], vertex[j - 1]
+                j -= 1
+            if places[j + 1] == at and j < n:
+                # A corner takes the place of a mark that is there.
+                vertex[j + 1] = corner
+                for i in range(j, n):
+                    places[i], vertex[i] = places[i + 1], vertex[i + 1]
+            else:
+                places[j], vertex[j] = at, corner
+                n += 1
+    if high == length:
+        vertex[n - 1] = of.chain[of.chain_last[start] - 1]
+    x0, y0 = sx + low * ax, sy + low * ay
+    for k in range(1, n):
+        x1, y1 = sx + places[k] * ax, sy + places[k] * ay
+        if vertex[k] >= 0:
+            x1, y1 = of.vertices[vertex[k], 0], of.vertices[vertex[k], 1]
+        p = p_low + (places[k - 1] - low) / (high - low) * (p_high - p_low)
+        q = p_low + (places[k] - low) / (high - low) * (p_high - p_low)
+        add_even_so(found, x0, y0, x1, y1, p * wx, p * wy, q * wx, q * wy)
+        x0, y0 = x1, y1
+
+
+@jit
+def add_corner_force(found, of, vertex, fx, fy):
+    """A force on a corner, resolved along its two edges: shear on a short piece of each."""
+    previous, following = of.before[vertex], of.following[vertex]
+    x, y = of.vertices[vertex, 0], of.vertices[vertex, 1]
+    bx, by = x - of.vertices[previous, 0], y - of.vertices[previous, 1]
+    ax, ay = of.vertices[following, 0] - x, of.vertices[following, 1] - y
+    before, after = math.hypot(bx, by), math.hypot(ax, ay)
+    reach = LONE_SPREAD * min(before, after)
+    bx, by, ax, ay = bx / before, by / before, ax / after, ay / after
+    turn = bx * ay - by * ax
+    x0, y0, x1, y1 = x - reach * bx, y - reach * by, x + reach * ax, y + reach * ay
+    fx, fy = fx / reach, fy / reach
+    if abs(turn) < FLAT:
+        # The corner is as good as flat: its two edges cannot resolve a force across them. Half of it goes on each; the
+        # middle of the two halves is off the corner, and what moment that makes one half, across, gives the other.
+        sx, sy = ax + bx, ay + by
+        cross = ((ax - bx) * fy - (ay - by) * fx) / (2 * (sx * sx + sy * sy))
+        ox, oy = -cross * sy, cross * sx
+        tx, ty = fx / 2 + ox, fy / 2 + oy
+        add(found, x0, y0, x, y, tx, ty, tx, ty)
+        tx, ty = fx / 2 - ox, fy / 2 - oy
+        add(found, x, y, x1, y1, tx, ty, tx, ty)
+        return
+    on_before, on_after = (fx * ay - fy * ax) / turn, (bx * fy - by * fx) / turn
+    tx, ty = on_before * bx, on_before * by
+    add(found, x0, y0, x, y, tx, ty, tx, ty)
+    tx, ty = on_after * ax, on_after * ay
+    add(found, x, y, x1, y1, tx, ty, tx, ty)
+
+
+@jit
+def add_edge_force(found, of, edge, px, py, fx, fy):
+    """A force at a point of an edge, spread over a short piece of it with the same moment. One beyond its end acts at
+    that end; returned is the couple that is then left, N m."""
+    x, y = of.vertices[edge, 0], of.vertices[edge, 1]
+    following = of.following[edge]
+    ex, ey = of.vertices[following, 0], of.vertices[following, 1]
+    length = math.hypot(ex - x, ey - y)
+    ax, ay = (ex - x) / length, (ey - y) / length
+    acts_at = place_along(px, py, x, y, ax, ay)
+    place = min(max(acts_at, 0.0), length)
+    couple = (acts_at - place) * (ax * fy - ay * fx)
+    # About the point, hence narrower near an end of the edge; at the very end it is a corner force.
+    if min(place, length - place) < SAME * length:
+        add_corner_force(found, of, edge if place < length / 2 else following, fx, fy)
+        return couple
+    middle = on_grid(place, length)
+    middle = place if middle <= 0.0 or middle >= length else middle
+    half = min(LONE_SPREAD * length / 2, middle, length - middle)
+    tx, ty = fx / (2 * half), fy / (2 * half)
+    # The push across the edge is where the point is, not in the middle.
+    tilt = 3 * (place - middle) / half * (ax * ty - ay * tx)
+    low, high = middle - half, middle + half
+    add(
+        found, x + low * ax, y + low * ay, x + high * ax, y + high * ay, tx + tilt * ay, ty - tilt * ax,
+        tx - tilt * ay, ty + tilt * ax,
+    )  # fmt: skip
+    return couple
+
+
+@jit
+def add_couple(found, of, first, last, area, couple):
+    """A ``couple`` as an even shear flow q along all edges, ``first`` to ``last``, of a block of this ``area``: Bredt's
+    M = 2 A q. It has no resultant, stretches nothing in the mean, and stays small however short the edge is that the
+    forces have slid beyond."""
+    if couple == 0:
+        return
+    for edge in range(first, last):
+        x0, y0 = of.vertices[edge, 0], of.vertices[edge, 1]
+        x1, y1 = of.vertices[of.following[edge], 0], of.vertices[of.following[edge], 1]
+        flow = couple / (2 * area * math.hypot(x1 - x0, y1 - y0))
+        tx, ty = flow * (x1 - x0), flow * (y1 - y0)
+        add(found, x0, y0, x1, y1, tx, ty, tx, ty)
+
+
+@jit
+def add_edge_piece(found, of, row, c, s):
+    """A piece of an edge (EDGE_FORCE row, current coordinates) with its traction, which is linear there too: the block's
+    motion is affine. Its ends stay bit for bit at the edge's where they are there."""
+    first, last = row.edge, of.following[row.edge]
+    nx, ny = of.now[last, 0] - of.now[first, 0], of.now[last, 1] - of.now[first, 1]
+    ax, ay, bx, by = of.vertices[first, 0], of.vertices[first, 1], of.vertices[last, 0], of.vertices[last, 1]
+    length = math.hypot(nx, ny)
+    stretch = length / math.hypot(bx - ax, by - ay)
+    s0 = ((row.start[0] - of.now[first, 0]) * nx + (row.start[1] - of.now[first, 1]) * ny) / length**2
+    s1 = ((row.end[0] - of.now[first, 0]) * nx + (row.end[1] - of.now[first, 1]) * ny) / length**2
+    if abs(s1 - s0) <= SNAP:
+        return  # as where a water table meets the edge's end: no force to speak of, and no length to put it on
+    x0, y0, x1, y1 = ax + s0 * (bx - ax), ay + s0 * (by - ay), ax + s1 * (bx - ax), ay + s1 * (by - ay)
+    if s0 < SNAP:
+        x0, y0 = ax, ay
+    if s1 > 1 - SNAP:
+        x1, y1 = bx, by
+    t = row.traction
+    add(
+        found, x0, y0, x1, y1, stretch * (c * t[0, 0] + s * t[0, 1]), stretch * (c * t[0, 1] - s * t[0, 0]),
+        stretch * (c * t[1, 0] + s * t[1, 1]), stretch * (c * t[1, 1] - s * t[1, 0]),
+    )  # fmt: skip
+
+
+@jit
+def add_point_load(found, of, first, last, px, py, fx, fy):
+    """A point load on an edge, of those from ``first`` to ``last``, is spread a little along it; one ``inside`` the rock
+    stays one. Returned is the couple that is left."""
+    nearest, least, scale = first, np.inf, 0.0
+    for edge in range(first, last):
+        x, y = of.vertices[edge, 0], of.vertices[edge, 1]
+        ax, ay = of.vertices[of.following[edge], 0] - x, of.vertices[of.following[edge], 1] - y
+        place = min(max(((px - x) * ax + (py - y) * ay) / (ax * ax + ay * ay), 0.0), 1.0)
+        distance = math.hypot(x + place * ax - px, y + place * ay - py)
+        if distance < least:
+            nearest, least, scale = edge, distance, math.hypot(ax, ay)
+    if least <= ON_EDGE * scale:
+        return add_edge_force(found, of, nearest, px, py, fx, fy)
+    if fx != 0 or fy != 0:
+        add_row(found.count, found.inside, 1, px, py, fx, fy)
+    return 0.0

@@ -1,0 +1,83 @@
+"""Blocks that nothing holds: static equilibrium sought and not found, blocks that slide on and on, or one gone out of
+reach."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from ... import dda
+from ...model import Event, State
+from ..coupled_state import CrackedBlocks
+from ..cycle_record import event
+from .mechanism import Mechanism
+
+log = logging.getLogger(__name__)
+
+
+def relax(now: CrackedBlocks, load_time: float) -> tuple[Event, ...]:
+    """Bring the blocks to rest under the loads of ``load_time``; a collapse when there is no equilibrium."""
+    with now.timed("dda"):
+        found = dda.equilibrium(
+            now.system, now.state, now.problem.loads, load_time=load_time, crack=now.response,
+            tolerance=now.problem.dda.unbalanced_tolerance,
+        )  # fmt: skip
+    # The budget is one of the steps that are recorded.
+    now.state, now.budget = found.state, now.budget.cut()
+    if not found.collapsed:
+        if not found.converged:
+            log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+        return ()
+    return _fallen(now, found, "", load_time)
+
+
+def collapse_in_situ(now: CrackedBlocks) -> tuple[Event, ...]:
+    """A collapse, when nothing held the blocks under the in-situ stress."""
+    if now.collapsed is None:
+        return ()
+    return _fallen(now, now.collapsed, "under the in-situ stress there is ", now.state.time)
+
+
+def _fallen(now: CrackedBlocks, found: dda.Equilibrium, where: str, time: float) -> tuple[Event, ...]:
+    detail = where + found.reason
+    log.warning("t = %g s: %s; the run ends", time, detail)
+    first = int(now.blocks.vertex_start[found.moving[0]])
+    return (event(now, "collapse", now.state, now.blocks.vertices[first], detail),)
+
+
+def lost(now: CrackedBlocks, state: State) -> tuple[Event, ...]:
+    """A collapse, when a block has gone farther than the blocks reach: in statics nothing will hold it any more, and
+    ever shorter steps would follow it for ever."""
+    moved = np.hypot(*(state.vertices - now.blocks.vertices).T)
+    farthest = int(np.argmax(moved))
+    if not moved[farthest] > np.hypot(*np.ptp(now.blocks.vertices, axis=0)):
+        return ()
+    name = now.blocks.names[now.blocks.vertex_block[farthest]]
+    detail = f"nothing holds {name}: it has moved {moved[farthest]:.3g} m"
+    log.warning("t = %g s: %s; the run ends", state.time, detail)
+    return (event(now, "collapse", state, now.blocks.vertices[farthest], detail),)
+
+
+def unheld(now: CrackedBlocks, result: dda.StepResult, mechanism: Mechanism) -> tuple[Event, ...]:
+    """A mechanism, when blocks of a static run go on without bound after the load step of ``result``."""
+    found = mechanism.check(result, now.blocks)
+    if found is None:
+        return ()
+    block, detail = found
+    told = event(now, "mechanism", result.state, now.blocks.vertices[int(now.blocks.vertex_start[block])], detail)
+    if now.problem.run.stepping == "events":
+        log.warning(
+            "cycle %d, t = %g s: %s; the run ends: no load has an equilibrium from here on. Follow it with "
+            'dda.dynamic_factor = 1 and stepping "fixed"',
+            now.number, result.state.time, detail,
+        )  # fmt: skip
+        return (told,)
+    load = f" and a load of {told.load / 1e3:.4g} kPa" if told.load else ""
+    log.warning(
+        "cycle %d, t = %g s%s: %s. What they move by from here on means nothing in a static run: follow it with "
+        "dda.dynamic_factor = 1, find its limit with `geomech safety`, or end here: "
+        'run.stop_at = ["mechanism"]',
+        now.number, result.state.time, load, detail,
+    )  # fmt: skip
+    return (told,)

@@ -1,0 +1,81 @@
+"""Blocks of a static run that nothing holds: what forces leave over is borne by the inertia of the steps alone.
+
+A static step, which carries no velocity, solves (2M/dt² + K) d = F. What rests, or is strained, takes of F a part that
+fades from step to step, K d. What slides or turns without bound takes the same force in every step, 2M d/dt²: its
+displacements are those of steps of that length, and no answer to the load.
+"""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from ... import dda
+from ...model import Blocks
+
+log = logging.getLogger(__name__)
+
+#: Blocks are held when less than this part of the forces on any of them is left to move it.
+HELD = 1e-2
+#: Where more is left, it must have faded by more than this part over so many load steps. Slowly rising loads on elastic
+#: rock leave less than the former part, and blocks that settle fade faster: a column of 100 m, in steps of 10 ms, by a
+#: third.
+FADES, STEPS = 0.1, 5
+#: What flies, with nearly all its weight to move it, may still land: it is told of when it has gone this part of its
+#: size.
+FLYING, GONE = 0.99, 0.05
+#: So many blocks are named.
+NAMED = 4
+
+
+class Mechanism:
+    """Watches the load steps of a static run; tells of a mechanism once, and again when blocks have been at rest in
+    between."""
+
+    def __init__(self) -> None:
+        self.ratios: list[float] = []
+        self.ways: list[float] = []
+        self.told = False
+
+    def check(self, result: dda.StepResult, blocks: Blocks) -> tuple[int, str] | None:
+        """After the load step of ``result``: the block that moves fastest and what is to be said, where blocks have
+        been out of balance for `STEPS` load steps and what is out of balance does not fade."""
+        ratio = float(result.statistics["unbalanced_ratio"])
+        if not ratio > HELD:
+            self.ratios, self.ways, self.told = [], [], False
+            return None
+        self.ratios = [*self.ratios[-STEPS:], ratio]
+        self.ways = [*self.ways[-STEPS:], float(np.hypot(*(result.state.vertices - blocks.vertices).T).max())]
+        if self.told or len(self.ratios) <= STEPS or ratio < (1.0 - FADES) * self.ratios[0]:
+            return None
+        speed = np.hypot(*result.state.velocity[:, :2].T)
+        speed[np.asarray(blocks.fixed, bool)] = 0.0
+        if self._stretches(result, blocks, int(np.argmax(speed))):
+            return None
+        if ratio > FLYING and not _has_gone(int(np.argmax(speed)), result, blocks):
+            return None
+        self.told = True
+        moving = np.flatnonzero(speed > 0.1 * speed.max())
+        moving = moving[np.argsort(-speed[moving], kind="stable")]
+        named = ", ".join(blocks.names[b] if blocks.names else f"block {b}" for b in moving[:NAMED].tolist())
+        others = len(moving) - NAMED
+        return int(moving[0]), (
+            f"nothing holds {named}{f' and {others} more' if others > 0 else ''}: {100 * ratio:.2g} % of the forces on "
+            "a block are left over, step after step"
+        )
+
+    def _stretches(self, result: dda.StepResult, blocks: Blocks, block: int) -> bool:
+        """Whether a bolt that is being stretched will hold the ``block``: what it has gained so far, on the way so far,
+        will balance the rest before the block has gone `GONE` of its size."""
+        bolts = result.state.bolts
+        if not (bolts["installed"] & ~bolts["broken"]).any():
+            return False
+        gained, way = self.ratios[0] - self.ratios[-1], self.ways[-1] - self.ways[0]
+        return gained > 0 and way * self.ratios[-1] <= gained * GONE * float(np.sqrt(blocks.areas()[block]))
+
+
+def _has_gone(block: int, result: dda.StepResult, blocks: Blocks) -> bool:
+    own = slice(blocks.vertex_start[block], blocks.vertex_start[block + 1])
+    way = np.hypot(*(result.state.vertices[own] - blocks.vertices[own]).T)
+    return bool(way.min() > GONE * np.sqrt(blocks.areas()[block]))

@@ -1,0 +1,311 @@
+"""Blocks that cracks have cut through become two or more.
+
+The outline, the holes and the cracks of a block are a planar graph whose nodes are already shared (mouths lie on the
+edges, crossings have a node), so the pieces are its faces: nothing is snapped here, and every coordinate that comes out
+is one that went in.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...model import CONTACT, Blocks, Cracks, Motion, State
+from .planar_graph import BlockGraph, faces_without_slivers, steps
+
+_log = logging.getLogger(__name__)
+
+# What becomes of a crack segment: it stays a crack, is a face of two children, or went with a sliver.
+CRACK, WALL, MERGED = 0, 1, 2
+
+#: Loops of a polygon in reference coordinates → mean stress in it (3,), Pa, current axes.
+MeanStress = Callable[[list[np.ndarray]], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """The scene after a split.
+
+    blocks     the children stand where their parent stood, the others as they were
+    state      its velocity, stress, rotation and crack strain handed down, contacts renumbered
+    cracks     what is not a block face now, each segment with the child that holds it
+    parent     (n_blocks,) the block before the split that each one comes from
+    lost_area  (n_blocks before,) m², area of each block less that of its parts: round-off, for slivers are merged
+    vertex_origin, edge_origin   (n_vertices,) the vertex, and the edge, before the split that each vertex, and the edge
+                                 that leaves
+               it, is (part of); −1 for a new vertex and for an edge that was a crack face
+    edge_span  (n_vertices, 2) from where to where on that edge, 0 to 1
+    """
+
+    blocks: Blocks
+    state: State
+    cracks: Cracks
+    parent: np.ndarray
+    lost_area: np.ndarray
+    vertex_origin: np.ndarray
+    edge_origin: np.ndarray
+    edge_span: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """One block to be: loops of (vertices, current coordinates, edge names), and where they come from."""
+
+    loops: list[tuple[np.ndarray, np.ndarray, list[str]]]
+    origin: list[np.ndarray]  # a loop each: old vertex, −1 for a new one
+    edge_origin: list[np.ndarray]  # a loop each: old edge that the edge is (part of), −1 for a crack face
+    edge_span: list[np.ndarray]  # a loop each, (n, 2): from where to where on the old edge, 0 to 1
+    parent: int
+    name: str
+
+
+def divided(blocks: Blocks, cracks: Cracks) -> np.ndarray:
+    """The blocks that ``cracks`` cut in two. Raises ValueError as `split_blocks`."""
+    return np.array([b for b in np.unique(cracks.block).tolist() if BlockGraph.of(blocks, b, cracks).closes()], int)
+
+
+def split_blocks(
+    blocks: Blocks, state: State, cracks: Cracks, mean_stress: Mapping[int, MeanStress] | None = None
+) -> Split | None:
+    """Split every block that its cracks (with its boundary) divide; None when there is none.
+
+    Children inherit material, fixity and the names of their edges; new edges are called "crack:<name>", children
+    "<parent>/1", "<parent>/2" … The parent's vertices keep reference and current coordinates to the last bit, new ones
+    follow its affine motion. The velocity is the parent's field, told about the child's centroid, so that mass,
+    momentum and angular momentum are those of the parent. Stress is the parent's, or what ``mean_stress[block]`` gives
+    for the child's loops. A child that still holds cracks keeps the parent's crack strain, one that is whole has none.
+
+    Contacts follow their vertices and edges. One whose vertex now belongs to two blocks is dropped (and logged): the
+    next contact search finds it on both. Raises ValueError for a crack mouth that is not on its block's boundary.
+    """
+    cut: dict[int, BlockGraph] = {}
+    for block in np.unique(cracks.block) if cracks.n_segments else ():
+        graph = BlockGraph.of(blocks, int(block), cracks)
+        if graph.closes():
+            cut[int(block)] = graph
+    if not cut:
+        return None
+    motion = Motion.of(blocks, state.vertices)
+    pieces: list[_Piece] = []
+    fate = np.full(cracks.n_segments, CRACK)
+    holder = np.full(cracks.n_segments, -1)
+    for block in range(blocks.n_blocks):
+        if block in cut:
+            own = cut[block].segments
+            children, fate[own], holder[own] = _divide(blocks, state, cracks, cut[block], motion)
+            holder[own] += len(pieces)
+            pieces += children
+        else:
+            holder[cracks.block == block] = len(pieces)
+            pieces.append(_whole(blocks, state, block))
+    parent = np.array([piece.parent for piece in pieces])
+    children_blocks = _assemble(blocks, pieces)
+    vertices = np.concatenate([now for piece in pieces for _, now, _ in piece.loops])
+
+    rest = _remaining(cracks, fate, holder)
+    held = np.isin(np.arange(len(parent)), rest.block)
+    divided = np.bincount(parent, minlength=blocks.n_blocks)[parent] > 1
+
+    stress = state.stress[parent].copy()
+    if mean_stress is not None:
+        for child in np.flatnonzero(divided):
+            if int(parent[child]) in mean_stress:
+                stress[child] = mean_stress[int(parent[child])](children_blocks.loops(int(child)))
+    crack_strain = np.where((held | ~divided)[:, None], state.crack_strain[parent], 0.0)
+    after = replace(
+        state,
+        vertices=vertices,
+        velocity=_velocity(blocks, state, children_blocks, vertices, parent),
+        stress=stress,
+        rotation=state.rotation[parent].copy(),
+        crack_strain=crack_strain,
+        contacts=_contacts(state.contacts, pieces),
+        acceleration=None,
+        removed=None if state.removed is None else state.removed[parent],
+    )
+    lost = blocks.areas() - np.bincount(parent, weights=children_blocks.areas(), minlength=blocks.n_blocks)
+    origin, edge_origin, span = (
+        np.concatenate([part for piece in pieces for part in getattr(piece, name)])
+        for name in ("origin", "edge_origin", "edge_span")
+    )
+    return Split(children_blocks, after, rest, parent, lost, origin, edge_origin, span)
+
+
+def _divide(
+    blocks: Blocks, state: State, cracks: Cracks, graph: BlockGraph, motion: Motion
+) -> tuple[list[_Piece], np.ndarray, np.ndarray]:
+    """The children of one block; the fate of each of its crack segments; and which child (from 0) holds it."""
+    import shapely
+
+    parent = graph.block
+    faces, kept = faces_without_slivers(graph, blocks.names[parent])
+    walls = {step for rings in faces for ring in rings for step in steps(ring)}
+    is_wall = np.array([(a, b) in walls for a, b in graph.ends.tolist()], dtype=bool)
+    wall_nodes = np.zeros(len(graph.points), bool)
+    wall_nodes[graph.ends[is_wall]] = True
+    needed = (graph.vertex >= 0) | wall_nodes  # a mouth of a crack that goes nowhere is no corner of a block
+
+    boundary = {(a, b): k for k, (a, b) in enumerate(graph.edges.tolist())}
+    face_name = {}
+    for k in np.flatnonzero(is_wall).tolist():
+        name = "crack:" + cracks.names[cracks.crack[graph.segments[k]]]
+        face_name[tuple(graph.ends[k].tolist())] = face_name[tuple(graph.ends[k, ::-1].tolist())] = name
+
+    current = motion.current(parent, graph.points)
+    old = graph.vertex >= 0
+    current[old] = state.vertices[graph.vertex[old]]
+
+    # In the order of their lowest old vertex; pieces without one, islands, last.
+    def order(rings: list[np.ndarray]) -> tuple:
+        vertices = [v for ring in rings for v in graph.vertex[ring].tolist() if v >= 0]
+        return (min(vertices, default=blocks.n_vertices), tuple(graph.points[rings[0]].min(axis=0).tolist()))
+
+    pieces, polygons = [], []
+    for n, rings in enumerate(sorted(faces, key=order)):
+        loops, origin, edge_origin, edge_span = [], [], [], []
+        for ring in rings:
+            ring = _from_first(graph, ring)
+            names, edges, spans, corners = [], [], [], []
+            for a, b in steps(ring):
+                k = boundary.get((a, b), -1)
+                if needed[a]:
+                    corners.append(a)
+                    names.append(face_name[a, b] if k < 0 else blocks.edge_names[blocks.edge_name[graph.edge[k]]])
+                    edges.append(-1 if k < 0 else int(graph.edge[k]))
+                    spans.append([0.0, 1.0] if k < 0 else graph.span[k].tolist())
+                else:
+                    spans[-1][1] = graph.span[k, 1]  # the edge goes on past the mouth
+            corners = np.array(corners)
+            loops.append((graph.points[corners], current[corners], names))
+            origin.append(graph.vertex[corners])
+            edge_origin.append(np.array(edges))
+            edge_span.append(np.array(spans))
+        name = f"{blocks.names[parent]}/{n + 1}" if len(faces) > 1 else blocks.names[parent]
+        pieces.append(_Piece(loops, origin, edge_origin, edge_span, parent, name))
+        polygons.append(shapely.Polygon(loops[0][0], [loop[0] for loop in loops[1:]]))
+
+    # Its middle tells where a segment lies: its ends may be on the boundary of several children.
+    middles = shapely.points(graph.points[graph.ends].mean(axis=1))
+    apart = np.array([shapely.distance(polygon, middles) for polygon in polygons])
+    return pieces, np.where(is_wall, WALL, np.where(kept, CRACK, MERGED)), apart.argmin(axis=0)
+
+
+def _from_first(graph: BlockGraph, ring: np.ndarray) -> np.ndarray:
+    """The ring turned to start at its lowest old vertex, or at its lowest leftmost point: the same on every machine."""
+    vertex = graph.vertex[ring]
+    if (vertex >= 0).any():
+        at = int(np.where(vertex >= 0, vertex, vertex.max() + 1).argmin())
+    else:
+        at = int(np.lexsort(graph.points[ring].T)[0])
+    return np.roll(ring, -at)
+
+
+def _whole(blocks: Blocks, state: State, block: int) -> _Piece:
+    """A block that stays as it is."""
+    loops, origin = [], []
+    for k in range(blocks.block_loop[block], blocks.block_loop[block + 1]):
+        own = np.arange(blocks.loop_start[k], blocks.loop_start[k + 1])
+        names = [blocks.edge_names[e] for e in blocks.edge_name[own]]
+        loops.append((blocks.vertices[own], state.vertices[own], names))
+        origin.append(own)
+    spans = [np.tile([0.0, 1.0], (len(own), 1)) for own in origin]
+    return _Piece(loops, origin, origin, spans, block, blocks.names[block])
+
+
+# -- what is handed down ---------------------------------------------------------------------------------------------
+
+
+def _assemble(blocks: Blocks, pieces: list[_Piece]) -> Blocks:
+    """The new blocks, loops exactly as the pieces have them; edge names known before keep their numbers."""
+    loops = [loop for piece in pieces for loop in piece.loops]
+    known = {name: k for k, name in enumerate(blocks.edge_names)}
+    labels = [known.setdefault(name, len(known)) for _, _, names in loops for name in names]
+    parent = np.array([piece.parent for piece in pieces])
+    return Blocks(
+        vertices=np.concatenate([points for points, _, _ in loops]),
+        loop_start=np.cumsum([0, *(len(points) for points, _, _ in loops)]),
+        block_loop=np.cumsum([0, *(len(piece.loops) for piece in pieces)]),
+        material=blocks.material[parent],
+        fixed=blocks.fixed[parent],
+        held=None if blocks.held is None else blocks.held[parent],
+        edge_name=np.array(labels, dtype=int),
+        edge_names=tuple(known),
+        names=tuple(piece.name for piece in pieces),
+    )
+
+
+def _velocity(blocks: Blocks, state: State, children: Blocks, vertices: np.ndarray, parent: np.ndarray) -> np.ndarray:
+    """The parents' first-order velocity fields, told about the children's current centroids."""
+    velocity = state.velocity[parent].copy()
+    for child in np.flatnonzero(np.bincount(parent, minlength=blocks.n_blocks)[parent] > 1):
+        whole = _centroid(blocks.loops(int(parent[child]), state.vertices))
+        x, y = _centroid(children.loops(int(child), vertices)) - whole
+        u0, v0, r, ex, ey, g = state.velocity[parent[child]]
+        velocity[child, 0] = u0 - r * y + ex * x + g / 2 * y
+        velocity[child, 1] = v0 + r * x + g / 2 * x + ey * y
+    return velocity
+
+
+def _centroid(loops: list[np.ndarray]) -> np.ndarray:
+    base = loops[0][0]
+    area, moment = 0.0, np.zeros(2)
+    for loop in loops:
+        p = loop - base
+        q = np.roll(p, -1, axis=0)
+        cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+        area += cross.sum() / 2
+        moment += cross @ (p + q) / 6
+    return base + moment / area
+
+
+def _remaining(cracks: Cracks, fate: np.ndarray, holder: np.ndarray) -> Cracks:
+    """The segments that are still cracks, with their blocks' new numbers. A node on a new boundary is a mouth now; one
+    at which cracks of two children met becomes a node for each."""
+    rows = np.flatnonzero(fate == CRACK)
+    on_wall = np.zeros(len(cracks.nodes), bool)
+    on_wall[cracks.segments[fate == WALL]] = True
+    pairs = np.column_stack([cracks.segments[rows].ravel(), np.repeat(holder[rows], 2)])
+    unique, number = np.unique(pairs, axis=0, return_inverse=True)
+    return Cracks(
+        nodes=cracks.nodes[unique[:, 0]],
+        segments=number.reshape(-1, 2),
+        crack=cracks.crack[rows],
+        block=holder[rows],
+        birth_cycle=cracks.birth_cycle[rows],
+        aperture=cracks.aperture[rows],
+        surface=(cracks.surface | on_wall)[unique[:, 0]],
+        names=cracks.names,
+        law=cracks.law[rows],
+    )
+
+
+def _contacts(contacts: np.ndarray, pieces: list[_Piece]) -> np.ndarray:
+    """The contacts with their new vertices, edges and blocks."""
+    vertices: dict[int, list[tuple[int, int]]] = {}
+    edges: dict[int, list[tuple[int, int, float, float]]] = {}
+    at = 0
+    for number, piece in enumerate(pieces):
+        for origin, edge_origin, span in zip(piece.origin, piece.edge_origin, piece.edge_span):
+            for k in range(len(origin)):
+                vertices.setdefault(int(origin[k]), []).append((at + k, number))
+                edges.setdefault(int(edge_origin[k]), []).append((at + k, number, *span[k]))
+            at += len(origin)
+    kept = []
+    for row in contacts:
+        owners = vertices[int(row["vertex"])]
+        if len(owners) > 1:
+            _log.info("contact of vertex %d dropped: the vertex is split between two blocks", int(row["vertex"]))
+            continue
+        # The part of the old edge that holds the contact; just outside a part when the contact lies off the edge's end.
+        edge, other, start, end = min(
+            edges[int(row["edge"])], key=lambda part: max(part[2] - row["position"], row["position"] - part[3], 0.0)
+        )
+        new = row.copy()
+        new["vertex"], new["block"] = owners[0]
+        new["edge"], new["other"] = edge, other
+        new["position"] = (row["position"] - start) / (end - start)
+        kept.append(new)
+    return np.array(kept, dtype=CONTACT) if kept else np.empty(0, CONTACT)

@@ -1,0 +1,392 @@
+"""What crack faces carry when blocks part along them becomes what the contacts of the new blocks begin with.
+
+The last solution of the whole body is in equilibrium, and so is every part of it under the tractions on its own
+boundary. Each segment of a new face hands its traction on to the contacts at its two ends by the linear shape
+functions, which keep force and moment, press nowhere where the faces do not and break no Coulomb law that they obey.
+Faces that are apart leave a gap, and faces that have slid their slip. Along what the crack has only just cut, rock bore
+the stress: where it pressed as a whole, its resultant stays, with as much shear as the new joint can take; where it
+pulled, it lets go. Edges that a mouth has divided are treated likewise, with the traction from outside. The other
+contacts of the parts keep the forces that they had, whatever their springs become.
+
+All that holds where the last pass has left the blocks. In statics a block that hangs by a thread is strained beyond
+measure before it parts; it then starts from where the load step began, and nothing is told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import dda
+from ...conventions import normal_of, traction
+from ...dda.contact_detection.initial_overlap import REFUSED
+from ...dda.joint_laws.bonds import WHOLE
+from ...dda.loads.force_records import EDGE_FORCE
+from ...model import OPEN, Blocks, Loads, State
+from ...model.blocks.block_arrays import STRAIGHT
+from ..load_transfer.boundary_tractions import BoundaryLoad
+from .block_splitting import Split
+from .face_inheritance import from_their_faces
+
+#: Points and nodes nearer to a segment than this part of its length lie on it.
+_ON = 1e-7
+#: … and load segments, on the line through the ends of a straight side.
+_ON_SIDE = 4 * STRAIGHT
+#: Contacts press along normals nearer to a face's than this (cosine, 4°): those of faces that bend no more are one.
+_ALIGNED = 0.9975
+#: Gauss points on a segment of whole rock.
+_IN_ROCK = 12
+#: Gauss points on a piece of a load that is linear: its moment is a cubic at most.
+_IN_LOAD = 2
+#: Faces that are farther apart than this part of the smaller block's size (√area) are told to be so far, and press no
+#: deeper into each other: contacts are sought as far off as faces pass each other by, which must not reach the blocks'
+#: other sides.
+_FARTHEST = 0.02
+#: Faces have opened, beyond the width that they were given, by no more than this part of that size. Parts stand where
+#: their parent did, face on face, and as they close lie in each other by the gap that is told; one that hung by a
+#: thread had opened by any amount, without inertia. Half of what is refused in a drawing.
+_OPENED = 0.5 * REFUSED
+#: Mean strains of cracks up to here are small: strains of rock that breaks are a few thousandths.
+_SMALL = 0.01
+#: Forces below this part of the largest are round-off.
+_NOTHING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """Crack faces of a solved body at points: traction (normal, shear) at nodes with their share of the length, gaps
+    and slip at the ends of elements; reference coordinates."""
+
+    nodes: np.ndarray  # (k, 2)
+    share: np.ndarray  # (k,) m
+    traction: np.ndarray  # (k, 2) Pa
+    ends: np.ndarray  # (n, 2, 2) of each element
+    width: np.ndarray  # (n, 1) m, apart as given
+    opening: np.ndarray  # (n, 2) m
+    slip: np.ndarray  # (n, 2) m
+
+    @classmethod
+    def of(cls, solution) -> _Faces:
+        faces, elements = solution.faces, solution.body.faces
+        ends = np.stack([elements.start, elements.end], axis=1)
+        along = (ends[:, 1] - ends[:, 0])[:, None]
+        length = np.hypot(along[..., 0], along[..., 1])
+        at = 2 * np.sum((elements.nodes - ends[:, :1]) * along, axis=2) / length**2 - 1
+        # Weights that are exact for polynomials through the nodes: positive at Chebyshev's and Gauss's.
+        table = np.polynomial.legendre.legvander(at, at.shape[1] - 1).transpose(0, 2, 1)
+        whole = np.zeros((len(at), at.shape[1], 1))
+        whole[:, 0] = length
+        aperture = solution.body.cracks.aperture[elements.source][:, None]
+        # A slot that cannot close has no width that is known.
+        aperture = np.where(np.isfinite(aperture), aperture, 0.0)
+        return cls(
+            elements.nodes.reshape(-1, 2),
+            np.linalg.solve(table, whole).ravel(),
+            faces.traction[:, 1:-1].reshape(-1, 2),
+            ends,
+            aperture,
+            faces.opening[:, [0, -1]],
+            faces.slip[:, [0, -1]],
+        )
+
+    def on(self, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """(places from 0 to 1, shares m, tractions) on the segment from ``a`` to ``b``; None where it is no crack
+        yet."""
+        here = np.repeat(self._elements_on(a, b), len(self.nodes) // len(self.ends))
+        # Elements graded to a corner at its end may be shorter than what tells them from the segment.
+        if self.share[here].sum() < 0.5 * np.hypot(*(b - a)):
+            return None
+        return _along(self.nodes[here], a, b)[0], self.share[here], self.traction[here]
+
+    def ends_at(self, a: np.ndarray, b: np.ndarray, most: float) -> tuple[np.ndarray, np.ndarray]:
+        """(2,) gap and (2,) slip at the ends of the segment from ``a`` to ``b``, opened by ``most`` m."""
+        here = self._elements_on(a, b)
+        points = self.ends[here].reshape(-1, 2)
+        nearest = [int(np.argmin(np.hypot(*(points - end).T))) for end in (a, b)]
+        gap = np.maximum(self.width[here] + np.minimum(self.opening[here], most), 0.0)
+        return gap.ravel()[nearest], self.slip[here].ravel()[nearest]
+
+    def _elements_on(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """(n,) which elements have their middle on the segment from ``a`` to ``b``."""
+        return _along(self.ends.mean(axis=1), a, b)[1]
+
+
+def holds_together(state: State, blocks: np.ndarray) -> bool:
+    """Whether the ``blocks`` (numbers) have small strains of cracks in ``state``, so that parts may begin where they
+    stand."""
+    return bool(np.abs(state.crack_strain[blocks]).max(initial=0.0) <= _SMALL)
+
+
+def _along(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where on the segment from ``a`` to ``b`` the ``points`` (n, 2) are, 0 to 1, and which of them are on it at
+    all."""
+    d = b - a
+    square = float(d @ d)
+    place = (points - a) @ d / square
+    off = np.abs((points - a) @ normal_of(d)) / square
+    return place, (off <= _ON) & (place >= -_ON) & (place <= 1 + _ON)
+
+
+@dataclass(eq=False)
+class _Told:
+    """Forces summed up for the contacts (n,) of a `ContactSet`, in current axes, on the block of the vertex."""
+
+    force: np.ndarray
+    gap: np.ndarray
+    slip: np.ndarray
+    known: np.ndarray
+
+    @classmethod
+    def none(cls, n: int) -> _Told:
+        return cls(np.zeros((n, 2)), np.full(n, np.inf), np.zeros(n), np.zeros(n, bool))
+
+
+def contacts_after(
+    system: dda.BlockSystem,
+    split: Split,
+    before: Blocks,
+    solutions: dict,
+    loads: dict[int, BoundaryLoad],
+    acting: Loads,
+    contacts: np.ndarray,
+) -> np.ndarray:
+    """CONTACT rows for the blocks of ``split``, whose next step begins with the forces at the end of the last.
+
+    ``system`` is that of the new blocks, ``before`` are those that were cut, ``solutions`` and boundary ``loads``
+    (block →) those of the last pass at ``split.state``; ``acting`` are the loads of the blocks, ``contacts`` the
+    CONTACT rows before the split.
+    """
+    blocks, state = split.blocks, split.state
+    near = system.contacts_near(state)
+    found = from_their_faces(near, state.contacts, contacts, split.parent)
+    parts = np.bincount(split.parent, minlength=before.n_blocks)
+    cut = [b for b in np.flatnonzero(parts > 1).tolist() if b in solutions]
+    if not len(found) or (found is near and not cut):
+        return state.contacts
+    told = _Told.none(len(found))
+    loaded = {load.edge_name for load in acting.edge_tractions}
+    wet = np.zeros(0, EDGE_FORCE)
+    if cut and acting.water is not None:
+        alone = Loads(water=acting.water)
+        wet = system.load_map.rows(alone, state.time, np.ascontiguousarray(state.vertices), state.rotation)[1]
+    for parent in cut:
+        _tell_of_walls(told, found, split, parent, solutions[parent], float(state.rotation[parent]))
+        _tell_of_divided_edges(told, found, split, before, parent, loads[parent], loaded, wet)
+    return system.told(state, found, _contacts(system, found, told, blocks, np.isin(split.parent, cut)))
+
+
+def _contacts(system: dda.BlockSystem, found, told: _Told, blocks: Blocks, is_part: np.ndarray) -> dda.ToldContacts:
+    """``told`` as forces along the contacts' own axes; contacts of parts (n_blocks,) of which nothing is told keep what
+    they bear."""
+    across = found.geometry[:, 1:3]
+    normal = np.sum(told.force * across, axis=1)
+    shear = np.sum(told.force * normal_of(across), axis=1)
+    least = _NOTHING * np.abs(told.force).max(initial=0.0)
+    normal = np.where((normal > least) | ((found.bonded == WHOLE) & (normal < -least)), normal, 0.0)
+    rough = np.array([joint.roughness is not None for joint in system.joints])[found.law]
+    keeps = ~told.known & (found.state != OPEN) & (is_part[found.block] | is_part[found.other])
+    normal, shear = np.where(told.known, normal, found.normal), np.where(told.known, shear, found.shear)
+    size = np.sqrt(blocks.areas())
+    farthest = _FARTHEST * np.minimum(size[found.block], size[found.other])
+    gap = np.minimum(told.gap, farthest)
+    # Joints as soft as their law says, of the little length that a corner may be left with, cannot bear what a whole
+    # face did.
+    normal = np.minimum(normal, found.springs.normal * farthest)
+    most = np.where(rough, np.inf, found.springs.peak * np.maximum(normal, 0.0))
+    shear = np.where(found.bonded > 0, shear, np.clip(shear, -most, most))
+    which = np.flatnonzero(told.known | keeps)
+    return dda.ToldContacts(
+        which=which,
+        normal=normal[which],
+        shear=shear[which],
+        gap=np.where(told.known & np.isfinite(told.gap), gap, found.gap)[which],
+        slip=np.where(told.known, told.slip, found.slip)[which],
+    )
+
+
+def _turned(vectors: np.ndarray, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return vectors @ np.array([[c, s], [-s, c]])
+
+
+def _tell_of_walls(told: _Told, found, split: Split, parent: int, solution, rotation: float) -> None:
+    """The tractions, gaps and slip of the faces along which ``parent`` is cut, to the contacts between its parts."""
+    blocks = split.blocks
+    faces, size = _Faces.of(solution), np.sqrt(blocks.areas())
+    points, following, owner = blocks.vertices, blocks.next_vertex, blocks.vertex_block
+    own = np.flatnonzero((split.edge_origin < 0) & (split.parent[owner] == parent))
+    edge_of = {(*points[e].tolist(), *points[following[e]].tolist()): int(e) for e in own}
+    between = {}
+    for row in np.flatnonzero((split.parent[found.block] == parent) & (split.parent[found.other] == parent)).tolist():
+        at = tuple(points[found.vertex[row]].tolist())
+        between.setdefault((frozenset((int(found.block[row]), int(found.other[row]))), at), []).append(row)
+    for (ax, ay, bx, by), edge in edge_of.items():
+        facing = edge_of.get((bx, by, ax, ay), -1)
+        if facing < edge:
+            continue  # once a pair
+        a, b = np.array([ax, ay]), np.array([bx, by])
+        # Rock of the owner is on the left: it is the upper face.
+        upper, pair = int(owner[edge]), frozenset((int(owner[edge]), int(owner[facing])))
+        normal = normal_of((b - a) / np.hypot(*(b - a)))
+        known = faces.on(a, b)
+        if known is None:
+            place, share, stress = _in_rock(solution, a, b, normal)
+            gap, slip = np.zeros(2), np.zeros(2)
+        else:
+            place, share, stress = known
+            gap, slip = faces.ends_at(a, b, _OPENED * float(min(size[part] for part in pair)))
+        along = -normal_of(normal)
+        force = -share[:, None] * (stress[:, :1] * normal + stress[:, 1:] * along)
+        weight = np.clip(np.stack([1 - place, place]), 0.0, 1.0)
+        force, along, across = _turned(weight @ force, rotation), _turned(along, rotation), _turned(normal, rotation)
+        for end, at in enumerate(((ax, ay), (bx, by))):
+            row = _contact_at(between.get((pair, at), ()), found, across, (edge, facing))
+            if row < 0:
+                continue
+            sign = 1.0 if found.block[row] == upper else -1.0
+            told.force[row] += sign * force[end]
+            told.known[row] = True
+            if gap[end] < told.gap[row]:
+                told.gap[row] = gap[end]
+                told.slip[row] = sign * slip[end] * float(along @ normal_of(found.geometry[row, 1:3]))
+
+
+def _in_rock(solution, a: np.ndarray, b: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places, shares and tractions on a segment of rock that the last solution had whole: its resultant, if that
+    presses, where rock was pressed. Bent rock that lets go of its tension keeps no more of its pressure than is in
+    balance."""
+    gauss, weight = np.polynomial.legendre.leggauss(_IN_ROCK)
+    place, share = 0.5 * (gauss + 1), 0.5 * weight * np.hypot(*(b - a))
+    vector = traction(solution.stress(a + place[:, None] * (b - a)), normal)
+    pressure = np.maximum(-vector @ normal, 0.0)
+    resultant = share @ np.column_stack([vector @ normal, vector @ -normal_of(normal)])
+    if resultant[0] >= 0:
+        return place, share, np.zeros((len(place), 2))
+    return place, share, pressure[:, None] / (share @ pressure) * resultant
+
+
+def _contact_at(rows, found, across: np.ndarray, edges: tuple[int, int]) -> int:
+    """Which of the contacts ``rows`` stands for a face across which it presses along ``across``; −1: none."""
+    best, where = (_ALIGNED, False), -1
+    for row in rows:
+        cosine = abs(float(found.geometry[row, 1:3] @ across))
+        fit = (round(cosine, 9), int(found.edge[row]) in edges)
+        if fit > best:
+            best, where = fit, row
+    return where
+
+
+def _tell_of_divided_edges(
+    told: _Told,
+    found,
+    split: Split,
+    before: Blocks,
+    parent: int,
+    load: BoundaryLoad,
+    loaded: set[str],
+    wet: np.ndarray,
+) -> None:
+    """The traction from outside on edges of ``parent`` that mouths have divided, or that end at a vertex that is two
+    now, to the contacts on the sides that their parts are in, but for the water's, EDGE_FORCE rows ``wet``. Where
+    contacts and an edge ``load`` share a side the traction is not theirs alone, and nothing is told."""
+    blocks, owner = split.blocks, split.blocks.vertex_block
+    old_vertices = np.bincount(split.vertex_origin[split.vertex_origin >= 0], minlength=before.n_vertices)
+    twice = old_vertices > 1
+    here = (split.parent[owner] == parent) & (split.edge_origin >= 0)
+    origin = np.maximum(split.edge_origin, 0)
+    partial = np.any(split.edge_span != [0.0, 1.0], axis=1)
+    divided = here & (partial | twice[origin] | twice[before.next_vertex[origin]])
+    rotation = float(split.state.rotation[parent])
+    # What touches an edge may stand on the next one of a straight side.
+    for side in sorted({blocks.side_start[edge] for edge in np.flatnonzero(divided).tolist()}):
+        edges = np.array(blocks.sides[side][:-1])
+        names = before.edge_name[split.edge_origin[edges]]
+        if any(before.edge_names[name] in loaded for name in names.tolist()):
+            continue
+        rows = _contacts_on(found, split, blocks.sides[side])
+        if not len(rows):
+            continue
+        ends = blocks.sides[side][0], blocks.sides[side][-1]
+        at = np.clip(_along(found.geometry[rows, 5:7], *split.state.vertices[list(ends)])[0], 0.0, 1.0)
+        neighbour = np.where(found.block[rows] == owner[side], found.other[rows], found.block[rows])
+        place, force = _loads_on(load, *blocks.vertices[list(ends)])
+        lumped = _turned(_shares(at, neighbour, place) @ force, rotation)
+        place, force = _water_on(wet[np.isin(wet["edge"], edges)], *split.state.vertices[list(ends)])
+        if len(place):
+            lumped -= _shares(at, neighbour, place) @ force
+        sign = np.where(found.block[rows] == owner[side], 1.0, -1.0)
+        told.force[rows] += sign[:, None] * lumped
+        told.slip[rows] = found.slip[rows]
+        told.known[rows] = True
+
+
+def _water_on(wet: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (k,) from 0 to 1 between ``a`` and ``b``, and the forces (k, 2) N there of EDGE_FORCE rows ``wet``, all in
+    current coordinates."""
+    gauss, weight = np.polynomial.legendre.leggauss(_IN_LOAD)
+    t = 0.5 * (gauss + 1)[:, None, None]
+    point = (1 - t) * wet["start"] + t * wet["end"]
+    length = np.hypot(*(wet["end"] - wet["start"]).T)[:, None]
+    force = 0.5 * weight[:, None, None] * length * ((1 - t) * wet["traction"][:, 0] + t * wet["traction"][:, 1])
+    return np.clip(_along(point.reshape(-1, 2), a, b)[0], 0.0, 1.0), force.reshape(-1, 2)
+
+
+def _shares(at: np.ndarray, neighbour: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(n, k) what part of a force at each ``place`` (k,) on an edge is that of each contact ``at`` (n,), with the block
+    ``neighbour`` (n,): by the linear shape functions, among the contacts of the neighbour that reaches there, of two
+    that do of the one that reaches further. (Two neighbours' corners meet on the edge within less than faces slide
+    by.)"""
+    out = np.zeros((len(at), len(place)))
+    groups = [np.flatnonzero(neighbour == b) for b in np.unique(neighbour).tolist()]
+    reach = np.array([[at[rows].min(), at[rows].max()] for rows in groups])
+    beyond = np.maximum(np.maximum(reach[:, :1] - place, place - reach[:, 1:]), 0.0)
+    width = np.broadcast_to((reach[:, 0] - reach[:, 1])[:, None], beyond.shape)
+    nearest = np.lexsort((width, beyond), axis=0)[0]
+    for number, rows in enumerate(groups):
+        own = np.flatnonzero(nearest == number)
+        stops, which = np.unique(np.round(at[rows], 9), return_inverse=True)
+        # What two contacts bear at one place they share.
+        share = 1.0 / np.bincount(which)[which]
+        for k, row in enumerate(rows.tolist()):
+            hat = (np.arange(len(stops)) == which[k]).astype(float)
+            out[row, own] = share[k] * np.interp(place[own], stops, hat)
+    return out
+
+
+def _contacts_on(found, split: Split, side: list[int]) -> np.ndarray:
+    """The contacts on the straight ``side`` of a part (the vertices along it), with blocks that are no parts of the
+    same parent."""
+    blocks, vertices = split.blocks, split.state.vertices
+    block = int(blocks.vertex_block[side[0]])
+    others = split.parent != split.parent[block]
+    along = vertices[side[-1]] - vertices[side[0]]
+    outward = -normal_of(along) / np.hypot(*along)
+    facing = found.geometry[:, 1:3] @ outward
+    touched = np.isin(found.edge, side[:-1]) & others[found.block] & (facing > _ALIGNED)
+    touching = (found.block == block) & others[found.other] & (facing < -_ALIGNED)
+    touching &= np.isin(found.vertex, side)
+    return np.flatnonzero(touched | touching)
+
+
+def _loads_on(load: BoundaryLoad, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (k,) from 0 to 1 on the edge from ``a`` to ``b``, reference coordinates, and the forces (k, 2) N of
+    ``load`` there."""
+    gauss, weight = np.polynomial.legendre.leggauss(_IN_LOAD)
+    places, forces = [np.zeros(0)], [np.zeros((0, 2))]
+    length = float(np.hypot(*(b - a)))
+    for segment, ends in zip(load.segments, load.tractions):
+        (s0, s1), _ = _along(segment, a, b)
+        off = np.abs((segment - a) @ normal_of(b - a)) / length**2
+        if off.max() > _ON_SIDE or s1 == s0:
+            continue
+        first, last = (np.clip((limit - s0) / (s1 - s0), 0.0, 1.0) for limit in (0.0, 1.0))
+        t = first + (last - first) * 0.5 * (gauss + 1)
+        share = 0.5 * weight * (last - first) * (s1 - s0) * length
+        places.append(s0 + t * (s1 - s0))
+        forces.append(np.abs(share)[:, None] * ((1 - t)[:, None] * ends[0] + t[:, None] * ends[1]))
+    if load.points is not None and len(load.points):
+        place, here = _along(load.points, a, b)
+        places.append(place[here])
+        forces.append(load.forces[here])
+    return np.concatenate(places), np.concatenate(forces)

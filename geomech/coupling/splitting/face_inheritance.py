@@ -1,0 +1,74 @@
+"""Corners that come into a joint face when one of its blocks parts go on from what the face has become.
+
+A block that is cut while it leans on a neighbour gets new corners in the middle of their common face. Their contacts are
+new, but the joint is not: what glued it, what sliding has worn off and how far it has lifted is there as much between
+the old corners as at them. Without this each new corner would come unglued, and of a face that is cut in two half its
+length would have lost cohesion and tensile strength, without a force that broke it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...dda.joint_laws.bonds import ALIGNED, OFF_LINE
+
+if TYPE_CHECKING:
+    from ...dda.open_close.contact_set import ContactSet
+
+#: A corner farther beyond the old contacts of a face than this part of its length is not in it.
+_BEYOND = 1e-3
+#: What a contact remembers of its joint.
+_MEMORY = ("bonded", "wear", "slip", "lift", "inset")
+
+
+def from_their_faces(found: ContactSet, kept: np.ndarray, old: np.ndarray, parent: np.ndarray) -> ContactSet:
+    """The contacts ``found`` after a split, new ones in a face of its ``parent`` (n_blocks,) blocks with the memory of
+    the nearest contact that the face had.
+
+    ``old`` are the CONTACT rows before the split, ``kept`` those that have come through it, with their new numbers.
+    """
+    faces = old[old["length"] > 0]
+    parts = np.bincount(parent)[parent] > 1
+    new = (parts[found.block] | parts[found.other]) & (parent[found.block] != parent[found.other])
+    new &= (found.geometry[:, 4] > 0) & ~np.isin(_key(found.vertex, found.edge), _key(kept["vertex"], kept["edge"]))
+    heirs, of = [], []
+    for row in np.flatnonzero(new).tolist():
+        nearest = _nearest(found, row, faces, parent)
+        if nearest >= 0:
+            heirs.append(row)
+            of.append(nearest)
+    if not heirs:
+        return found
+    memory = {name: getattr(found, name).copy() for name in _MEMORY}
+    for name in _MEMORY:
+        memory[name][heirs] = faces[name][of]
+    # (Slip along the edge is the same seen from the other block, whose edge runs the other way.)
+    return replace(found, **memory)
+
+
+def _key(vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """(n,) one number for each pair."""
+    return (vertex.astype(np.int64) << 32) + edge
+
+
+def _nearest(found: ContactSet, row: int, faces: np.ndarray, parent: np.ndarray) -> int:
+    """Which of the old contacts ``faces`` is nearest to the corner of ``row`` in the same face; −1 for none."""
+    a, b = parent[found.block[row]], parent[found.other[row]]
+    same, swapped = ((faces["block"] == x) & (faces["other"] == y) for x, y in ((a, b), (b, a)))
+    sense = np.where(same, 1.0, -1.0)
+    normal, point = found.geometry[row, 1:3], found.geometry[row, 5:7]
+    apart = faces["point"] - point
+    distance = np.hypot(*apart.T)
+    on_line = (same | swapped) & (sense * (faces["normal"] @ normal) > ALIGNED)
+    on_line &= np.abs(apart @ normal) <= OFF_LINE * np.maximum(distance, faces["length"])
+    at = np.flatnonzero(on_line)
+    if not len(at):
+        return -1
+    along = apart[at] @ np.array([-normal[1], normal[0]])
+    beyond = _BEYOND * float(faces["length"][at].sum())
+    if along.min() > beyond or along.max() < -beyond:
+        return -1
+    return int(at[np.argmin(distance[at])])

@@ -1,0 +1,1 @@
+"""Which vertices and edges of blocks meet, and where the springs of their contacts stand."""

@@ -1,0 +1,522 @@
+"""The contacts of a step: found on the present geometry, given joint laws and springs, remembering the step before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...model import OPEN, SLIP, STICK, Blocks, DdaSettings, JointLaw, State, corner_lengths
+from ..counters import Work
+from ..joint_laws.bonds import BondedFaces
+from ..joint_laws.nonlinear_laws import CurvedJoints
+from ..joint_laws.penalty_springs import JointTable, Springs, contact_springs, least_face, penalties, resolved
+from ..joint_laws.whole_faces import WholeFaces
+from ..open_close.contact_set import ContactSet
+from ..statics.sharp_toes import SHARP, ToeCorners, stand_off
+from ..step_control.relative_motion import Approach, Windows, widths
+from . import contact_records
+from .bonded_corners import held_by_glue
+from .entrance_edges import FACE, SMOOTHED, Corners, convex_corners, describe_contacts, find_contacts
+from .face_quadrature import FacePoints, give_by_bending
+from .neighbour_search import NearPairs
+from .t_junctions import nodes_in_faces
+from .thin_walls import from_outside
+
+#: At time zero, faces nearer than this many times the domain's size touch and are bonded by cohesion and tension.
+_TOUCH = 1e-7
+#: Contacts whose normals are nearer in direction than this (cosine) are on one line.
+_ALIGNED = 0.99
+_UNKNOWN = -2
+_NEVER = -1
+#: The gaps of blocks that turn are followed to this part of the smaller block's size (√area).
+_PRECISION = 1e-5
+#: What lies behind a line by less than this part of the smaller block's size (√area) when they first touch was pushed
+#: there by others' give, or by the rounding of arcs.
+_HAIR = 1e-4
+#: Sound crosses a model so often, and so many steps are taken, until its blocks bear what is put on them at the start. (The
+#: weight of a slope of 1 000 blocks, put on suddenly, sinks into eased springs by 6 % of the work of its first 0.3 s, after
+#: so long by 0.1 %.)
+_TRANSITS, _STEPS = 4.0, 20
+#: Contacts are sought at this many times the depth to which the last step has let any penetrate, whatever the window.
+_DEEPER = 2.0
+
+
+class ContactFinder:
+    """Finds the contacts of ``blocks`` and gives each its law and springs.
+
+    ``joint_index`` as for `BlockSystem`; ``modulus`` (n_blocks,) Pa: E' of each block, from which penalties follow;
+    ``rigid`` (n_blocks,) those that do not strain; ``mass`` (n_blocks,) kg/m; ``work`` counts searches.
+    """
+
+    def __init__(
+        self,
+        blocks: Blocks,
+        joints: Sequence[JointLaw],
+        joint_index: Callable[[str, str], int | None],
+        settings: DdaSettings,
+        modulus: np.ndarray,
+        rigid: np.ndarray,
+        mass: np.ndarray,
+        work: Work | None = None,
+    ) -> None:
+        self._work = work
+        self.names = blocks.names or tuple(f"block {b}" for b in range(blocks.n_blocks))
+        self._edge_names = blocks.edge_names
+        self._n_joints = len(joints)
+        self._joint_index = joint_index
+        self._settings = settings
+        self._modulus, self._area = modulus, blocks.areas()
+        self._table = JointTable.of(joints)
+        self._stiff = ~np.isnan(self._table.normal_stiffness)
+        # What bonds, waves cross as they do rock.
+        self._yields = ~self._stiff & (self._table.tension == 0.0) & (self._table.cohesion == 0.0)
+        self._mass = np.where(blocks.fixed, np.inf, mass)
+        #: s, from when on springs are eased to what steps resolve.
+        self._eased_from = np.inf
+        self._eases = settings.springs == "resolved" and bool(self._yields.any())
+        if self._eases and settings.dynamic_factor > 0.0:
+            self._eased_from = max(
+                _TRANSITS * _transit(blocks, modulus * self._area, mass), _STEPS * settings.time_step
+            )
+        self._stiff_along = ~np.isnan(self._table.shear_stiffness)
+        self._by_length = self._stiff & self._stiff_along
+        self.has_face_nodes = bool(self._by_length.any())
+        self._law_of = np.full((len(blocks.edge_names),) * 2, _UNKNOWN, np.int64)
+        self._edge_name = np.ascontiguousarray(blocks.edge_name, np.int64)
+        self._next = np.ascontiguousarray(blocks.next_vertex, np.int64)
+        self._previous = np.ascontiguousarray(blocks.previous_vertex, np.int64)
+        self._start = np.ascontiguousarray(blocks.vertex_start, np.int64)
+        self._owner = np.ascontiguousarray(blocks.vertex_block, np.int64)
+        self._flat = blocks.in_side
+        self._rigid = rigid
+        # Triangles follow a rock that bends; multipliers hold what springs would give.
+        self._bends = (np.diff(self._start) > 3) & ~rigid & ~blocks.fixed & (settings.contact == "penalty")
+        self._rounding, self._longest = corner_lengths(blocks, settings.corner_rounding)
+        #: (n_vertices,) m: the lengths over which corners are rounded.
+        self.rounding = np.minimum(self._rounding, self._longest)
+        #: Whether toes hold: `SHARP`, `ROUNDED` or `FREE` (`toes`).
+        self.toes = SHARP
+        #: Whether faces keep all their cohesion for as long as they touch anywhere (`whole_faces`).
+        self.whole_faces = False
+        self._corners = ToeCorners(
+            self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
+        )
+        self._always_fixed = np.ascontiguousarray(blocks.fixed, dtype=np.bool_)
+        self.widths = widths(blocks.vertices, self._next, self._start, self._area)
+        self.take_out(None)
+        self._size = float(np.ptp(blocks.vertices, axis=0).max())
+
+    def take_out(self, removed: np.ndarray | None) -> None:
+        """Find no more contacts of the blocks ``removed`` (n_blocks,)."""
+        self._removed = removed
+        self._fixed = self._always_fixed if removed is None else self._always_fixed | removed
+        self._near = NearPairs(self._start, self._fixed, self._work)
+        self.approach = Approach(self._next, self._start, self.widths, self._near)
+
+    def find(
+        self,
+        state: State,
+        vertices: np.ndarray,
+        window: float | Windows,
+        glue_holds: bool = True,
+        lumped: bool = False,
+        broken: np.ndarray | None = None,
+        motion: np.ndarray | None = None,
+        margin: float = np.inf,
+    ) -> ContactSet:
+        """Every vertex within ``window`` (m, of all pairs of blocks or of each) of an edge it may touch, with what ``state.contacts`` remembers of it;
+        without corners that are held to each other by the glue around them, if that ``glue_holds``; the springs of
+        faces that have a stiffness of their own at their corners, if ``lumped``; those of the bonds ``broken``
+        (vertex·n_vertices + edge), too. ``motion`` (n_vertices, 2) m is what vertices are expected to move by in the step:
+        it says on which sides corners meet; corners that stay apart then, with ``margin`` m to spare, are left out."""
+        old = np.ascontiguousarray(state.contacts)
+        old_vertex, old_edge, keys, old_normal, lift, gap = contact_records.names(old, len(vertices))
+        near = self._reaching(window, vertices, old, lift, gap)
+        rank = np.argsort(keys, kind="stable")
+        corners = Corners(
+            convex_corners(vertices, self._next, self._previous), self._rounding, self._longest, self._pressed(old),
+            np.zeros_like(vertices) if motion is None else motion, float(margin) + lift,
+        )  # fmt: skip
+        table, met = find_contacts(
+            vertices, self._next, self._previous, self._start, near.pairs, near.reach, keys[rank], corners
+        )
+        at = near.of_contacts(self._owner[table[:, 0]], self._owner[table[:, 1]], len(self._area))
+        geometry, mate, parent = describe_contacts(
+            table, met, vertices, self._next, self._previous, near.reach[at], old_vertex, old_edge, old_normal, rank
+        )
+        known = np.append((old["state"] != OPEN) | (old["lift"] < 0.0), False)[parent]
+        keep = self._from_outside(table, vertices, known, corners.pressed)
+        if not keep.all():
+            table, geometry, mate, parent = table[keep], geometry[keep], mate[keep], parent[keep]
+        law = self._laws(table[:, 1], mate)
+        if self._removed is not None:
+            law[self._removed[self._owner[table[:, :2]]].any(axis=1)] = _NEVER
+        if (law == _NEVER).any():
+            keep = law != _NEVER
+            table, geometry, parent, law = table[keep], geometry[keep], parent[keep], law[keep]
+        nodes, own = None, parent
+        if self._by_length.any():
+            nodes = nodes_in_faces(
+                table[:, 0], table[:, 1], self._owner, self._flat, geometry, law, self._by_length[law]
+            )
+        if nodes is not None:
+            geometry[:, 4] = nodes.left(geometry[:, 4])
+            parent = nodes.heirs(own, np.ascontiguousarray(old["state"]))
+        block, other = self._owner[table[:, 0]], self._owner[table[:, 1]]
+        springs = self._springs(block, other, law, geometry[:, 4], state.time >= self._eased_from)
+        remembered = self._remembered(old, parent, state.time, geometry, springs, self._stiff[law])
+        eased = 0.0
+        if self._eases and len(old):
+            eased = self._keep_forces(old, parent, geometry, springs, remembered, law)
+        if self._table.curved.any():
+            self._pass_on_wear(old, block, other, geometry, remembered)
+        # A step that rounding smooths is none, and a vertex that lies a hair behind a line which it has not touched brings
+        # no energy: there contacts begin without force.
+        hair = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        smoothed = (table[:, 3] == SMOOTHED) | ((geometry[:, 3] > -hair) & (len(old) > 0))
+        smoothed &= (remembered["state"] == OPEN) & (remembered["bonded"] == 0) & (geometry[:, 3] < remembered["lift"])
+        remembered["lift"] = np.where(smoothed, geometry[:, 3], remembered["lift"])
+        # What has come up a ramp goes on from there as it is pressed.
+        up = np.flatnonzero((table[:, 3] == SMOOTHED) & (remembered["state"] != OPEN) & (parent >= 0))
+        up = up[old["tilt"][parent[up]] != 0.0] if len(up) else up
+        remembered["lift"][up] = np.minimum(0.0, geometry[up, 3] - old["gap"][parent[up]])
+        vertex, edge, corner = (column.copy() for column in table[:, :3].T)
+        if self.toes != SHARP:
+            off = stand_off(vertex, edge, corner, geometry, vertices, self._corners, self.toes)
+            remembered["lift"] = np.where(off >= 0.0, -off, remembered["lift"])
+        keep = np.ones(len(vertex), bool)
+        if nodes is not None:
+            for name in ("normal", "shear") if len(old) else ():
+                borne = np.where(own >= 0, old[name + "_force"][own], 0.0)
+                remembered[name] = nodes.left(borne)
+            keep[nodes.node] = False
+        glued = None
+        if glue_holds and remembered["bonded"].any():
+            along = vertices[self._next[edge]] - vertices[edge]
+            share = geometry[:, 4] / np.hypot(along[:, 0], along[:, 1])
+            glued = held_by_glue(vertex, edge, self._next, geometry[:, 0], share, remembered["bonded"] == 1)
+            if glued is not None:
+                keep &= ~glued
+        if not keep.all():
+            vertex, edge, block, other, law = vertex[keep], edge[keep], block[keep], other[keep], law[keep]
+            corner, geometry = corner[keep], geometry[keep]
+            springs = Springs(**{name: value[keep] for name, value in vars(springs).items()})
+            remembered = {name: value[keep] for name, value in remembered.items()}
+        bonded, faces = remembered["bonded"], None
+        if bonded.any():
+            faces = BondedFaces.of(block, other, geometry, bonded)
+        found = ContactSet(
+            vertex=vertex,
+            edge=edge,
+            block=block,
+            other=other,
+            law=law,
+            corner=corner,
+            tilt=self._tilt(vertices, edge, corner, geometry),
+            precision=_PRECISION * np.sqrt(np.minimum(self._area[block], self._area[other])),
+            geometry=np.ascontiguousarray(geometry),
+            springs=springs,
+            relies_on_glue=glued is not None,
+            faces=faces,
+            released=eased,
+            **remembered,
+        )
+        if self.whole_faces:
+            cohesion = np.where(bonded > 0, self._table.cohesion[law], 0.0)
+            whole = WholeFaces.of(block, other, found.geometry, law, cohesion)
+            found = replace(found, whole=whole).sharing_cohesion(found.state, bonded)
+        if lumped or not (self._stiff.any() or found.inset.any()):
+            return found
+        inside = found.inset & (bonded == 1)
+        if broken is not None:
+            inside = inside & ~np.isin(vertex * len(vertices) + edge, broken)
+
+        def softened(ends, length):
+            """Part of its length that the springs of a face are apart: they give by its rotation what its blocks would
+            bend; and the part of their stiffness that they have."""
+            across, point = found.geometry[ends[:, 0], 1:3], found.geometry[ends[:, 0], 5:7]
+            behind = [
+                give_by_bending(
+                    owner[ends[:, 0]], across, point, vertices, self._next, self._start, self._modulus, self._bends
+                )
+                for owner in (block, other)
+            ]
+            share = np.minimum(1.0, length / np.maximum(length, np.maximum(behind[0][:, 1], behind[1][:, 1])))
+            give = behind[0][:, 0] + behind[1][:, 0]
+            # One block between rigid ones bends to and fro, by a third of what either half would, if at all: they hold
+            # it.
+            give[self._rigid[block[ends[:, 0]]] | self._rigid[other[ends[:, 0]]]] = 0.0
+            own = 2.0 / (share * springs.normal[ends[:, 0]] * length**2)
+            return np.sqrt(own / np.maximum(own, give)), share
+
+        def placed(inside):
+            return FacePoints.of(
+                block, other, found.geometry, np.where(inside, 2, self._stiff[law]), found.normal, found.bare,
+                (bonded == 1) & (springs.tension > 0), least_face(block, other, self._area, self._fixed), softened,
+            )  # fmt: skip
+
+        points = placed(inside)
+        if inside.any() or found.inset.any():
+            kept = np.zeros(len(found), bool)
+            if points is not None:
+                kept[points.ends] = True
+            out = found.inset & ~kept
+            found = _at_their_corners(found, placed(found.inset) if out.any() else None, out, inside & kept)
+        return replace(found, by_length=self._stiff_along[law]).placed(points)
+
+    def _reaching(
+        self, window: float | Windows, vertices: np.ndarray, old: np.ndarray, lift: float, gap: float
+    ) -> Windows:
+        """``window`` of each pair, wide enough for what the contacts ``old`` hold: faces that slid apart press at a
+        distance, those that do not fit pass each other by as much; what soft springs have let in deeper than that touches
+        still. ``lift`` is the largest, ``gap`` the lowest of them."""
+        if not isinstance(window, Windows):
+            pairs = self._near.of(vertices, max(window + lift, -_DEEPER * gap))
+            window = Windows(pairs, np.full(len(pairs), window))
+        if not len(window.pairs) or (lift == 0.0 and -_DEEPER * gap <= window.reach.min()):
+            return window
+        reach = window.reach.copy()
+        at = window.of_contacts(old["block"], old["other"], len(self._area))
+        known, wide = at >= 0, np.zeros(len(reach))
+        np.maximum.at(wide, at[known], np.abs(old["lift"][known]))
+        reach += wide
+        deep = known & (old["state"] != OPEN)
+        np.maximum.at(reach, at[deep], -_DEEPER * old["gap"][deep])
+        return Windows(window.pairs, reach)
+
+    def _from_outside(self, table: np.ndarray, vertices: np.ndarray, known: np.ndarray, pressed: np.ndarray):
+        """(n,) whether vertices of the rows of `find_contacts` may have come to their edges from outside: rows that are
+        ``known`` (n,), as they continue contacts that press or begin to behind the line, and corners that meet corners,
+        have; faces of blocks are ``pressed`` (n_blocks,) m in."""
+        vertex, edge = table[:, 0], table[:, 1]
+        block, other = self._owner[vertex], self._owner[edge]
+        shallow = _HAIR * np.sqrt(np.minimum(self._area[block], self._area[other]))
+        shallow += _DEEPER * np.maximum(pressed[block], pressed[other])
+        keep = from_outside(
+            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            self._owner, known, np.where(table[:, 3] == FACE, -1.0, shallow),
+        )  # fmt: skip
+        return keep | (table[:, 2] >= 0)
+
+    def _springs(
+        self, block: np.ndarray, other: np.ndarray, law: np.ndarray, length: np.ndarray, eased: bool
+    ) -> Springs:
+        """Springs of contacts (n,), ``eased`` to what the steps of a run resolve."""
+        kn, ks = self._settings.normal_penalty, self._settings.shear_penalty
+        if kn is None:
+            normal = penalties(block, other, length, self._modulus, self._area, self._fixed, self._rigid)
+            if eased:
+                eased_to = resolved(normal, block, other, self._mass, self._settings.time_step)
+                normal = np.where(self._yields[law], eased_to, normal)
+        else:
+            normal = np.full(len(block), float(kn))
+        return contact_springs(
+            self._table,
+            law,
+            length,
+            least_face(block, other, self._area, self._fixed),
+            normal,
+            normal if ks is None else np.full(len(block), float(ks)),
+        )
+
+    def _remembered(self, old, parent, time, geometry, springs, stiff):
+        """What contacts keep of their rows ``parent`` (−1: new) in ``old``, by the names of `ContactSet`."""
+        known = parent >= 0
+
+        (contact_state, bonded), (normal, shear, slip, wear, lift, stretch, bare), inset = contact_records.inherited(
+            old, parent
+        )
+        if not known.all():
+            # New contacts that touch already are tried closed first.
+            fresh = ~known & (geometry[:, 3] <= _TOUCH * self._size) & (geometry[:, 3] > -_TOUCH * self._size)
+            if len(old) == 0 and time == 0.0:
+                bonded[fresh & (geometry[:, 4] > 0)] = 1
+            contact_state[fresh] = STICK
+        bonded[(springs.cohesion == 0) & (springs.tension == 0)] = 0
+        # Friction on a normal force that pulls by its round-off acts the other way: taken for the sense of the sliding
+        # it would turn that about in every step, and with it the matrix of blocks at rest.
+        pulls = springs.friction * normal + springs.sliding < 0.0
+        direction = np.where(contact_state == SLIP, np.sign(shear), 0.0) * np.where(pulls, -1.0, 1.0)
+        # Bonds of blocks that bend are there from the start, or never.
+        if len(old) == 0 and time == 0.0 and self._bends.any():
+            inset = (bonded == 1) & (springs.tension > 0) & ~stiff
+        rough = (springs.peak > 0) | (bonded > 0)
+        contact_state[(contact_state == SLIP) & rough & (direction == 0)] = STICK
+        contact_state[(contact_state == STICK) & ~rough] = SLIP
+        return {
+            "state": contact_state, "direction": direction, "bonded": bonded, "normal": normal, "shear": shear,
+            "slip": slip, "wear": wear, "lift": lift, "stretch": stretch, "inset": inset, "bare": bare,
+        }  # fmt: skip
+
+    def _keep_forces(self, old, parent, geometry, springs, remembered, law) -> float:
+        """Faces that press with other springs than before keep the force, not the gap: what has come to bear on springs that
+        were not eased sinks in no further for these. J/m that the old springs had stored beyond what the new ones do."""
+        known = np.flatnonzero((parent >= 0) & (remembered["state"] != OPEN) & self._yields[law])
+        before, now = old["stiffness"][parent[known]], springs.normal[known]
+        ratio = np.where(before > 0.0, before / now, 1.0)
+        gap, lift = geometry[known, 3], remembered["lift"][known]
+        pressed = np.minimum(gap - lift, 0.0)
+        remembered["lift"][known] = np.where(pressed < 0.0, gap - ratio * pressed, lift)
+        # Of penalties, those along the face are as stiff as those across.
+        along = np.where(
+            self._stiff_along[law[known]], 0.0, remembered["shear"][known] ** 2 / (ratio * springs.shear[known])
+        )
+        return 0.5 * float(((1.0 - ratio) * (before * pressed**2 + along)).sum())
+
+    def _pressed(self, old: np.ndarray) -> np.ndarray:
+        """(n_blocks,) m: how deep the faces of each block were last pressed in."""
+        deepest = np.zeros(len(self._area))
+        closed = old["state"] != OPEN
+        for blocks in (old["block"][closed], old["other"][closed]):
+            np.maximum.at(deepest, blocks, -old["gap"][closed])
+        return deepest
+
+    def _tilt(self, vertices, edge, corner, geometry) -> np.ndarray:
+        """(n,) rad, as in `ContactSet`."""
+        tilt, rounded = np.zeros(len(edge)), np.flatnonzero(corner >= 0)
+        along = vertices[self._next[edge[rounded]]] - vertices[edge[rounded]]
+        normal = geometry[rounded, 1:3]
+        tilt[rounded] = np.arctan2(
+            along[:, 1] * normal[:, 1] + along[:, 0] * normal[:, 0],
+            along[:, 1] * normal[:, 0] - along[:, 0] * normal[:, 1],
+        )
+        return tilt
+
+    def _pass_on_wear(self, old, block, other, geometry, remembered) -> None:
+        """Contacts that have not touched are as worn, and as far lifted, as the nearest that slides along their
+        direction between the same two blocks: these have moved by as much everywhere."""
+        touched = old[(old["wear"] > 0) & (old["state"] != OPEN)]
+        if not len(touched):
+            return
+        pair = np.stack(
+            [np.minimum(touched["block"], touched["other"]), np.maximum(touched["block"], touched["other"])]
+        )
+        for c in np.flatnonzero((remembered["state"] == OPEN) & (remembered["lift"] >= 0)):
+            same = (pair[0] == min(block[c], other[c])) & (pair[1] == max(block[c], other[c]))
+            same &= np.abs(touched["normal"] @ geometry[c, 1:3]) > _ALIGNED
+            same &= touched["wear"] > remembered["wear"][c]
+            if same.any():
+                at = np.flatnonzero(same)
+                row = touched[at[np.argmin(np.linalg.norm(touched["point"][at] - geometry[c, 5:7], axis=1))]]
+                for name in ("slip", "wear", "lift"):
+                    remembered[name][c] = row[name]
+
+    @property
+    def closure(self) -> np.ndarray:
+        """(n_laws,) m: the closure that each law tends to; infinite for a straight spring."""
+        return self._table.closure
+
+    def on_penalty(self, found: ContactSet) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) twice: contacts whose normal, and whose shear springs are the solver's penalties, not a joint's
+        stiffness."""
+        t, lone = self._table, found.geometry[:, 4] <= 0
+        by_peak = t.stiff_by_peak[found.law] & ~lone
+        return (
+            np.isnan(t.normal_stiffness[found.law]),
+            np.isnan(t.shear_stiffness[found.law]) & ~by_peak,
+        )
+
+    def curved(self, found: ContactSet) -> CurvedJoints | None:
+        """The contacts of ``found`` whose laws are no straight lines; None where there are none."""
+        if not (self._table.curved.any() and self._table.curved[found.law].any()):
+            return None
+        return CurvedJoints(self._table, found)
+
+    def _laws(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
+        a, b = self._edge_name[edge], self._edge_name[mate]
+        law = self._law_of[a, b]
+        if (law == _UNKNOWN).any():
+            names, met = self._edge_names, np.zeros(self._law_of.shape, bool)
+            met[a, b] = True
+            for i, j in np.argwhere(met & (self._law_of == _UNKNOWN)).tolist():
+                index = self._joint_index(names[i], names[j])
+                if index is not None and not 0 <= index < self._n_joints:
+                    raise ValueError(
+                        f"edges {names[i]!r} and {names[j]!r} have joint law {index}, out of {self._n_joints}"
+                    )
+                self._law_of[i, j] = _NEVER if index is None else index
+            law = self._law_of[a, b]
+        return law
+
+    def near_boxes(self, box: np.ndarray) -> np.ndarray:
+        """(k, 2) all pairs of blocks whose boxes ``box`` (n_blocks, 4) meet, and some whose do not."""
+        return self._near.of_boxes(box, 0.1 * self.widths)
+
+    def may_touch(self, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) False for a ``vertex`` of which neither edge may touch the ``edge``, and for blocks that are taken out."""
+        law = np.maximum(self._laws(edge, vertex), self._laws(edge, self._previous[vertex]))
+        out = law != _NEVER
+        if self._removed is not None:
+            out &= ~(self._removed[self._owner[vertex]] | self._removed[self._owner[edge]])
+        return out
+
+    def beyond_middle(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) True where a ``vertex`` lies behind its ``edge`` by more than half of what the block is thick there."""
+        return ~from_outside(
+            vertex, edge, self._off_lines(vertices, vertex, edge), vertices, self._next, self._previous, self._start,
+            self._owner, np.zeros(len(vertex), np.bool_), np.full(len(vertex), -1.0),
+        )  # fmt: skip
+
+    def gaps(self, vertices: np.ndarray, before: np.ndarray, found: ContactSet) -> np.ndarray:
+        """(n,) m of the contacts ``found`` on the geometry ``before``, at their corners, once the blocks are where
+        ``vertices`` are."""
+        gap = self._off_lines(vertices, found.vertex, found.edge)
+        rounded = np.flatnonzero(found.corner >= 0)
+        if len(rounded):
+            v, w = found.vertex[rounded], found.corner[rounded]
+            moved = vertices[v] - vertices[w] - (before[v] - before[w])
+            normal = found.geometry[rounded, 1:3]
+            gap[rounded] = found.geometry[rounded, 3] + np.einsum("na,na->n", moved, normal)
+        return gap
+
+    def _off_lines(self, vertices: np.ndarray, vertex: np.ndarray, edge: np.ndarray) -> np.ndarray:
+        """(n,) m of ``vertex`` (n,) outside the line of ``edge`` (n,) on the geometry ``vertices``."""
+        start = vertices[edge]
+        along, out = vertices[self._next[edge]] - start, vertices[vertex] - start
+        return (out[:, 0] * along[:, 1] - out[:, 1] * along[:, 0]) / np.hypot(along[:, 0], along[:, 1])
+
+    def toes_among(self, found: ContactSet, vertices: np.ndarray) -> np.ndarray:
+        """(n,) m by which toes among the contacts ``found`` stand off; below zero for other contacts."""
+        parts = found.vertex, found.edge, found.corner, found.geometry
+        return stand_off(*parts, vertices, self._corners, self.toes)
+
+    def carried(self, vertices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """CONTACT ``rows`` carried to the new geometry ``vertices`` (gap and forces as they are)."""
+        return contact_records.carried(rows, vertices, self._next)
+
+    def where(self, found: ContactSet, contact: int) -> str:
+        """Which contact of ``found`` it is, for messages; empty for −1."""
+        if contact < 0:
+            return ""
+        x, y = found.geometry[contact, 5:7]
+        a, b = self.names[found.block[contact]], self.names[found.other[contact]]
+        return f" (a corner of {a!r} on {b!r} at x = {x:.6g}, y = {y:.6g} m)"
+
+
+def _transit(blocks: Blocks, stiffness: np.ndarray, mass: np.ndarray) -> float:
+    """s that sound takes across ``blocks`` of E' A ``stiffness`` and ``mass`` (n_blocks,), at its slowest."""
+    heavy = mass > 0.0
+    slowest = float(np.sqrt(np.min(stiffness[heavy] / mass[heavy], initial=np.inf)))
+    return float(np.hypot(*np.ptp(blocks.vertices, axis=0))) / slowest
+
+
+def _at_their_corners(found: ContactSet, stood: FacePoints | None, out: np.ndarray, inset: np.ndarray) -> ContactSet:
+    """The contacts ``found``, the springs of those that come ``out`` (n,) of their faces, inside which they ``stood``,
+    at the corners with the forces that they had: these are then where the faces, that do not fit any more, begin to
+    press and to pull. Forces of springs alone: what dashpots bore over the last step would stay in them as energy from
+    nowhere."""
+    if stood is None:
+        return replace(found, inset=inset)
+    gap, full = found.geometry[:, 3], found.springs
+    soft, before = stood.springs(full, np.zeros(len(gap), bool)), stood.between_corners(found.gap_before)
+    spring = stood.at_corners(-soft.normal * before) / full.normal
+    closed = (found.state != OPEN) | (found.bonded > 0)
+    told = np.where(closed, gap + spring, np.minimum(gap, 0.0))
+    # Blocks that were bent by the moment on their faces, as springs inside these are, are bent no more.
+    bent = 0.5 * (soft.normal * before**2 - full.normal * spring**2)
+    bent += 0.5 * found.shear**2 * (1.0 / soft.shear - 1.0 / full.shear)
+    return replace(
+        found, lift=np.where(out, told, found.lift), inset=inset, unbent=float(bent[out & closed].sum())
+    )  # fmt: skip

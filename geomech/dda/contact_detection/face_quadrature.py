@@ -1,0 +1,363 @@
+"""Where the springs of a joint face stand, so that it resists being turned as it resists being closed.
+
+Blocks that strain evenly part along a straight line, the gap g(s) along their face. A joint of stiffness kₙ (Pa/m) that
+cannot pull presses by −kₙ g where g < 0, on the part c of the face's length ℓ:
+
+    N = −kₙ ∫ g ds,    M = −kₙ ∫ g s ds    over that part; c = ℓ or c = 3 (ℓ/2 − e), e = M/N (a triangle of pressure).
+
+Two springs kₙ c/2 at the Gauss points of the part give both exactly; at the ends of the face they would resist rotation
+by kₙ ℓ³/4 instead of kₙ ℓ³/12. Where the part ends follows from the gap at the end of the step: a step whose faces end
+elsewhere than was taken is done again (Newton's method; the pressure is zero there, so that N changes with the square
+of what is missed).
+
+Bonds of blocks that have no stiffness of their own, and hold at their extreme fibre too, are held in the mean by the
+solver's springs. At the corners these would hold every rotation as well; but a block of one strain cannot bend, and
+what it would give under the moment on its face has to be given at the face. A beam of the block's depth that has its
+second moment I about its centroid across the face, and reaches from there by h to the face, would turn by
+
+    θ = M h / (E' I / 2h)        (of a rectangle M h / (E' ℓ³/12); Kawai 1978 has rigid blocks give so throughout),
+
+and so far inside their corners stand the two springs that give it. Along the face they stand in its middle, both: a
+block that bends is stretched along its faces by a strain that changes across it, its neighbours as they bend, and
+springs that held the faces at two places along each other would hold that. So bricks in courses, bricks laid in bond
+and cells of any shape glued together bend as a beam does, the better the more of them there are; otherwise they lock:
+between displacements that agree at the corners and are linear in every block, none bends. A triangle's three do not
+lock. Their springs are as stiff as a part ℓ/w of the solver's, w = √(12 I / A) the width of the block along the face:
+under one stress all faces of a block then give as much. Springs as stiff on a short face as on a long one would bear by
+what those beside them give, many times the stress of the rock, and break the bond under a part of what it holds.
+
+Rows of CONTACT tell of forces at the corners, where contacts are found: the two that have the same resultant and
+moment, and bring the same stress. (What a state carries over of shear is that of the springs.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...compiled import kept
+from ...model import OPEN
+from ..joint_laws.bonds import WITHOUT_GAPS, BondedFaces, on_lines
+from ..joint_laws.penalty_springs import Springs
+
+#: Distance of the two Gauss points of an interval, in parts of it.
+_GAUSS = 1 / np.sqrt(3.0)
+#: A part in contact that is known but for this much of its length is known: forces but for its square. The next step
+#: begins from the geometry, so that statics go on to the end.
+_KNOWN = 1e-2
+#: Springs that are this much of their face apart are at its corners.
+_AT_CORNERS = 0.99
+
+
+@dataclass(frozen=True, eq=False)
+class FacePoints:
+    """Faces (m,) with a contact at either end whose springs stand inside them, as a step takes them to touch.
+
+    ends      (m, 2)  rows of the step's `ContactSet`
+    corners   (n, 7)  geometry of all its rows, at the corners
+    length    (m,)    m
+    part      (m, 2)  where the part in contact begins and ends, in parts of the face from its first end
+    held      (m,)    bonds may pull: the part is the whole face
+    shortest  (m,)    no part is shorter: below, the springs are those of a corner (`contact_springs.least_face`)
+    apart     (m,)    distance of the two springs, in parts of the part
+    bends     (m,)    bonds that give as their blocks would bend: along the face both springs stand in its middle
+    share     (m,)    the part of the stiffness at the corners that its springs have
+    went      (m, 2)  how far its ends have gone with the last iteration of the step
+    stride    (m,)    the part of the way to where they seem to be that they go: half the last one's, or less, after
+              turning about
+    """
+
+    ends: np.ndarray
+    corners: np.ndarray
+    length: np.ndarray
+    part: np.ndarray
+    held: np.ndarray
+    shortest: np.ndarray
+    apart: np.ndarray
+    bends: np.ndarray
+    share: np.ndarray
+    went: np.ndarray
+    stride: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        block: np.ndarray,
+        other: np.ndarray,
+        geometry: np.ndarray,
+        stiff: np.ndarray,
+        normal: np.ndarray,
+        bare: np.ndarray,
+        holds: np.ndarray,
+        least: np.ndarray,
+        softened: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    ) -> FacePoints | None:
+        """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
+        blocks, 0 for neither, last known to press by ``normal`` N and to be ``bare`` of touch
+        from their corners on, ``holds`` a bond that may pull, ``least`` m of face
+        that the stiffness is at least that of; ``softened(ends, length)`` the ``apart`` and
+        ``share`` of bonds. None without any."""
+        some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0))
+        if len(some) < 2:
+            return None
+        some, start, along = on_lines(block, other, geometry, some)
+        two = np.flatnonzero(np.diff(start) == 2)
+        ends, places = some[start[two, None] + [0, 1]], along[start[two, None] + [0, 1]]
+        length = np.abs(places[:, 1] - places[:, 0])
+        whole = np.abs(geometry[ends, 4].sum(axis=1) - length) <= WITHOUT_GAPS * length
+        # A bond at one end alone (the other end is where a crack has cut the face) stays at its corner: on a part that
+        # comes and goes with what presses it would be another spring in every step, and bring energy.
+        whole &= (stiff[ends[:, 0]] == stiff[ends[:, 1]]) & (holds[ends[:, 0]] == holds[ends[:, 1]])
+        if not whole.any():
+            return None
+        ends, length = ends[whole], length[whole]
+        held, shortest = holds[ends].all(axis=1), np.minimum(2 * least[ends].max(axis=1) / length, 1.0)
+        apart, share, glued = np.full(len(ends), _GAUSS), np.ones(len(ends)), stiff[ends[:, 0]] == 2
+        if glued.any():
+            shortest[glued] = 1.0
+            apart[glued], share[glued] = softened(ends[glued], length[glued])
+            some = (apart < _AT_CORNERS) | (share < _AT_CORNERS)
+            ends, length, held, shortest, apart, share, glued = (
+                each[some] for each in (ends, length, held, shortest, apart, share, glued)
+            )
+        part = _left(bare[ends], _pressed(normal[ends], held, shortest), held, shortest)
+        still, full = np.zeros_like(part), np.ones(len(part))
+        return cls(ends, geometry, length, part, held, shortest, apart, glued, share, still, full)
+
+    def pressed_by(self, normal: np.ndarray) -> FacePoints:
+        """The same faces on the parts that forces ``normal`` (n,) N at the corners press on."""
+        return replace(self, part=_pressed(normal[self.ends], self.held, self.shortest))
+
+    def before(self, bare: np.ndarray, stiff_in_shear: np.ndarray) -> FacePoints:
+        """The same faces on the parts that the last step has left in contact, ``bare`` (n,) as in `ContactSet`: those
+        whose shear stiffness goes by their length (``stiff_in_shear``), the others where they are."""
+        first, second = bare[self.ends].T
+        known = (first >= 0) & (second >= 0) & (first + second < 1) & stiff_in_shear[self.ends[:, 0]]
+        return replace(self, part=np.where(known[:, None], np.stack([first, 1 - second], axis=1), self.part))
+
+    def passed_on(self, shear: np.ndarray, was: FacePoints) -> np.ndarray:
+        """(n,) N that these springs begin with, of the ``shear`` of springs where they ``was``: that of a stress which is
+        linear along that part, and goes on where both parts touch. It has the resultant and the moment of what goes on,
+        and its springs store no more than that did."""
+        out = shear.copy()
+        if (was.part == self.part).all():
+            return out
+        low, high = was.part.T
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        on_first, on_second = shear[self.ends].T
+        mean, tilt = 0.5 * (on_first + on_second), 0.5 * (on_second - on_first) / self.apart
+        a, b = np.clip((self.part.T - middle) / half, -1.0, 1.0)
+        total = mean * (b - a) + tilt * (b**2 - a**2) / 2
+        moment = mean * (b**2 - a**2) / 2 + tilt * (b**3 - a**3) / 3
+        first, second = (self.place.T - middle) / half
+        on_low = (second * total - moment) / (second - first)
+        # A straight line through a stress that ends within the part swings to the other side beyond.
+        one_way = on_first * on_second >= 0
+        on_low = np.where(one_way, np.clip(on_low, np.minimum(total, 0.0), np.maximum(total, 0.0)), on_low)
+        moved = (was.part != self.part).any(axis=1)
+        out[self.ends[moved]] = np.stack([on_low, total - on_low], axis=1)[moved]
+        return out
+
+    def but(self, others: FacePoints) -> FacePoints | None:
+        """These faces without those that ``others``, the same faces, have on other parts; None where none is left."""
+        kept = (self.part == others.part).all(axis=1)
+        if not kept.any():
+            return None
+        own = {name: getattr(self, name)[kept] for name in self.__dataclass_fields__ if name != "corners"}
+        return replace(self, **own)
+
+    @property
+    def place(self) -> np.ndarray:
+        """(m, 2) where along the face the springs of its contacts stand, in parts of it."""
+        low, high = self.part[:, :1], self.part[:, 1:]
+        return low + (high - low) * (0.5 + np.multiply.outer(self.apart, [-0.5, 0.5]))
+
+    def geometry(self) -> np.ndarray:
+        """(n, 7) of the contacts, moved to where their springs stand."""
+        out = self.corners.copy()
+        near, far = self.ends, self.ends[:, ::-1]
+        vertex, across = self.corners[near, 5:7], self.corners[near, 1:3]
+        # The far end of the own face: the far vertex, or its foot on the own edge where that belongs to the other
+        # block.
+        beyond = self.corners[far, 3]
+        along = vertex[:, 1] - vertex[:, 0]
+        same = np.einsum("mi,mi->m", across[:, 0], across[:, 1]) > 0
+        foot = np.where(same, 0.0, 1.0)[:, None, None] * beyond[..., None] * across[:, ::-1]
+        share = np.abs(self.place - [0.0, 1.0])
+        sense = np.array([1.0, -1.0])[None, :, None]
+        out[near, 5:7] = vertex + share[..., None] * (sense * along[:, None] - foot)
+        out[:, 3] = self.between_corners(self.corners[:, 3])
+        out[near, 4] = (0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length)[:, None]
+        return out
+
+    def share_shear(self, vectors: np.ndarray, block: np.ndarray) -> None:
+        """Let both springs of faces that bend feel the motion along the middle of the face, in place: ``vectors`` (n, 2,
+        12) as `contact_vectors` has them, ``block`` (n,) that of the vertex."""
+        if not self.bends.any():
+            return
+        one, two = self.ends[self.bends].T
+        # Seen from the other block, whose edge runs the other way, the sides are exchanged and the motion is the same.
+        swapped = (block[one] != block[two])[:, None]
+        along, other = vectors[one, 1], vectors[two, 1]
+        mean = 0.5 * (along + np.where(swapped, np.roll(other, 6, axis=1), other))
+        vectors[one, 1], vectors[two, 1] = mean, np.where(swapped, np.roll(mean, 6, axis=1), mean)
+
+    def along_faces(self, value: np.ndarray) -> np.ndarray:
+        """(n,) of motion along the edges, ``value`` (n,) at the corners, as the springs feel it."""
+        out = self.between_corners(value)
+        ends = self.ends[self.bends]
+        out[ends] = out[ends].mean(axis=1, keepdims=True)
+        return out
+
+    def springs(self, lumped: Springs, stiff_in_shear: np.ndarray) -> Springs:
+        """The springs ``lumped`` at the corners, by the lengths that they have where they stand; ``stiff_in_shear``
+        (n,) those whose law has a shear stiffness."""
+        ratio = np.ones(len(self.corners))
+        lengths = 0.5 * (self.part[:, 1] - self.part[:, 0]) * self.length
+        ratio[self.ends] = lengths[:, None] / self.corners[self.ends, 4]
+        share = np.ones(len(self.corners))
+        share[self.ends] = self.share[:, None]
+        return replace(
+            lumped,
+            normal=lumped.normal * ratio * share,
+            shear=np.where(stiff_in_shear, lumped.shear * ratio, lumped.shear * share),
+            cohesion=lumped.cohesion * ratio,
+            tension=lumped.tension * ratio,
+        )
+
+    def on_bonded(self, faces: BondedFaces) -> BondedFaces:
+        """Bonded ``faces`` found at the corners, with the arms of where their springs stand."""
+        arm = np.full(len(self.corners), np.nan)
+        arm[faces.rows] = faces.arm
+        first, second = arm[self.ends].T
+        arm[self.ends] = first[:, None] + self.place * (second - first)[:, None]
+        return replace(faces, arm=arm[faces.rows])
+
+    def at_points(self, force: np.ndarray) -> np.ndarray:
+        """(n,) N: normal ``force`` of CONTACT rows, at the corners, as the springs carry it."""
+        out, (first, second) = force.copy(), self.place.T
+        at_first, at_second = force[self.ends].T
+        out[self.ends[:, 0]] = (second * (at_first + at_second) - at_second) / (second - first)
+        out[self.ends[:, 1]] = (at_second - first * (at_first + at_second)) / (second - first)
+        return out
+
+    def at_corners(self, force: np.ndarray) -> np.ndarray:
+        """(n,) N at the corners: what has the resultant and the moment of the springs' normal ``force``; of their
+        shear, whose arms, the gaps, are linear along the face too, what stretches the blocks as much besides."""
+        out, (first, second) = force.copy(), self.place.T
+        on_first, on_second = force[self.ends].T
+        out[self.ends[:, 0]] = on_first * (1 - first) + on_second * (1 - second)
+        out[self.ends[:, 1]] = on_first * first + on_second * second
+        return out
+
+    def between_corners(self, value: np.ndarray) -> np.ndarray:
+        """(n,) at the springs, of the straight line through ``value`` (n,) at the corners."""
+        out, place = value.copy(), self.place
+        at_first, at_second = value[self.ends].T
+        out[self.ends] = at_first[:, None] + place * (at_second - at_first)[:, None]
+        return out
+
+    def gap_at_corners(self, gap: np.ndarray) -> np.ndarray:
+        """(n,) m at the corners, of the straight line through the ``gap`` at the springs."""
+        out, (first, second) = gap.copy(), self.place.T
+        at_first, at_second = gap[self.ends].T
+        slope = (at_second - at_first) / (second - first)
+        out[self.ends] = np.stack([at_first - first * slope, at_first + (1 - first) * slope], axis=1)
+        return out
+
+    def better(self, gap: np.ndarray, state: np.ndarray, holds: np.ndarray) -> FacePoints | None:
+        """The faces with the parts that a step has left in contact, ``gap`` (n,) m and ``state`` (n,) of the springs,
+        ``holds`` (n,) bonds that may pull; None where these are the parts taken.
+
+        A part of which one spring has parted bears no moment, and its gaps tell nothing: the resultant acts beyond the
+        other, so that the part grows that way, or where it ends with the face is halved. None grows by more than its
+        length at either end, for on one that is too short the block turns too far. (A spring may be open and yet not
+        parted: its dashpot lets it go before.)
+        """
+        held = holds[self.ends].all(axis=1)
+        part = _touching(self.gap_at_corners(gap)[self.ends], held, self.shortest, self.part)
+        low, high = self.part.T
+        length = high - low
+        part = np.clip(part, (low - length)[:, None], (high + length)[:, None])
+        # One that has come over to the other side is sought in both.
+        over = (part[:, 0] >= high) | (part[:, 1] <= low)
+        part[over] = np.stack([np.minimum(part[:, 0], low), np.maximum(part[:, 1], high)], axis=1)[over]
+        first, second = ((state[self.ends] != OPEN) | (gap[self.ends] <= 0)).T
+        lame = (first != second) & ~held & (length > self.shortest)
+        half = np.maximum(0.5 * length, self.shortest)
+        to_low = np.where(low > 0, [np.maximum(low - length, 0.0), high], [low, low + half])
+        to_high = np.where(high < 1, [low, np.minimum(high + length, 1.0)], [high - half, high])
+        part[lame] = np.where(first, to_low, to_high).T[lame]
+        # Neighbours that turn each other's block go back and forth together for ever: the way is halved at every turn.
+        way = part - self.part
+        stride = np.where((way * self.went).sum(axis=1) < 0, 0.5 * self.stride, self.stride)
+        way *= stride[:, None]
+        off = np.abs(way).max(axis=1) > _KNOWN * (part[:, 1] - part[:, 0])
+        if not off.any():
+            return None
+        way[~off] = 0.0
+        return replace(self, part=self.part + way, went=np.where(off[:, None], way, self.went), stride=stride)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def give_by_bending(owner, across, point, vertices, following, start, modulus, bends):
+    """(m, 2): what the block ``owner`` (m,) turns by (rad/(N m)) behind the face across the normal ``across`` (m, 2)
+    through ``point`` (m, 2), h / (E' I / 2h) with its second moment I along the face and the distance h from its
+    centroid; and its width along the face, √(12 I / A) (m); 0 for blocks that do not bend. ``vertices`` (n, 2), the next of each ``following`` (n,), those of a block from ``start`` on,
+    its ``modulus`` Pa. (A face that is shorter than the block is wide turns the whole of that width.)"""
+    out = np.zeros((owner.shape[0], 2))
+    for f in range(owner.shape[0]):
+        b = owner[f]
+        if not bends[b]:
+            continue
+        nx, ny = across[f, 0], across[f, 1]
+        area = first = second = far = 0.0
+        for v in range(start[b], start[b + 1]):
+            w = following[v]
+            # Along the face and away from it.
+            s = (vertices[v, 1] - point[f, 1]) * nx - (vertices[v, 0] - point[f, 0]) * ny
+            d = (vertices[v, 0] - point[f, 0]) * nx + (vertices[v, 1] - point[f, 1]) * ny
+            r = (vertices[w, 1] - point[f, 1]) * nx - (vertices[w, 0] - point[f, 0]) * ny
+            e = (vertices[w, 0] - point[f, 0]) * nx + (vertices[w, 1] - point[f, 1]) * ny
+            cross = d * r - s * e
+            area += cross / 2
+            far += cross * (d + e) / 6
+            first += cross * (s + r) / 6
+            second += cross * (s * s + s * r + r * r) / 12
+        height, inertia = far / area, second - first * first / area
+        out[f, 0] = 2.0 * height * height / (modulus[b] * inertia)
+        out[f, 1] = np.sqrt(12.0 * inertia / area)
+    return out
+
+
+def _touching(gap: np.ndarray, held: np.ndarray, shortest: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face in contact, by the ``gap`` (m, 2) at its ends; faces that are all open keep that
+    ``before``."""
+    first, second = gap.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        zero = first / (first - second)
+    low = np.where((first > 0) & (second < 0), np.minimum(zero, 1 - shortest), 0.0)
+    high = np.where((first < 0) & (second > 0), np.maximum(zero, shortest), 1.0)
+    low, high = np.where(held, 0.0, low), np.where(held, 1.0, high)
+    out = ((first > 0) & (second > 0) & ~held)[:, None]
+    return np.where(out, before, np.stack([low, high], axis=1))
+
+
+def _left(bare: np.ndarray, pressed: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face that is left beside what is ``bare`` (m, 2) from its ends on, where something is; the
+    part ``pressed`` (m, 2) of all others."""
+    first, second = bare.T
+    some = (first >= 0) & (second >= 0) & (first + second > 0) & (1 - first - second >= shortest * (1 - 1e-9)) & ~held
+    return np.where(some[:, None], np.stack([first, 1 - second], axis=1), pressed)
+
+
+def _pressed(normal: np.ndarray, held: np.ndarray, shortest: np.ndarray) -> np.ndarray:
+    """(m, 2) the part of each face that the forces ``normal`` (m, 2) at its ends press on: c/ℓ = 3 (1/2 − e/ℓ), at most
+    1."""
+    total = normal.sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where((total > 0) & ~held, np.clip(normal[:, 1] / total, 0.0, 1.0), 0.5)
+    length = np.clip(3 * np.minimum(share, 1 - share), shortest, 1.0)
+    return np.stack([np.where(share > 0.5, 1 - length, 0.0), np.where(share > 0.5, 1.0, length)], axis=1)

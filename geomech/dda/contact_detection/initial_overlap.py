@@ -1,0 +1,133 @@
+"""Blocks that overlap before they have moved: their contacts would throw them apart."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from ...compiled import kept, part
+from ...model import Blocks
+from .neighbour_search import boxes, near_pairs
+
+log = logging.getLogger(__name__)
+
+#: Blocks that overlap by more than this part of the smaller one's size, √area, are refused …
+REFUSED = 1e-3
+#: … and by more than this part reported: the springs give back what they are pressed in by.
+REPORTED = 1e-6
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _depth_inside(x, y, vertices, next_vertex, first, last):
+    """How far (x, y) lies inside the polygon with the edges from ``first`` to ``last``; 0 outside. m."""
+    winding = 0
+    least = np.inf
+    for e in range(first, last):
+        f = next_vertex[e]
+        ax, ay = vertices[e, 0] - x, vertices[e, 1] - y
+        bx, by = vertices[f, 0] - x, vertices[f, 1] - y
+        dx, dy = bx - ax, by - ay
+        cross = ax * by - ay * bx
+        if ay <= 0.0:
+            winding += by > 0.0 and cross > 0.0
+        else:
+            winding -= by <= 0.0 and cross < 0.0
+        square = dx * dx + dy * dy
+        t = min(1.0, max(0.0, -(ax * dx + ay * dy) / square))
+        px, py = ax + t * dx, ay + t * dy
+        least = min(least, px * px + py * py)
+    return np.sqrt(least) if winding != 0 else 0.0
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _depth_crossing(vertices, next_vertex, e, f):
+    """Least distance of the ends of two edges from each other's line where they cross, else 0. m."""
+    least = np.inf
+    for turn in range(2):
+        i, j = (e, f) if turn == 0 else (f, e)
+        ax, ay = vertices[i, 0], vertices[i, 1]
+        dx, dy = vertices[next_vertex[i], 0] - ax, vertices[next_vertex[i], 1] - ay
+        length = np.sqrt(dx * dx + dy * dy)
+        start = ((vertices[j, 0] - ax) * dy - (vertices[j, 1] - ay) * dx) / length
+        end = ((vertices[next_vertex[j], 0] - ax) * dy - (vertices[next_vertex[j], 1] - ay) * dx) / length
+        if start * end >= 0.0:
+            return 0.0
+        least = min(least, abs(start), abs(end))
+    return least
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def depth_of_pair(vertices, next_vertex, start, box, centroid, a, b):
+    """How deep the blocks ``a`` and ``b`` overlap, m; 0 if they do not. ``start`` (n_blocks + 1,) their first vertices,
+    ``box`` (n_blocks, 4) least x, y and greatest x, y, ``centroid`` (n_blocks, 2)."""
+    if box[a, 0] >= box[b, 2] or box[b, 0] >= box[a, 2] or box[a, 1] >= box[b, 3] or box[b, 1] >= box[a, 3]:
+        return 0.0
+    depth = 0.0
+    for turn in range(2):
+        i, j = (a, b) if turn == 0 else (b, a)
+        # Blocks drawn twice have all corners on each other's outline.
+        if _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[i], start[i + 1]) > 0.0:
+            depth = max(
+                depth, _depth_inside(centroid[i, 0], centroid[i, 1], vertices, next_vertex, start[j], start[j + 1])
+            )
+        # Corners, and middles of edges: those of blocks shifted along a common side alone lie inside.
+        for v in range(start[i], start[i + 1]):
+            for share in (0.0, 0.5):
+                x = vertices[v, 0] + share * (vertices[next_vertex[v], 0] - vertices[v, 0])
+                y = vertices[v, 1] + share * (vertices[next_vertex[v], 1] - vertices[v, 1])
+                if box[j, 0] < x < box[j, 2] and box[j, 1] < y < box[j, 3]:
+                    depth = max(depth, _depth_inside(x, y, vertices, next_vertex, start[j], start[j + 1]))
+    if depth == 0.0:
+        for e in range(start[a], start[a + 1]):
+            for f in range(start[b], start[b + 1]):
+                depth = max(depth, _depth_crossing(vertices, next_vertex, e, f))
+    return depth
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _worst_pair(vertices, next_vertex, start, box, pairs, centroid, size):
+    """(block, other, depth) of the one of the ``pairs`` (k, 2) that overlaps deepest relative to the smaller block's
+    size; (−1, −1, 0) for none."""
+    worst_a, worst_b, worst, worst_share = -1, -1, 0.0, 0.0
+    for k in range(len(pairs)):
+        a, b = pairs[k]
+        depth = depth_of_pair(vertices, next_vertex, start, box, centroid, a, b)
+        smaller = min(size[a], size[b])
+        if depth > worst_share * smaller:
+            worst_a, worst_b, worst, worst_share = a, b, depth, depth / smaller
+    return worst_a, worst_b, worst
+
+
+def deepest_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> tuple[int, int, float, float]:
+    """The two blocks that overlap most at ``vertices`` (−1, −1 for none), by how much, m, and over the smaller one's
+    size, √area; ``moments`` (n_blocks, ≥ 3) with area and centroid first."""
+    start = np.ascontiguousarray(blocks.vertex_start, np.int64)
+    box = boxes(vertices, start[:-1])
+    size = np.sqrt(moments[:, 0])
+    a, b, depth = _worst_pair(
+        np.ascontiguousarray(vertices), np.ascontiguousarray(blocks.next_vertex, np.int64), start, box,
+        near_pairs(box, np.zeros(len(box), bool), 0.0), np.ascontiguousarray(moments[:, 1:3]), size,
+    )  # fmt: skip
+    return a, b, depth, depth / min(size[a], size[b]) if a >= 0 else 0.0
+
+
+def refuse_overlap(blocks: Blocks, vertices: np.ndarray, moments: np.ndarray) -> None:
+    """Look for blocks that overlap at ``vertices``; ``moments`` as in `deepest_overlap`.
+
+    Raises ValueError naming the worst two when they overlap by more than `REFUSED` of the smaller one's size; what
+    exceeds `REPORTED` is logged.
+    """
+    a, b, depth, share = deepest_overlap(blocks, vertices, moments)
+    if share <= REPORTED:
+        return
+    start = blocks.vertex_start
+    low, high = ([limit(vertices[start[k] : start[k + 1]], axis=0) for k in (a, b)] for limit in (np.min, np.max))
+    x, y = 0.5 * (np.maximum(*low) + np.minimum(*high))
+    names = blocks.names or tuple(f"block {k}" for k in range(blocks.n_blocks))
+    what = (
+        f"{names[a]!r} and {names[b]!r} overlap by {depth:.3g} m near x = {x:.6g}, y = {y:.6g} m before they have moved"
+    )
+    if share > REFUSED:
+        raise ValueError(f"{what}: draw them apart, or cut one out of the other")
+    log.warning("%s; their contact pushes them apart", what)

@@ -1,0 +1,115 @@
+"""Where two rounded corners meet: one contact with one normal for a pair of convex corners.
+
+The corner v of one block touches the corner w of another where x = v − w lies in a wedge that two entrance lines with
+the normals n₁ and n₂ bound, {x·n₁ < 0 and x·n₂ < 0} (Shi 1988). A sharp wedge leaves open which of its lines holds two
+corners that overlap by micrometres: blocks that have settled by as little differently would hang on each other. Rounded
+by a circle that touches both lines at the rounding length ρ from its tip (radius R = ρ / tan(φ/2), φ the angle between
+n₁ and n₂; Itasca's UDEC rounds the corners of blocks so), the wedge has one outward normal everywhere, and that changes
+gradually:
+
+    G(x) = |x − c| − R  where x − c lies between n₁ and n₂,  c = −R (n₁ + n₂) / (1 + cos φ);  else  x·n₁ or x·n₂.
+
+Corners that overlap by less than ρ in the one direction so slide over each other by a ramp, the lower the less they
+overlap; what overlaps by more than ρ is held by the side that was drawn.
+
+The contact of a step acts along the normal at the place where x first comes to G = 0 on the path that the blocks'
+velocities foresee, or where it comes nearest. G is convex: the half-plane with that normal contains all of the rounded
+wedge, and nothing passes into it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import part
+
+#: A normal nearer to that of one line than this angle (cosine; 0.2 rad) is taken for it: a ramp as shallow has less than
+#: a fiftieth of the rounding length in height, and the step that it smooths is none of the drawing's.
+_ON_LINE = 0.98
+#: … which is this part of the rounding length, 1 − cos 0.2.
+EASED = 0.02
+#: The rounding length is at least this many times as long as the faces of the two blocks are pressed in: a block on soft
+#: joints sinks in before it slides, and does not hang on the next one for it.
+_PRESSED = 4.0
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def rounding_length(rounding, longest, pressed):
+    """m: of two corners with these lengths, at most the ``longest`` (m), of blocks that are ``pressed`` in so far (m)."""
+    return min(longest, max(rounding, _PRESSED * pressed))
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way):
+    """G and its gradient at (x, y), and which line it is that of: 1, 2, or 0 for the arc."""
+    zx, zy = x - cx, y - cy
+    past_first, past_second = way * (nx1 * zy - ny1 * zx), way * (zx * ny2 - zy * nx2)
+    if past_first >= 0.0 and past_second >= 0.0:
+        far = np.sqrt(zx * zx + zy * zy)
+        if far > 0.0:
+            return zx / far, zy / far, far - radius, 0
+    if past_second >= 0.0 or (past_first < 0.0 and gap1 >= gap2):
+        return nx1, ny1, gap1, 1
+    return nx2, ny2, gap2, 2
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
+    """Along which normal corners at x = (``x``, ``y``) m meet that move by (``dx``, ``dy``) m in a step.
+
+    ``nx1`` … ``gap2``: unit normals of the two lines and x's distance from them; ``length``: the rounding length, m.
+    Returns the normal, the gap along it, m, and the line whose normal it is (1, 2, or 0 for none).
+    """
+    cosine, sine = nx1 * nx2 + ny1 * ny2, nx1 * ny2 - ny1 * nx2
+    way = 1.0 if sine >= 0.0 else -1.0
+    radius = length * (1.0 + cosine) / max(abs(sine), 1e-300)
+    cx, cy = -radius * (nx1 + nx2) / (1.0 + cosine), -radius * (ny1 + ny2) / (1.0 + cosine)
+    mx, my, gap, line = _nearest(x, y, nx1, ny1, nx2, ny2, gap1, gap2, radius, cx, cy, way)
+    if gap > 0.0:
+        here, zx, zy = (mx, my, gap, line), x - cx, y - cy
+        # Where on the path x comes first to the wedge, or nearest to it: lines are met, or near, at an end of the path
+        # or where it crosses them, the arc also where the path passes its centre.
+        rate1, rate2, travel = dx * nx1 + dy * ny1, dx * nx2 + dy * ny2, dx * dx + dy * dy
+        along = zx * dx + zy * dy
+        places = np.empty(5)
+        places[0], n = 1.0, 1
+        if gap1 > 0.0 and -rate1 > gap1:
+            places[n] = -gap1 / rate1
+            n += 1
+        if gap2 > 0.0 and -rate2 > gap2:
+            places[n] = -gap2 / rate2
+            n += 1
+        if -along > 0.0 and -along < travel:
+            left = along * along - travel * (zx * zx + zy * zy - radius * radius)
+            places[n] = (-along - np.sqrt(max(left, 0.0))) / travel
+            n += 1
+            if left < 0.0:
+                places[n - 1] = -along / travel
+        elif -along > 0.0:
+            left = along * along - travel * (zx * zx + zy * zy - radius * radius)
+            if left > 0.0 and -along - np.sqrt(left) < travel:
+                places[n] = (-along - np.sqrt(left)) / travel
+                n += 1
+        least, first = gap, 2.0
+        tiny = 1e-9 * length
+        for k in range(n):
+            t = places[k]
+            px, py, near, on = _nearest(
+                x + t * dx, y + t * dy, nx1, ny1, nx2, ny2, gap1 + t * rate1, gap2 + t * rate2, radius, cx, cy, way
+            )
+            # Of places in the wedge the first, before them all others the nearest.
+            if near <= tiny:
+                earlier = least > tiny or t < first
+            else:
+                earlier = near < least
+            if earlier:
+                least, first, mx, my, line = near, t, px, py, on
+        gap = zx * mx + zy * my - radius
+        # The line to come is none to stand on as long as the corner is behind it, beside the wedge.
+        if (line == 1 and gap1 < -EASED * length) or (line == 2 and gap2 < -EASED * length):
+            mx, my, gap, line = here
+    if line == 1 or (mx * nx1 + my * ny1 > _ON_LINE and gap1 > -EASED * length):
+        return nx1, ny1, gap1, 1
+    if line == 2 or (mx * nx2 + my * ny2 > _ON_LINE and gap2 > -EASED * length):
+        return nx2, ny2, gap2, 2
+    return mx, my, gap, 0

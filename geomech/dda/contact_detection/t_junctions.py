@@ -1,0 +1,135 @@
+"""Nodes inside a common face that are no corners: they bear nothing, the ends of the face do.
+
+Where joints meet a block's side from beyond, cutting leaves nodes in it. Blocks of one strain keep their sides straight,
+so that a face presses as its two ends tell, wherever nodes lie between them. At first they lie at the corners of other
+blocks; when these slide, a corner goes on and the node stays behind, in the face. Contacts of both would bear its springs
+by their lengths: the node all of it before they part and next to nothing after, with a force that stretches what stiffness
+is left, while the corner comes to be pressed in at once. (A wall's node so brought half of the energy turned over from
+nowhere.) Stiffness times length alone makes this so: springs of contacts whose law has none are as stiff on any length.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiled import kept
+from ...model import OPEN
+from ..joint_laws.bonds import ALIGNED, OFF_LINE, WITHOUT_GAPS
+
+
+class NodesInFaces(NamedTuple):
+    """Contacts (k,) of a table that nodes inside faces have.
+
+    node        (k,)    rows of the table
+    neighbours  (k, 2)  rows of the contacts on either side that bear in their place
+    share       (k, 2)  of what they bear: the lever's
+    """
+
+    node: np.ndarray
+    neighbours: np.ndarray
+    share: np.ndarray
+
+    def left(self, borne: np.ndarray) -> np.ndarray:
+        """(n,) of contacts: what is ``borne`` (n,), tributary lengths or forces, with what the nodes have left to their
+        neighbours."""
+        return _left(borne, self.node, self.neighbours, self.share)
+
+    def heirs(self, parent: np.ndarray, state: np.ndarray) -> np.ndarray:
+        """(n,) rows of the last step that contacts go on from: ``parent`` (n,), −1 for new ones, and where these come
+        beside a node whose contact was closed, or were open themselves, that one; ``state`` is of the last step's rows."""
+        return _heirs(parent, state, self.node, self.neighbours)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _left(borne, node, neighbours, share):
+    out = borne.copy()
+    for k in range(node.shape[0]):
+        # In this order: where another node lies between, it hands on what has been left to it.
+        for side in range(2):
+            out[neighbours[k, side]] += share[k, side] * out[node[k]]
+        out[node[k]] = 0.0
+    return out
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _heirs(parent, state, node, neighbours):
+    out = parent.copy()
+    for k in range(node.shape[0]):
+        before = parent[node[k]]
+        if before < 0 or state[before] == OPEN:
+            continue
+        for end in neighbours[k]:
+            if out[end] < 0 or state[out[end]] == OPEN:
+                out[end] = before
+    return out
+
+
+def nodes_in_faces(
+    vertex: np.ndarray,
+    edge: np.ndarray,
+    owner: np.ndarray,
+    flat: np.ndarray,
+    geometry: np.ndarray,
+    law: np.ndarray,
+    by_length: np.ndarray,
+) -> NodesInFaces | None:
+    """Those among contacts (n,), pair of blocks by pair, of ``vertex`` and ``edge``; ``owner`` and ``flat`` (n_vertices,)
+    (`Blocks.in_side`), ``geometry`` (n, 7) and ``law`` as in `ContactSet`, ``by_length`` (n,) contacts whose springs go by their
+    lengths. None without any."""
+    mine = flat[vertex] & by_length & (geometry[:, 4] > 0)
+    if not mine.any():
+        return None
+    node, neighbours, share = _between(mine, vertex, edge, owner, geometry, law)
+    return NodesInFaces(node, neighbours, share) if len(node) else None
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _between(mine, vertex, edge, owner, geometry, law):
+    n = vertex.shape[0]
+    out = np.zeros(n, np.bool_)
+    length = geometry[:, 4].copy()
+    node = np.empty(n, np.int64)
+    neighbours = np.empty((n, 2), np.int64)
+    share = np.empty((n, 2))
+    count = first = 0
+    for r in range(n):
+        a, b = owner[vertex[r]], owner[edge[r]]
+        while not (
+            (owner[vertex[first]] == a and owner[edge[first]] == b)
+            or (owner[vertex[first]] == b and owner[edge[first]] == a)
+        ):
+            first += 1
+        if not mine[r]:
+            continue
+        nx, ny = geometry[r, 1], geometry[r, 2]
+        before, after = -np.inf, np.inf
+        low = high = -1
+        for q in range(first, n):
+            one, two = owner[vertex[q]], owner[edge[q]]
+            if not ((one == a and two == b) or (one == b and two == a)):
+                break
+            if q == r or out[q] or law[q] != law[r] or length[q] <= 0.0:
+                continue
+            if abs(nx * geometry[q, 1] + ny * geometry[q, 2]) < ALIGNED:
+                continue
+            dx, dy = geometry[q, 5] - geometry[r, 5], geometry[q, 6] - geometry[r, 6]
+            along, off = dy * nx - dx * ny, dx * nx + dy * ny
+            if abs(off) > OFF_LINE * abs(along) + abs(geometry[r, 3]) + abs(geometry[q, 3]):
+                continue
+            if along < 0.0 and along > before:
+                before, low = along, q
+            elif along > 0.0 and along < after:
+                after, high = along, q
+        # A node's length is half the way between its neighbours: otherwise the face has a gap.
+        if low < 0 or high < 0 or abs(length[r] - 0.5 * (after - before)) > WITHOUT_GAPS * (after - before):
+            continue
+        out[r] = True
+        node[count] = r
+        neighbours[count, 0], neighbours[count, 1] = low, high
+        share[count, 0], share[count, 1] = after / (after - before), -before / (after - before)
+        length[low] += share[count, 0] * length[r]
+        length[high] += share[count, 1] * length[r]
+        count += 1
+    return node[:count], neighbours[:count], share[:count]

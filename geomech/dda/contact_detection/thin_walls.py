@@ -1,0 +1,100 @@
+"""Contacts of a vertex with an edge from whose outside it cannot have come: those of the far side of a thin wall.
+
+The line of an edge has the whole half-plane behind it on its inner side, of which the block is only the nearest part. A
+vertex behind the line by the gap g < 0 presses on the edge where it is in the block by |g|; where it lies beyond the
+middle of the wall, of the thickness T below its foot on the edge,
+
+    −g > T / 2,
+
+it has come to the other side of the wall, or lies outside beyond that: of a corner's two faces it touches the one that
+it is before. (Two corners that meet have one contact, see `rounded_corners`.) A contact that was closed before, or begins to
+press behind its line (as the faces of a crack do that was open when it cut its block), is what it was.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import kept, part
+
+#: A vertex is behind an edge by more than this part of the edge's length, or touches it.
+_BEHIND = 1e-9
+#: What a wall is measured from is no part of its far side: nearer than this part of the depth there is none.
+_START = 1e-6
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _thickness(vertices, next_vertex, edge, first, last, x, y, nx, ny, least):
+    """Of the block with the vertices from ``first`` to ``last``: how far it goes on from (x, y) on its ``edge`` against
+    the outward normal (nx, ny), by more than ``least`` m, and the edge where it ends."""
+    thick, far = np.inf, -1
+    for e in range(first, last):
+        if e == edge:
+            continue
+        f = next_vertex[e]
+        dx, dy = vertices[f, 0] - vertices[e, 0], vertices[f, 1] - vertices[e, 1]
+        # Outward normal of e is (dy, −dx): the ray leaves the block where it points along it.
+        leaving = -(dy * nx - dx * ny)
+        if leaving <= 0.0:
+            continue
+        px, py = vertices[e, 0] - x, vertices[e, 1] - y
+        along = (px * ny - py * nx) / (dx * -ny + dy * nx)
+        if along < 0.0 or along > 1.0:
+            continue
+        inward = -((px + along * dx) * nx + (py + along * dy) * ny)
+        if least < inward < thick:
+            thick, far = inward, e
+    return thick, far
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _convex(vertices, next_vertex, previous_vertex, i):
+    """Whether the outline turns outwards at vertex ``i``, or not at all."""
+    k, j = previous_vertex[i], next_vertex[i]
+    ax, ay = vertices[i, 0] - vertices[k, 0], vertices[i, 1] - vertices[k, 1]
+    bx, by = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1]
+    return ax * by - ay * bx >= -_BEHIND * np.sqrt((ax * ax + ay * ay) * (bx * bx + by * by))
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def from_outside(vertex, edge, gap, vertices, next_vertex, previous_vertex, start, owner, known, shallow):
+    """(n,) False for contacts of ``vertex`` with ``edge`` (n,) whose vertex is on the far side of the edge's block;
+    ``gap`` (n,) m, ``start`` (n_blocks + 1,) first vertices, ``owner`` (n_vertices,) blocks; ``known`` (n,)
+    are those that came from outside before. Of corners that meet both faces are kept, unless
+    the vertex lies before one and deeper than ``shallow`` (n,) m behind the other; −1 for what is no corner."""
+    keep = np.ones(vertex.shape[0], np.bool_)
+    for c in range(vertex.shape[0]):
+        v, e = vertex[c], edge[c]
+        f = next_vertex[e]
+        dx, dy = vertices[f, 0] - vertices[e, 0], vertices[f, 1] - vertices[e, 1]
+        length = np.sqrt(dx * dx + dy * dy)
+        if known[c] or gap[c] >= -_BEHIND * length:
+            continue
+        nx, ny = dy / length, -dx / length
+        t = ((vertices[v, 0] - vertices[e, 0]) * dx + (vertices[v, 1] - vertices[e, 1]) * dy) / (length * length)
+        # Beyond a corner that points outwards the line stands for that: what lies behind it there is not this block.
+        if t <= 0.0 and _convex(vertices, next_vertex, previous_vertex, e):
+            continue
+        if t >= 1.0 and _convex(vertices, next_vertex, previous_vertex, f):
+            continue
+        b = owner[e]
+        past = t <= 0.0 or t >= 1.0
+        depth = -gap[c]
+        if past:
+            # In a re-entrant corner it is in the block by both of its faces: as deep as it is from the corner.
+            end = e if t <= 0.0 else f
+            x, y = vertices[end, 0], vertices[end, 1]
+            nx, ny = x - vertices[v, 0], y - vertices[v, 1]
+            depth = np.sqrt(nx * nx + ny * ny)
+            nx, ny = nx / depth, ny / depth
+        else:
+            x, y = vertices[e, 0] + t * dx, vertices[e, 1] + t * dy
+        thick, far = _thickness(vertices, next_vertex, e, start[b], start[b + 1], x, y, nx, ny, _START * depth)
+        if shallow[c] >= 0.0 and not past and far >= 0 and (next_vertex[far] == e or next_vertex[e] == far):
+            g = next_vertex[far]
+            ux, uy = vertices[g, 0] - vertices[far, 0], vertices[g, 1] - vertices[far, 1]
+            before = (vertices[v, 0] - vertices[far, 0]) * uy - (vertices[v, 1] - vertices[far, 1]) * ux
+            if before <= 0.0 or depth <= shallow[c]:
+                continue
+        keep[c] = depth <= 0.5 * thick
+    return keep

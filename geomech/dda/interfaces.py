@@ -1,0 +1,69 @@
+"""What one step needs of a system of blocks, and what the limits of a step need of the step.
+
+`geomech.dda.system.BlockSystem` and `geomech.dda.time_step.Attempt` are these. Arrays are by block (n_blocks,) unless
+said otherwise; units are m, kg, s, Pa.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..model import Blocks, DdaSettings, State
+    from .contact_detection.contact_finder import ContactFinder
+    from .kinematics.newmark import TimeScheme
+    from .linear_solver.assembly import Pattern
+    from .loads.load_vectors import LoadMap
+
+
+class AttemptedStep(Protocol):
+    """A step as it was solved: ``increment`` (n_blocks, 6) of the unknowns, ``vertices`` (n_vertices, 2) before it,
+    ``largest`` displacement of a vertex."""
+
+    state: State
+    increment: np.ndarray
+    vertices: np.ndarray
+    moments: np.ndarray
+    largest: float
+
+
+class SteppedSystem(Protocol):
+    """Blocks with what stays from step to step: material, mass, freedom, contact finder, time scheme.
+
+    ``free`` is the row of each block in the equations, −1 where it is fixed, ``moving`` the numbers of those that have
+    one; ``next`` and ``owner`` are by vertex; ``no_compliance`` (n_blocks, 3, 3) and ``no_offset`` (n_blocks, 3) are
+    those of blocks without cracks.
+    """
+
+    blocks: Blocks
+    settings: DdaSettings
+    scheme: TimeScheme
+    finder: ContactFinder
+    load_map: LoadMap
+    density: np.ndarray
+    mass: np.ndarray
+    stiffness: np.ndarray
+    compliance: np.ndarray
+    no_compliance: np.ndarray
+    no_offset: np.ndarray
+    fixed: np.ndarray
+    free: np.ndarray
+    moving: np.ndarray
+    turns: np.ndarray
+    rigid: np.ndarray
+    held: np.ndarray | None
+    taken_out: np.ndarray | None
+    next: np.ndarray
+    vertex_start: np.ndarray
+    owner: np.ndarray
+    half_diagonal: float
+    rounding: float
+    rounding_told: bool
+    allowed_penetration: float
+
+    @property
+    def step_limit(self) -> float: ...
+
+    def pattern_of(self, block: np.ndarray, other: np.ndarray, moments: np.ndarray, linked: Any) -> Pattern: ...

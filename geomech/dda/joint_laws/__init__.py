@@ -1,0 +1,1 @@
+"""What contacts carry: penalty springs, joint stiffness, Coulomb friction, bonds, nonlinear laws."""

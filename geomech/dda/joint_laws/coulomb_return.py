@@ -1,0 +1,147 @@
+"""Forces that contacts carry in given states, and the states that these forces call for.
+
+A closed contact must not pull beyond its tensile strength, an open one must not penetrate, a sticking one must hold
+less than its strength μN + cℓ, and a sliding one would carry more than it does if it stuck (the return mapping of an
+elastic-plastic spring, under which exactly one of the states fits a given motion; the sign of the sliding, which Shi
+1988 asks for, leaves cases in which none does).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import kept, part
+from ...model import OPEN, SLIP, STICK
+
+#: Strengths are known to this part of themselves; slip, which is counted from the step's start, to this part of the
+#: round-off of coordinates.
+_KNOWN, _OF_SLIP = 1e-9, 1e-3
+
+
+#: Products may be fused into sums.
+_jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
+
+
+@part(fastmath={"contract"}, error_model="numpy", nogil=True, inline="always")
+def _move(unknowns, block, other, order, vectors, c):
+    """Motion of contact ``c`` along the normal and along the edge. (Inlined: to call it takes twice as long as the
+    sums.)"""
+    apart = along = 0.0
+    i, j = order[block[c]], order[other[c]]
+    if i >= 0:
+        for a in range(6):
+            apart += vectors[c, 0, a] * unknowns[6 * i + a]
+            along += vectors[c, 1, a] * unknowns[6 * i + a]
+    if j >= 0:
+        for a in range(6):
+            apart += vectors[c, 0, 6 + a] * unknowns[6 * j + a]
+            along += vectors[c, 1, 6 + a] * unknowns[6 * j + a]
+    return apart, along
+
+
+@_jit
+def moved(unknowns, block, other, order, vectors, lift=None):
+    """(n, 2): motion in the step along the normal, without ``lift`` (n,) times that along the edge, and along the edge."""
+    out = np.empty((block.shape[0], 2))
+    for c in range(block.shape[0]):
+        out[c, 0], out[c, 1] = _move(unknowns, block, other, order, vectors, c)
+        if lift is not None:
+            out[c, 0] -= lift[c] * out[c, 1]
+    return out
+
+
+@_jit
+def contact_forces(
+    unknowns, block, other, order, vectors, state, direction, gap0, normal, shear, friction, sliding, lift, shear0
+):
+    """(n, 4): normal force, shear force, new gap and motion along the edge in the step, in the present states."""
+    n = block.shape[0]
+    forces = np.zeros((n, 4))
+    for c in range(n):
+        apart, along = _move(unknowns, block, other, order, vectors, c)
+        gap = gap0[c] + apart - lift[c] * along
+        forces[c, 2], forces[c, 3] = gap, along
+        if state[c] != OPEN:
+            forces[c, 0] = -normal[c] * gap
+            if state[c] == STICK:
+                forces[c, 1] = shear0[c] - shear[c] * along
+            else:
+                forces[c, 1] = direction[c] * (friction[c] * forces[c, 0] + sliding[c])
+    return forces
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def check_states(
+    forces,
+    state,
+    direction,
+    bonded,
+    normal,
+    shear,
+    friction,
+    sliding,
+    peak,
+    hold,
+    cohesion,
+    tension,
+    keeps,
+    shear0,
+    slack,
+):
+    """The states that the ``forces`` (n, 4) of `contact_forces` call for.
+
+    Returns (new state; new direction; new bonded; violation (n,) N, 0 where the state stands). Gaps below the ``slack``
+    (n,) m, the round-off of coordinates, decide nothing, nor does what they make of friction.
+    """
+    n = state.shape[0]
+    new_state, new_direction, new_bonded = state.copy(), direction.copy(), bonded.copy()
+    violation = np.zeros(n)
+    for c in range(n):
+        gap, slide = forces[c, 2], forces[c, 3]
+        if state[c] == OPEN:
+            if gap >= -slack[c]:
+                continue
+            violation[c] = -normal[c] * gap
+            # The state to try is that of the springs under the motion at hand: sticking where it would have to slide, a
+            # contact may pull, open, close again and never come to sliding.
+            trial = shear0[c] - shear[c] * slide
+            if abs(trial) > violation[c] * friction[c] + sliding[c] and bonded[c] == 0:
+                new_state[c], new_direction[c] = SLIP, np.sign(trial)
+            else:
+                new_state[c] = STICK
+            continue
+        pull = tension[c] if bonded[c] == 1 else 0.0
+        if -forces[c, 0] > pull * (1.0 + _KNOWN) + normal[c] * slack[c]:
+            # What holds no pull opens without breaking: it may close again before the states are found.
+            new_state[c], new_bonded[c] = OPEN, (0 if pull > 0.0 else bonded[c])
+            violation[c] = normal[c] * abs(gap)
+        elif state[c] == STICK:
+            strength = max(0.0, peak[c] * forces[c, 0] + hold[c] + (cohesion[c] if bonded[c] else 0.0))
+            excess = abs(forces[c, 1]) - strength
+            if excess > _KNOWN * strength + (_OF_SLIP * shear[c] + peak[c] * normal[c]) * slack[c]:
+                new_state[c], new_bonded[c] = SLIP, (2 if keeps[c] and bonded[c] else 0)
+                new_direction[c] = np.sign(forces[c, 1])
+                violation[c] = excess
+        elif friction[c] > 0.0 or sliding[c] > 0.0:
+            strength = max(0.0, friction[c] * forces[c, 0] + sliding[c])
+            trial = direction[c] * (shear0[c] - shear[c] * slide)
+            if strength - trial > _KNOWN * strength + (_OF_SLIP * shear[c] + friction[c] * normal[c]) * slack[c]:
+                # By way of sticking even if it would slide back: turned about at once, two solutions may alternate.
+                new_state[c] = STICK
+                violation[c] = strength - trial
+    return new_state, new_direction, new_bonded, violation
+
+
+def reserves(state, bonded, normal_force, shear_force, gap, springs, slack) -> np.ndarray:
+    """(n,) N: how far contacts in these states are from leaving them, linear in the load while all states stand. Open
+    ones: the force that closing their gap would make; sticking ones: what is left of their strength, or of what presses
+    them; sliding ones the latter. They leave them where `check_states` says so, beyond what the rounding ``slack``
+    (n,) m of coordinates makes of forces: that is where nothing is left."""
+    rounding = springs.normal * slack
+    pull = np.where(bonded == 1, springs.tension, 0.0)
+    lifts = normal_force + pull * (1.0 + _KNOWN) + rounding
+    held = springs.hold + np.where(bonded > 0, springs.cohesion, 0.0)
+    strength = np.maximum(0.0, springs.peak * normal_force + held)
+    excess = _KNOWN * strength + (_OF_SLIP * springs.shear + springs.peak * springs.normal) * slack
+    closed = np.where(state == STICK, np.minimum(lifts, strength + excess - np.abs(shear_force)), lifts)
+    return np.where(state == OPEN, springs.normal * gap + rounding, closed)

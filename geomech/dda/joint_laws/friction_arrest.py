@@ -1,0 +1,229 @@
+"""Speeds at the end of a step that the step itself cannot bring about: sliding that friction stops within it, and
+contact vibrations that it does not resolve.
+
+A step weighs its forces over its whole length: friction that stops a block half way goes on pulling until the end, and
+leaves it with a speed of the order of a dt, often backwards. What was missed is an impulse: over the rest r = dt − t* of
+the step, t* by the line from the sliding speed u₀ at the start to the one that friction all along would have left at the
+end, friction may have had any value |S| ≤ μN + c instead (Coulomb). Of these that is taken which leaves no sliding, or
+the one nearest to it (Moreau 1988: Coulomb's law between velocities and impulses).
+
+A contact that stays closed on a spring which is stiff beside m/dt² hardly moves, and v' = 2 d/dt − v only turns its speed
+about from step to step, undamped: forces then swing about those that hold the blocks, and contacts near their strength
+change their state in every step. Such a contact ends the step with the mean speed d/dt that it had in it.
+
+Blocks answer as in the step: 2M/dt² Δd + (springs) Δd = impulse/dt, Δv = 2 Δd/dt, with all contacts that stay closed; so
+momentum is passed on between blocks, not lost, and a spring that the step does resolve keeps its vibration. Kinetic
+energy never grows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import OPEN, SLIP, STICK
+from ..linear_solver import assembly
+from ..open_close.contact_set import ContactSet
+from ..open_close.settled_states import Settled
+
+#: Impulses found to be beyond what friction can have been are brought back to it so often.
+_ROUNDS = 4
+#: A spring k turns the speed of a mass m about in every step of Shi's, instead of swinging, from k dt² = 16 m on: there
+#: its two roots are real, and one of them tends to −1.
+_TURNS_ABOUT = 16.0
+#: Blocks at rest move by as much as the rounding of so many contacts one upon the other: a wall of 1 000 bricks by four
+#: times that of one contact in a step, of 10 000 by nineteen. To stop them takes three solutions, and they go on so.
+_PASSED_ON = 20.0
+#: A step stops sliding where its speed is more than this part of what the largest force of a contact on the block gives
+#: it in so long a time; with it all that is slower, else nothing. (One brick that slides on a wall of 10 000 shakes
+#: hundreds of contacts at their strength, by 1e-11 m each, of 1e-12 J in all, in every step, which all blocks' equations
+#: were solved for three times more.)
+_WORTH = 3e-5
+#: … and takes vibrations out that swing the forces of contacts by more than this part of the largest: less hardly brings
+#: one to its strength.
+_SWING = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Unresolved:
+    """Speeds ``apart`` and ``along`` (n,) m/s of contacts beyond their mean ones in the step, where springs hold them
+    that the step does not resolve; 0 elsewhere."""
+
+    apart: np.ndarray
+    along: np.ndarray
+
+    @classmethod
+    def of(
+        cls, found: ContactSet, settled: Settled, slid: np.ndarray, speeds: np.ndarray, mass: np.ndarray, dt: float,
+    ) -> Unresolved | None:  # fmt: skip
+        """None where there is nothing worth it. ``slid`` (n,) m along the edge in the step, ``speeds`` (n, 2) m/s at
+        its end across the edge and along it, ``mass`` (n_blocks,) kg, infinite if fixed."""
+        light = np.where(mass[found.block] <= mass[found.other], found.block, found.other)
+        stiff, springs = _TURNS_ABOUT * mass[light] / (dt * dt), settled.springs
+        holds = (found.state != OPEN) & (settled.state != OPEN) & (springs.normal > stiff)
+        sticks = holds & (found.state == STICK) & (settled.state == STICK) & (springs.shear > stiff)
+        apart = np.where(holds, speeds[:, 0] - (settled.gap - found.gap_before) / dt, 0.0)
+        along = np.where(sticks, speeds[:, 1] - slid / dt, 0.0)
+        rows = np.flatnonzero(holds)
+        largest = np.maximum(np.abs(apart[rows]), np.abs(along[rows])) / dt
+        if not _worth_it(found, rows, largest, light, mass, settled.normal_force, _SWING):
+            return None
+        return cls(apart, along)
+
+
+@dataclass(frozen=True, eq=False)
+class Stopped:
+    """Contacts ``rows`` whose sliding comes to a stop in the step. ``sense`` ±1 along the edge is that of the sliding;
+    speeds (m/s) in that sense ``before`` and ``after`` the step."""
+
+    rows: np.ndarray
+    sense: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+    @classmethod
+    def of(
+        cls, found: ContactSet, settled: Settled, slid: np.ndarray, along: np.ndarray, mass: np.ndarray, dt: float,
+        slack: float,
+    ) -> Stopped | None:  # fmt: skip
+        """None where nothing stops. ``slid`` (n,) m along the edge in the step, ``along`` (n,) m/s the speed there at
+        its end; ``mass`` (n_blocks,) kg, infinite if fixed. Speeds that carry no farther in a step than the ``slack`` (m)
+        of contacts one upon the other are none."""
+        stuck = (found.state == SLIP) & (settled.state == STICK) & (found.direction != 0.0)
+        rows = np.flatnonzero(stuck | ((settled.state == SLIP) & (settled.direction != 0.0)))
+        if not len(rows):
+            return None
+        after = along[rows]
+        # Friction acts against the sliding.
+        sense = -np.where(stuck[rows], found.direction[rows], settled.direction[rows])
+        before = sense * (2.0 * slid[rows] / dt - after)
+        keep = (np.abs(after) * dt > _PASSED_ON * slack) & (before > 0.0) & (sense * after < 0.0)
+        light = np.where(mass[found.block] <= mass[found.other], found.block, found.other)
+        if not _worth_it(found, rows[keep], np.abs(after[keep]) / dt, light, mass, settled.normal_force, _WORTH):
+            return None
+        return cls(rows[keep], sense[keep], before[keep], sense[keep] * after[keep])
+
+
+def _worth_it(
+    found: ContactSet, rows: np.ndarray, deceleration: np.ndarray, light: np.ndarray, mass: np.ndarray,
+    force: np.ndarray, worth: float,
+) -> bool:  # fmt: skip
+    """Whether it takes more than the part ``worth`` of the largest force on its blocks to give any of the contacts
+    ``rows`` its ``deceleration`` (m/s²); ``light`` (n,) are the lighter blocks of all contacts, ``mass`` (n_blocks,) kg,
+    ``force`` (n,) N presses all contacts."""
+    if not len(rows):
+        return False
+    largest = np.zeros(len(mass))
+    for blocks in (found.block, found.other):
+        np.maximum.at(largest, blocks, force)
+    return bool((deceleration * mass[light[rows]] > worth * largest[light[rows]]).any())
+
+
+def contact_speeds(found: ContactSet, geometry: np.ndarray, velocity: np.ndarray, centroid: np.ndarray) -> np.ndarray:
+    """(n, 2) m/s of the vertex relative to the edge, across the edge and along it; ``geometry`` (n, 7) of the contacts,
+    ``velocity`` (n_blocks, 6), ``centroid`` (n_blocks, 2) m."""
+    normal, point = geometry[:, 1:3], geometry[:, 5:7]
+    speed = np.zeros((len(found), 2))
+    for owner, sign in ((found.block, 1.0), (found.other, -1.0)):
+        v, (x, y) = velocity[owner], (point - centroid[owner]).T
+        speed[:, 0] += sign * (v[:, 0] + (0.5 * v[:, 5] - v[:, 2]) * y + v[:, 3] * x)
+        speed[:, 1] += sign * (v[:, 1] + (0.5 * v[:, 5] + v[:, 2]) * x + v[:, 4] * y)
+    across = normal[:, 0] * speed[:, 0] + normal[:, 1] * speed[:, 1]
+    return np.stack([across, normal[:, 0] * speed[:, 1] - normal[:, 1] * speed[:, 0]], axis=1)
+
+
+def stop(
+    stopped: Stopped | None, unresolved: Unresolved | None, pattern: assembly.Pattern, matrix: np.ndarray,
+    vectors: np.ndarray, found: ContactSet, settled: Settled, dt: float,
+) -> tuple[np.ndarray, float]:  # fmt: skip
+    """(n_free, 6) m: Δd by whose rate 2 Δd/dt the velocities change, in the unknowns of `assembly`; and the energy (J/m)
+    that friction takes thereby. ``matrix`` (n, 6, 6) and ``vectors`` (n_contacts, 2, 12) as solved with. Raises
+    numpy.linalg.LinAlgError."""
+    springs, nothing = settled.springs, np.zeros(len(found))
+    apart, along = (nothing, nothing) if unresolved is None else (unresolved.apart, unresolved.along)
+    data, side = np.empty(pattern.size), np.empty(6 * pattern.n)
+
+    def answer(state, direction, friction, push, pull) -> np.ndarray:
+        # Other contacts keep what they carry: closed ones their gap, sticking ones their place, sliding ones their
+        # friction.
+        assembly.assemble_contacts(
+            pattern, data, side, matrix, np.zeros((pattern.n, 6)), pattern.upper, pattern.lower, found.block,
+            found.other, pattern.order, vectors, state, direction, 0.5 * dt * apart, springs.normal, springs.shear,
+            friction, push, springs.lift, pull,
+        )  # fmt: skip
+        return assembly.solve(pattern, data, side, False).reshape(-1, 6)
+
+    shear = -springs.shear * 0.5 * dt * along
+    if stopped is None:
+        return answer(settled.state, settled.direction, springs.friction, nothing, shear), 0.0
+    rows, sense, u0, u1 = stopped.rows, stopped.sense, stopped.before, stopped.after
+    resisted, pushed = -sense * settled.shear_force[rows], settled.normal_force[rows]
+    slips = settled.state[rows] == SLIP
+    strength = np.maximum(springs.friction[rows] * pushed + springs.sliding[rows], np.abs(resisted))
+    # Friction all along, which those that slid to the end had, leaves the speed ``full``.
+    full, bound = np.where(slips, u1, np.nan), np.full(len(rows), np.nan)
+    for _ in range(_ROUNDS):
+        given = ~np.isnan(bound)
+        state, push, pull = settled.state.copy(), nothing.copy(), shear.copy()
+        direction, friction = settled.direction.copy(), springs.friction.copy()
+        state[rows] = np.where(given, SLIP, STICK)
+        direction[rows], friction[rows] = 1.0, 0.0
+        push[rows] = np.where(given, -sense * (bound - resisted), 0.0)
+        pull[rows] = np.where(given, 0.0, -springs.shear[rows] * sense * u1 * 0.5 * dt)
+        change = answer(state, direction, friction, push, pull)
+        moved = _moved(found, rows, pattern.order, vectors, change)
+        force = np.where(given, push[rows], pull[rows] - springs.shear[rows] * moved)
+        total = resisted - sense * force
+        stuck = np.isnan(full)
+        # By how much a newton of friction more slows those that stuck: what the impulse has done, over the impulse.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slowed = np.abs(moved[stuck] * 2.0 / dt / force[stuck])
+        full[stuck] = u1[stuck] - np.nan_to_num(slowed, posinf=0.0) * (strength[stuck] - resisted[stuck])
+        slowing = u0 - full
+        share = np.clip(np.where(slowing > 0.0, u0 / np.where(slowing > 0.0, slowing, 1.0), 1.0), 0.0, 1.0)
+        least = strength * (2.0 * share - 1.0)
+        beyond = ~given & ((total < least) | (total > strength))
+        # What friction at its bound has stopped and more, sticks.
+        speed = u1 + sense * moved * 2.0 / dt
+        within = given & (np.where(bound < strength, speed, -speed) > 0.0)
+        if not (beyond.any() or within.any()):
+            break
+        bound[beyond] = np.clip(total, least, strength)[beyond]
+        bound[within] = np.nan
+    return change, float(-(force * (dt * sense * u1 + moved)).sum())
+
+
+def _moved(
+    found: ContactSet, rows: np.ndarray, order: np.ndarray, vectors: np.ndarray, change: np.ndarray
+) -> np.ndarray:
+    """(n,) m along the edge of contacts ``rows`` under ``change`` (n_free, 6)."""
+    out = np.zeros(len(rows))
+    for k, owner in enumerate((found.block[rows], found.other[rows])):
+        free = order[owner] >= 0
+        part = vectors[rows[free], 1, 6 * k : 6 * k + 6]
+        out[free] += np.einsum("na,na->n", part, change[order[owner[free]]])
+    return out
+
+
+def _product(u: np.ndarray, w: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """(n_blocks,) ∫ u·w of two first-order velocity fields (n_blocks, 6)."""
+    area, xx, yy, xy = moments[:, 0], moments[:, 3], moments[:, 4], moments[:, 5]
+    p, q, r, s = 0.5 * u[:, 5] - u[:, 2], 0.5 * u[:, 5] + u[:, 2], 0.5 * w[:, 5] - w[:, 2], 0.5 * w[:, 5] + w[:, 2]
+    total = area * (u[:, 0] * w[:, 0] + u[:, 1] * w[:, 1])
+    total += (u[:, 3] * w[:, 3] + q * s) * xx + (p * r + u[:, 4] * w[:, 4]) * yy
+    return total + (u[:, 3] * r + p * w[:, 3] + q * w[:, 4] + u[:, 4] * s) * xy
+
+
+def dissipating(
+    change: np.ndarray, velocity: np.ndarray, moments: np.ndarray, density: np.ndarray, fixed: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The part of ``change`` (n_blocks, 6) of ``velocity`` that does not raise the kinetic energy of the blocks that
+    are not ``fixed``, and what it takes of it, J/m."""
+    mass = np.where(fixed, 0.0, density)
+    first = float((mass * _product(velocity, change, moments)).sum())
+    second = float((mass * _product(change, change, moments)).sum())
+    if first >= 0.0 or second == 0.0:
+        return np.zeros_like(change), 0.0
+    part = min(1.0, -2.0 * first / second)
+    return part * change, -part * (first + 0.5 * part * second)

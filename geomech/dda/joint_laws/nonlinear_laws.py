@@ -1,0 +1,194 @@
+"""Joint laws that are no straight line: tangents at the forces at hand, and by how much a solution misses the laws.
+
+Every contact enters the step as a line: N = −k (g − κ p), |S| ≤ μ N + c. A law that bends (Barton & Bandis' strength,
+hyperbolic closure), that remembers how far it slid (softening, mobilised roughness) or that lifts its faces is replaced
+by its tangent at the normal force and the secant over the slip of the last open–close iteration. The step is settled
+only when the lines and the laws agree on the forces, so that nothing lags behind by a step.
+
+Strength and dilation: Barton & Choubey (1977) eqs. 7 and 11; mobilised roughness beyond the peak: Barton, Bandis &
+Bakhtar (1985) fig. 4; closure: Bandis, Lumsden & Barton (1983) eq. 8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model import OPEN, SLIP
+from ...model.joints.joint_law import STEEPEST
+from .penalty_springs import JointTable, Springs
+
+if TYPE_CHECKING:
+    from ..open_close.contact_set import ContactSet
+
+#: JRC mobilised over its peak, at slips over that of the peak.
+_SLIP_OVER_PEAK = np.array([1.0, 2.0, 4.0, 10.0, 25.0, 100.0])
+_ROUGHNESS_LEFT = np.array([1.0, 0.85, 0.70, 0.50, 0.40, 0.0])
+#: Where faces hardly press, the shear stiffness is that under this part of the wall's strength.
+_LEAST_PRESSURE = 1e-6
+#: Forces that differ from their laws by less than this part of the contact's own force agree with them. Slip wears the
+#: strength by successive substitution, so it is not as small as the round-off that the other states are held to.
+_AGREED = 1e-8
+
+
+def rough_strength(
+    pressure: np.ndarray, jrc: np.ndarray, jcs: np.ndarray, residual_angle: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(strength Pa, its slope over pressure, peak dilation angle rad) of rough joints under ``pressure`` (n,) Pa ≥ 0.
+
+    τ = σ tan(JRC log₁₀(JCS/σ) + φr), the angle at most 70° (σ → 0) and at least φr (σ ≥ JCS); the dilation is half the
+    part of the angle that roughness brings.
+    """
+    with np.errstate(divide="ignore"):
+        brought = np.radians(jrc) * np.log10(np.where(pressure > 0, jcs / np.maximum(pressure, 1e-300), np.inf))
+    angle = np.clip(residual_angle + brought, residual_angle, STEEPEST)
+    bends = (angle > residual_angle) & (angle < STEEPEST)
+    slope = np.tan(angle)
+    tangent = slope - np.where(bends, np.radians(jrc) / np.log(10.0) * (1.0 + slope * slope), 0.0)
+    return pressure * slope, tangent, 0.5 * (angle - residual_angle)
+
+
+class CurvedJoints:
+    """The contacts of a step whose laws, of those in ``table``, are curved."""
+
+    def __init__(self, table: JointTable, found: ContactSet) -> None:
+        at = np.flatnonzero(table.curved[found.law])
+        self.rows, self.law, self.length = at, found.law[at], found.geometry[at, 4]
+        self._cohesive = self.length if found.cohesive is None else found.cohesive[at]
+        self._wear, self._slip = found.wear[at], found.slip[at]
+        self._table = table
+
+    def lines(
+        self,
+        springs: Springs,
+        gap: np.ndarray,
+        found: ContactSet,
+        state: np.ndarray,
+        direction: np.ndarray,
+        bonded: np.ndarray,
+        normal_force: np.ndarray,
+        plastic: np.ndarray,
+    ) -> tuple[Springs, np.ndarray]:
+        """``springs`` and starting ``gap`` (n,) with the tangents of the laws at ``normal_force`` N and ``plastic``
+        slip m.
+
+        ``springs`` and ``gap`` are those of straight laws, dashpots included, which ``found`` is without.
+        """
+        t, law, length, at = self._table, self.law, self.length, self.rows
+        face = length > 0
+        n = np.where(state[at] == OPEN, 0.0, np.maximum(normal_force[at], 0.0))
+        p = np.where(state[at] == SLIP, plastic[at], 0.0)
+        pressure = np.where(face, n / np.where(face, length, 1.0), np.inf)
+
+        friction, sliding, peak, hold, cohesion = self._strength(pressure, p, n, bonded[at])
+        undamped, gap0 = found.springs.normal[at], found.gap[at]
+        drag = springs.normal[at] - undamped
+        normal, offset = self._closure(undamped, n)
+        shear = springs.shear[at]
+        by_peak = t.stiff_by_peak[law] & face
+        if by_peak.any():
+            least = np.maximum(pressure, _LEAST_PRESSURE * t.jcs[law])
+            strength, _, _ = rough_strength(least, t.jrc[law], t.jcs[law], t.residual_angle[law])
+            shear = np.where(by_peak, strength * length / t.peak_slip[law], shear)
+        lift = np.where(state[at] == SLIP, self._lift(pressure, p, direction[at]), 0.0)
+
+        stiff = normal + drag
+        start = (springs.normal[at] * gap[at] + normal * (gap0 + offset) - undamped * gap0) / stiff
+        # Slip is what the shear spring does not take up; the lift counts slip alone on the way out.
+        out = lift * direction[at] < 0
+        share = np.where(out, lift / shear, 0.0)
+        start = start + share * (found.shear[at] - direction[at] * sliding)
+        # … and on the way back the motion along the edge, of which the unknowns have not what is given.
+        start = start - np.where(lift * direction[at] > 0, lift * found.stretch[at], 0.0)
+        stiff = stiff / (1.0 - stiff * share * direction[at] * friction)
+
+        new = {
+            name: getattr(springs, name).copy()
+            for name in ("normal", "shear", "friction", "sliding", "peak", "hold", "cohesion", "lift")
+        }
+        for name, value in (
+            ("normal", stiff), ("shear", shear), ("friction", friction), ("sliding", sliding), ("peak", peak),
+            ("hold", hold), ("cohesion", cohesion), ("lift", lift),
+        ):  # fmt: skip
+            new[name][at] = value
+        gap = gap.copy()
+        gap[at] = start
+        return replace(springs, **new), gap
+
+    def _strength(self, pressure, plastic, n, bonded):
+        t, law, length = self._table, self.law, self.length
+        # Strength left at the step's start for those that stick, at its end for those that slide.
+        left, left_sliding = self._left(self._wear, slides=False), self._left(self._wear + np.abs(plastic), slides=True)
+        fall = t.friction[law] - t.residual_friction[law]
+        peak, friction = t.residual_friction[law] + fall * left, t.residual_friction[law] + fall * left_sliding
+        lost = t.cohesion[law] - t.residual_cohesion[law]
+        cohesion = (t.residual_cohesion[law] + lost * left) * self._cohesive
+        sliding = np.where(bonded == 2, (t.residual_cohesion[law] + lost * left_sliding) * self._cohesive, 0.0)
+        hold = np.zeros(len(law))
+        rough = (t.jrc[law] > 0) & (length > 0)
+        if rough.any():
+            finite = np.where(rough, pressure, 0.0)
+            for wear, slope, rest in ((self._wear, peak, hold), (self._wear + np.abs(plastic), friction, sliding)):
+                strength, tangent, _ = rough_strength(finite, self._roughness(wear), t.jcs[law], t.residual_angle[law])
+                slope[rough] = (tangent / t.reduction[law])[rough]
+                rest[rough] = ((strength * length - tangent * n) / t.reduction[law])[rough]
+        return friction, sliding, peak, hold, cohesion
+
+    def _left(self, wear, slides: bool) -> np.ndarray:
+        """Part of the way from residual to peak strength that is left after ``wear``."""
+        d = self._table.softening[self.law]
+        at_once = np.where((wear > 0) | slides, 0.0, 1.0)
+        return np.where(d > 0, np.clip(1.0 - wear / np.where(d > 0, d, 1.0), 0.0, 1.0), at_once)
+
+    def _roughness(self, wear) -> np.ndarray:
+        """JRC that is mobilised after ``wear`` beyond the peak."""
+        t, law = self._table, self.law
+        return t.jrc[law] * np.interp(1.0 + wear / t.peak_slip[law], _SLIP_OVER_PEAK, _ROUGHNESS_LEFT)
+
+    def _closure(self, stiffness, n) -> tuple[np.ndarray, np.ndarray]:
+        """(tangent N/m, offset m) with N = −k_t (g + offset) near the force ``n``: closure n/(k₀ + n/Vm)."""
+        limit = self._table.closure[self.law]
+        closed = n / (stiffness + n / limit)
+        tangent = stiffness / (1.0 - closed / limit) ** 2
+        return tangent, closed - n / tangent
+
+    def _lift(self, pressure, plastic, direction) -> np.ndarray:
+        """m of lift per m of slip along the edge's direction; falling where a contact slides back to where it began."""
+        t, law = self._table, self.law
+        before, after = self._slip, self._slip + plastic
+        middle = 0.5 * (before + after)
+        side = np.sign(np.where(middle != 0, middle, np.where(plastic != 0, plastic, -direction)))
+        reach, slope = t.dilation_slip[law], t.dilation[law]
+        moved = plastic != 0
+        gained = np.minimum(np.abs(after), reach) - np.minimum(np.abs(before), reach)
+        rate = np.where(moved, gained / np.where(moved, plastic, 1.0), side * (np.abs(before) < reach)) * slope
+        rough = (t.jrc[law] > 0) & (self.length > 0)
+        if rough.any():
+            wear = self._wear + 0.5 * np.abs(plastic)
+            _, _, angle = rough_strength(
+                np.where(rough, pressure, 0.0), self._roughness(wear), t.jcs[law], t.residual_angle[law]
+            )
+            rate = np.where(rough, side * np.tan(angle), rate)
+        return rate
+
+    def misfit(
+        self, was: Springs, gap_was: np.ndarray, now: Springs, gap_now: np.ndarray, state, forces: np.ndarray
+    ) -> np.ndarray:
+        """(n,) N by which the ``forces`` (n, 4) of `check_states`, on the lines that were, miss the laws; 0 where they
+        agree."""
+        out = np.zeros(len(state))
+        at = self.rows
+        n, s, gap, slide = forces[at].T
+        closed, slips = state[at] != OPEN, state[at] == SLIP
+        moved = gap - gap_was[at] + was.lift[at] * slide
+        pressed = -now.normal[at] * (gap_now[at] + moved - now.lift[at] * slide)
+        strength = now.friction[at] * n + now.sliding[at]
+        off = np.where(closed, np.abs(pressed - n), 0.0)
+        off = np.maximum(off, np.where(slips, np.abs(strength - np.abs(s)), 0.0))
+        sprung = np.abs(now.shear[at] - was.shear[at]) * np.abs(slide)
+        off = np.maximum(off, np.where(closed & ~slips, sprung, 0.0))
+        size = np.maximum(np.abs(n), np.abs(s))
+        out[at] = np.where(off > _AGREED * size, off, 0.0)
+        return out

@@ -1,0 +1,59 @@
+"""Unknowns that stay zero: those of guided platens, and the rigid motion of a lone block under loads in balance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import kept
+
+#: Loads on a lone block whose resultant is below this part of their size are in balance: it strains by less, and loads
+#: that balance on the undeformed block miss by about its strain on the deformed one.
+_BALANCE = 1e-2
+
+
+def balanced(load: np.ndarray, points: np.ndarray, edges: np.ndarray, weight: np.ndarray, moments: np.ndarray) -> bool:
+    """Whether a lone block's loads are in balance: generalised ``load`` (6,), POINT_FORCE and EDGE_FORCE rows,
+    ``weight`` (2,) N, a row of `block_moments`.
+
+    Such a block has no support, and pressed by forces that keep their direction it is not even stable: in statics its
+    rigid motion, which carries no force, is held.
+    """
+    size = sum(float(np.abs(rows["force"]).sum()) for rows in (points, edges))
+    total = np.abs(load[:3] / [1.0, 1.0, np.sqrt(moments[0])])
+    return float(np.abs(weight).sum()) <= _BALANCE * size and bool((total <= _BALANCE * size).all())
+
+
+def with_rigid_motion(held: np.ndarray | None) -> np.ndarray:
+    """(1, 6) what is ``held`` of a lone block, and its rigid motion."""
+    out = np.zeros((1, 6), bool) if held is None else held.copy()
+    out[0, :3] = True
+    return out
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def hold(held, matrix, right, vectors, block, other, order):
+    """Take the unknowns ``held`` (n_blocks, 6) out of the equations, in place: their rows say that they are zero.
+
+    ``matrix`` (n, 6, 6) and ``right`` (n, 6) as in `assembly`; ``vectors`` (n_contacts, 2, 12) of the contacts between
+    ``block`` and ``other``; ``order`` (n_blocks,) the row of each block, −1 if fixed.
+    """
+    size = 0.0
+    for i in range(matrix.shape[0]):
+        for k in range(6):
+            size = max(size, abs(matrix[i, k, k]))
+    for b in range(held.shape[0]):
+        i = order[b]
+        if i < 0:
+            continue
+        for k in range(6):
+            if held[b, k]:
+                for m in range(6):
+                    matrix[i, k, m] = matrix[i, m, k] = 0.0
+                matrix[i, k, k] = size
+                right[i, k] = 0.0
+    for c in range(block.shape[0]):
+        for k in range(6):
+            if held[block[c], k]:
+                vectors[c, 0, k] = vectors[c, 1, k] = 0.0
+            if held[other[c], k]:
+                vectors[c, 0, 6 + k] = vectors[c, 1, 6 + k] = 0.0

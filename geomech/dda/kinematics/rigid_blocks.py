@@ -1,0 +1,52 @@
+"""Blocks that do not strain: three unknowns, and the mean stress that the forces on them make.
+
+The strains of a rigid block are held at zero exactly. What its rows of the equations would have to carry for that is
+its mean stress, the virial of all forces on it: A σ̄ = Σ sym(F ⊗ x) + ∫ sym(b ⊗ x) dA about its centroid, with its
+inertia and the centrifugal force of its spin in b (Love 1927, §120).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...conventions import rotate_stress
+
+
+def with_rigid(held: np.ndarray | None, rigid: np.ndarray) -> np.ndarray | None:
+    """(n_blocks, 6) what is ``held``, and the strains of ``rigid`` (n_blocks,) blocks; None when that is nothing."""
+    if not rigid.any():
+        return held
+    out = np.zeros((len(rigid), 6), bool) if held is None else held.copy()
+    out[rigid, 3:] = True
+    return out
+
+
+def mean_stress(
+    blocks: np.ndarray,
+    contacts: np.ndarray,
+    load: np.ndarray,
+    moments: np.ndarray,
+    density: np.ndarray,
+    acceleration: np.ndarray,
+    spin: np.ndarray,
+    middle: np.ndarray,
+    turn: np.ndarray,
+) -> np.ndarray:
+    """(n, 3) Pa mean stress of ``blocks`` (n,) on axes turned by ``turn`` (n_blocks,) rad, from the forces of a step:
+    CONTACT rows, on a geometry turned by ``middle`` (n_blocks,) rad, generalised ``load`` (n_blocks, 6) N m,
+    ``acceleration`` (n_blocks, 6) and ``spin`` (n_blocks,) rad/s."""
+    n = contacts["normal"]
+    force = contacts["normal_force"][:, None] * n
+    force += contacts["shear_force"][:, None] * np.stack([-n[:, 1], n[:, 0]], axis=1)
+    virial = np.zeros((len(load), 3))
+    for owner, sign in (("block", 1.0), ("other", -1.0)):
+        own = contacts[owner]
+        (x, y), (fx, fy) = (contacts["point"] - moments[own, 1:3]).T, sign * force.T
+        for k, part in enumerate((x * fx, y * fy, 0.5 * (y * fx + x * fy))):
+            virial[:, k] += np.bincount(own, weights=part, minlength=len(virial))
+    virial = rotate_stress(virial, -middle) + load[:, 3:]
+    xx, yy, xy = moments[:, 3:6].T
+    second = np.stack([xx, yy, xy], axis=1)
+    turning = np.stack([-xy, xy, 0.5 * (xx - yy)], axis=1)
+    virial += density[:, None] * (spin[:, None] ** 2 * second - acceleration[:, 2:3] * turning)
+    return rotate_stress(virial[blocks] / moments[blocks, :1], turn[blocks])

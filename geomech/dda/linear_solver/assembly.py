@@ -1,0 +1,419 @@
+"""The 6×6-block system of a step: the blocks' own equations, contact springs, and its solution.
+
+Unknowns are (u0, v0, h r0, h εx, h εy, h γxy) with h = √area, so that all six are lengths and the matrix stays well
+scaled. Free blocks only: a fixed block has no unknowns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...compiled import kept, part
+from ...model import OPEN, SLIP, STICK
+from .block_solver import RESIDUAL, BlockSolver
+from .simd import load_six, minus_product, numbers, plus_product, product, spread, store, store_six, zeros
+from .task_pool import add_at_once, await_value, crew
+
+#: Up to this many free blocks a dense factorisation is quicker than a sparse one (measured on brick walls).
+DENSE_BLOCKS = 60
+#: From so many blocks on, rows are filled on all cores, of so many at a time.
+THREADED, SHARE = 4000, 256
+#: Up to this part of the blocks, only the rows of those whose contacts have other laws are filled again.
+FILLED_AGAIN = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """What links blocks besides contacts: ``blocks`` (k, 6, 6) of the matrix at ``row`` and ``column`` (k,) of its 6×6
+    blocks, which stand at ``places`` (k, 6, 6) of the flat matrix."""
+
+    row: np.ndarray
+    column: np.ndarray
+    places: np.ndarray
+    blocks: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """Where each 6×6 block stands in the flat matrix: entry (a, b) of a block is data[base + a·stride[row] + b].
+
+    ``order`` (n_blocks,) is the number of each block's unknowns, −1 if fixed; those of one begin at ``begins``
+    (n + 1,). ``solver`` is None for a dense matrix.
+    ``links`` are those that other things than contacts make, None without.
+    """
+
+    n: int
+    order: np.ndarray
+    begins: np.ndarray
+    stride: np.ndarray
+    diagonal: np.ndarray
+    upper: np.ndarray
+    lower: np.ndarray
+    size: int
+    solver: BlockSolver | None = None
+    links: Links | None = None
+
+    def add_links(self, data: np.ndarray) -> None:
+        """Add them to an assembled matrix."""
+        if self.links is not None:
+            np.add.at(data, self.links.places, self.links.blocks)
+
+    def without_contacts(self, matrix: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
+        """(n, 6) the product of the blocks' own ``matrix`` (n, 6, 6) and of the links with ``unknowns`` (6 n,)."""
+        rows = unknowns.reshape(-1, 6)
+        out = np.einsum("bij,bj->bi", matrix, rows)
+        if self.links is not None:
+            np.add.at(out, self.links.row, np.einsum("kij,kj->ki", self.links.blocks, rows[self.links.column]))
+        return out
+
+
+def dense_pattern(order: np.ndarray, block: np.ndarray, other: np.ndarray) -> Pattern:
+    """Pattern of a full matrix; ``block`` and ``other`` (n_contacts,) are the contacts' owners."""
+    n = int(order.max()) + 1
+    number = np.arange(n)
+    i, j = order[block], order[other]
+    return Pattern(
+        n=n,
+        order=order,
+        begins=36 * n * np.arange(n + 1),
+        stride=np.full(n, 6 * n),
+        diagonal=36 * n * number + 6 * number,
+        upper=36 * n * i + 6 * j,
+        lower=36 * n * j + 6 * i,
+        size=36 * n * n,
+    )
+
+
+def sparse_pattern(
+    order: np.ndarray, block: np.ndarray, other: np.ndarray, points: np.ndarray, kept: BlockSolver | None = None
+) -> Pattern:
+    """Pattern of a block-sparse matrix, its 6×6 blocks stored one after the other. ``points`` (n_blocks, 2) m:
+    centroids.
+
+    The ``kept`` solver serves on as long as no two blocks meet that did not when it was made.
+    """
+    n = int(order.max()) + 1
+    i, j = order[block], order[other]
+    both = (i >= 0) & (j >= 0)
+    number = np.arange(n)
+    pairs = np.concatenate([i[both] * n + j[both], j[both] * n + i[both]])
+    if kept is None or not kept.holds(pairs):
+        keys = np.unique(np.concatenate([number * n + number, pairs]))
+        free = np.empty(n, np.int64)
+        free[order[order >= 0]] = np.flatnonzero(order >= 0)
+        kept = BlockSolver(points[free], keys // n, keys % n)
+    return Pattern(
+        n=n,
+        order=order,
+        begins=36 * kept.pointer,
+        stride=np.full(n, 6),
+        diagonal=36 * kept.entry(number * n + number),
+        upper=36 * kept.entry(np.where(both, i * n + j, 0)),
+        lower=36 * kept.entry(np.where(both, j * n + i, 0)),
+        size=36 * len(kept.keys),
+        solver=kept,
+    )
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def contact_vectors(block, other, geometry, order, moments):
+    """(n, 2, 12): relative motion of vertex and edge along the normal and along the edge, per unit of the unknowns.
+
+    Both blocks turn about the vertex itself, so that the pair of contact forces has no moment; the owner of the edge
+    is strained at the vertex's projection on the edge, so that penetration does not stretch its arm.
+    """
+    n = block.shape[0]
+    out = np.zeros((n, 2, 12))
+    for c in range(n):
+        nx, ny = geometry[c, 1], geometry[c, 2]
+        for side in range(2):
+            b = block[c] if side == 0 else other[c]
+            if order[b] < 0:
+                continue
+            sign = 1.0 if side == 0 else -1.0
+            h = np.sqrt(moments[b, 0])
+            x, y = (geometry[c, 5] - moments[b, 1]) / h, (geometry[c, 6] - moments[b, 2]) / h
+            for k in range(2):
+                ax, ay = (nx, ny) if k == 0 else (-ny, nx)
+                at = 6 * side
+                out[c, k, at] = sign * ax
+                out[c, k, at + 1] = sign * ay
+                out[c, k, at + 2] = sign * (x * ay - y * ax)
+                sx = x - side * geometry[c, 3] * nx / h
+                sy = y - side * geometry[c, 3] * ny / h
+                out[c, k, at + 3] = sign * sx * ax
+                out[c, k, at + 4] = sign * sy * ay
+                out[c, k, at + 5] = sign * 0.5 * (sy * ax + sx * ay)
+    return out
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def sides_of(n, order, block, other):
+    """The sides of contacts that each of ``n`` blocks with unknowns has: (n + 1,) where they begin in (k,), 2 c for the
+    vertex of contact c and 2 c + 1 for its edge, ascending."""
+    start = np.zeros(n + 2, np.int64)
+    for c in range(len(block)):
+        i, j = order[block[c]], order[other[c]]
+        if i >= 0:
+            start[i + 2] += 1
+        if j >= 0:
+            start[j + 2] += 1
+    for b in range(n):
+        start[b + 2] += start[b + 1]
+    side = np.empty(start[n + 1], np.int64)
+    for c in range(len(block)):
+        i, j = order[block[c]], order[other[c]]
+        if i >= 0:
+            side[start[i + 1]] = 2 * c
+            start[i + 1] += 1
+        if j >= 0:
+            side[start[j + 1]] = 2 * c + 1
+            start[j + 1] += 1
+    return start[: n + 1], side
+
+
+@part(error_model="numpy", nogil=True)
+def _put_block(where, at, stride, r0, r1, r2, r3, r4, r5):
+    """Write six rows of six, ``stride`` apart."""
+    store_six(where, at, r0)
+    store_six(where, at + stride, r1)
+    store_six(where, at + 2 * stride, r2)
+    store_six(where, at + 3 * stride, r3)
+    store_six(where, at + 4 * stride, r4)
+    store_six(where, at + 5 * stride, r5)
+
+
+@part(error_model="numpy", nogil=True)
+def _add_pair(room, pull, across, r0, r1, r2, r3, r4, r5):
+    """The rows r and the 6 × 6 of push ⊗ ``pull`` + drag ⊗ ``across``, whose push and drag lie at 0 and 8 of the
+    ``room``."""
+    r0 = plus_product(plus_product(r0, spread(room, 0), pull), spread(room, 8), across)
+    r1 = plus_product(plus_product(r1, spread(room, 1), pull), spread(room, 9), across)
+    r2 = plus_product(plus_product(r2, spread(room, 2), pull), spread(room, 10), across)
+    r3 = plus_product(plus_product(r3, spread(room, 3), pull), spread(room, 11), across)
+    r4 = plus_product(plus_product(r4, spread(room, 4), pull), spread(room, 12), across)
+    r5 = plus_product(plus_product(r5, spread(room, 5), pull), spread(room, 13), across)
+    return r0, r1, r2, r3, r4, r5
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _fill_rows(
+    first, last, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
+    normal, shear, slope, lift,
+):  # fmt: skip
+    """Fill the rows of blocks from ``first`` to before ``last``, see `assemble`; ``start`` and ``side`` from
+    `sides_of`. What is done for a block is its own: rows are the same to the bit whoever fills them.
+
+    A block's own 6 × 6, and that of the neighbour whose contacts are gone through, stay in registers."""
+    buffer = np.empty(16)
+    room, into, given, along = numbers(buffer), numbers(data), numbers(matrix), numbers(vectors)
+    kns, kss, frictions, rises = numbers(normal), numbers(shear), numbers(slope), numbers(lift)
+    for b in range(first, last):
+        data[begins[b] : begins[b + 1]] = 0.0
+        step, at = stride[b], 36 * b
+        d0, d1, d2 = load_six(given, at), load_six(given, at + 6), load_six(given, at + 12)
+        d3, d4, d5 = load_six(given, at + 18), load_six(given, at + 24), load_six(given, at + 30)
+        p0 = p1 = p2 = p3 = p4 = p5 = zeros(into)
+        at_hand = -1
+        for q in range(start[b], start[b + 1]):
+            c, at = side[q] >> 1, 6 * (side[q] & 1)
+            if normal[c] == 0.0 and shear[c] == 0.0:
+                continue
+            n, t = load_six(along, 24 * c + at), load_six(along, 24 * c + 12 + at)
+            rise = spread(rises, c)
+            push = product(spread(kns, c), plus_product(n, spread(frictions, c), t))
+            store(room, 0, push)
+            store(room, 8, product(spread(kss, c), t))
+            pull = minus_product(n, rise, t)
+            d0, d1, d2, d3, d4, d5 = _add_pair(room, pull, t, d0, d1, d2, d3, d4, d5)
+            if (order[other[c]] if at == 0 else order[block[c]]) >= 0:
+                their = upper[c] if at == 0 else lower[c]
+                if their != at_hand:
+                    if at_hand >= 0:
+                        _put_block(into, at_hand, step, p0, p1, p2, p3, p4, p5)
+                    at_hand = their
+                    # What contacts before have made of it, for they need not stand together.
+                    p0, p1 = load_six(into, their), load_six(into, their + step)
+                    p2, p3 = load_six(into, their + 2 * step), load_six(into, their + 3 * step)
+                    p4, p5 = load_six(into, their + 4 * step), load_six(into, their + 5 * step)
+                n, t = load_six(along, 24 * c + 6 - at), load_six(along, 24 * c + 18 - at)
+                p0, p1, p2, p3, p4, p5 = _add_pair(room, minus_product(n, rise, t), t, p0, p1, p2, p3, p4, p5)
+        if at_hand >= 0:
+            _put_block(into, at_hand, step, p0, p1, p2, p3, p4, p5)
+        _put_block(into, diagonal[b], step, d0, d1, d2, d3, d4, d5)
+    # What is found by its place is kept until here.
+    return len(buffer) + len(data) + len(matrix) + len(vectors) + len(normal) + len(shear) + len(slope) + len(lift)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _fill_shared(
+    claimed, told, share, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
+    vectors, normal, shear, slope, lift,
+):  # fmt: skip
+    """Fill the rows of ``share`` blocks at a time, by turns with other threads; ``claimed`` and ``told`` (1,) as for
+    the elimination of fronts."""
+    n = len(matrix)
+    shares = (n + share - 1) // share
+    while True:
+        q = add_at_once(claimed, 0, 1)
+        if q >= shares:
+            break
+        _fill_rows(
+            q * share, min(n, (q + 1) * share), start, side, data, matrix, begins, stride, diagonal, upper, lower,
+            block, other, order, vectors, normal, shear, slope, lift,
+        )  # fmt: skip
+        add_at_once(told, 0, 1)
+    await_value(told, 0, shares)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _fill_again(
+    most, held, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order, vectors,
+    normal, shear, slope, lift,
+):  # fmt: skip
+    """Fill the rows of blocks whose contacts have other laws than those ``held`` (4 of (n_contacts,)), unless these are
+    more than ``most`` blocks; whether that is done."""
+    n, rows = len(matrix), 0
+    differs = np.zeros(n, np.bool_)
+    for c in range(len(block)):
+        if normal[c] != held[0][c] or shear[c] != held[1][c] or slope[c] != held[2][c] or lift[c] != held[3][c]:
+            for i in (order[block[c]], order[other[c]]):
+                if i >= 0 and not differs[i]:
+                    differs[i] = True
+                    rows += 1
+    if rows > most:
+        return False
+    for b in range(n):
+        if differs[b]:
+            _fill_rows(
+                b, b + 1, start, side, data, matrix, begins, stride, diagonal, upper, lower, block, other, order,
+                vectors, normal, shear, slope, lift,
+            )  # fmt: skip
+    return True
+
+
+def assemble(
+    pattern: Pattern,
+    data: np.ndarray,
+    matrix: np.ndarray,
+    upper: np.ndarray,
+    lower: np.ndarray,
+    block: np.ndarray,
+    other: np.ndarray,
+    order: np.ndarray,
+    vectors: np.ndarray,
+    normal: np.ndarray,
+    shear: np.ndarray,
+    slope: np.ndarray,
+    lift: np.ndarray,
+    sides: tuple[np.ndarray, np.ndarray] | None = None,
+    held: tuple[np.ndarray, ...] | None = None,
+) -> None:
+    """Fill ``data`` with the blocks' own part ``matrix`` (n, 6, 6) and contacts that answer a motion by dN =
+    −``normal`` (n − κ t)·Δu, κ the ``lift``, and dS = −``shear`` t·Δu + ``slope`` dN; ``upper`` and ``lower`` as in the
+    ``pattern``, for these contacts, whose ``sides`` may be known, as from `sides_of`. ``held``: the laws (``normal``,
+    ``shear``, ``slope``, ``lift``) with which ``data`` is filled already, all else the same."""
+    at = pattern.begins, pattern.stride, pattern.diagonal, upper, lower, block, other, order
+    laws = vectors, normal, shear, slope, lift
+    sides = sides_of(pattern.n, order, block, other) if sides is None else sides
+    if held is not None and _fill_again(int(FILLED_AGAIN * pattern.n), held, *sides, data, matrix, *at, *laws):
+        return
+    if pattern.n < THREADED:
+        _fill_rows(0, pattern.n, *sides, data, matrix, *at, *laws)
+        return
+    claimed, told = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    crew().share(_fill_shared, claimed, told, SHARE, *sides, data, matrix, *at, *laws)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _springs(
+    right, base_right, block, other, order, vectors, state, direction, gap, normal, shear, friction, sliding, lift,
+    shear0,
+):  # fmt: skip
+    """Fill ``right``, see `assemble_contacts`; (n,) the normal and shear stiffness of contacts in their states and how
+    much of the normal force slides, and whether the matrix is symmetric."""
+    for b in range(base_right.shape[0]):
+        for a in range(6):
+            right[6 * b + a] = base_right[b, a]
+    stiff, along, slope, symmetric = np.zeros(len(block)), np.zeros(len(block)), np.zeros(len(block)), True
+    for c in range(block.shape[0]):
+        if state[c] == OPEN:
+            continue
+        given = shear0[c]
+        stiff[c], along[c] = normal[c], shear[c] if state[c] == STICK else 0.0
+        if state[c] == SLIP:
+            slope[c] = direction[c] * friction[c]
+            given = direction[c] * sliding[c]
+            symmetric = symmetric and slope[c] == 0.0 and lift[c] == 0.0
+        pressed = normal[c] * gap[c]
+        i, j = order[block[c]], order[other[c]]
+        for a in range(12):
+            k = i if a < 6 else j
+            if k >= 0:
+                n, t = vectors[c, 0, a], vectors[c, 1, a]
+                right[6 * k + a % 6] += given * t - pressed * (n + slope[c] * t)
+    return stiff, along, slope, symmetric
+
+
+def assemble_contacts(
+    pattern: Pattern,
+    data: np.ndarray,
+    right: np.ndarray,
+    matrix: np.ndarray,
+    base_right: np.ndarray,
+    upper: np.ndarray,
+    lower: np.ndarray,
+    block: np.ndarray,
+    other: np.ndarray,
+    order: np.ndarray,
+    vectors: np.ndarray,
+    state: np.ndarray,
+    direction: np.ndarray,
+    gap: np.ndarray,
+    normal: np.ndarray,
+    shear: np.ndarray,
+    friction: np.ndarray,
+    sliding: np.ndarray,
+    lift: np.ndarray,
+    shear0: np.ndarray,
+    sides: tuple[np.ndarray, np.ndarray] | None = None,
+    held: tuple[np.ndarray, ...] | None = None,
+) -> tuple[bool, tuple[np.ndarray, ...]]:
+    """Fill ``data`` and ``right`` with the blocks' own part and the springs of closed contacts; True if symmetric, and
+    what ``data`` holds then, see `assemble`.
+
+    Normal force N = −kₙ(g + n·Δu − κ t·Δu), with the lift κ by sliding. Stick: S = S₀ − kₛ t·Δu. Slip: S = ± (μ N + c),
+    with N the unknown one, which makes the matrix unsymmetric but friction exact in one solution.
+    """
+    at = block, other, order, vectors
+    *laws, symmetric = _springs(
+        right, base_right, *at, state, direction, gap, normal, shear, friction, sliding, lift, shear0
+    )
+    laws = (*laws, lift)
+    assemble(pattern, data, matrix, upper, lower, *at, *laws, sides, held)
+    return symmetric, laws
+
+
+def solve(
+    pattern: Pattern, data: np.ndarray, right: np.ndarray, symmetric: bool, force: float = 0.0, beside: bool = False,
+    near: np.ndarray | None = None, within: float = RESIDUAL,
+) -> np.ndarray:  # fmt: skip
+    """Unknowns (6 n,) in the pattern's order; ``force``, ``near`` and ``within`` as for `BlockSolver.solve`;
+    ``beside``: see there. Overwrites ``data`` when dense. Raises numpy.linalg.LinAlgError."""
+    pattern.add_links(data)
+    if pattern.solver is None:
+        from scipy.linalg.lapack import dgesv, dposv
+
+        # The flat matrix is C-ordered: its Fortran view is the transpose.
+        full = data.reshape(6 * pattern.n, -1).T
+        if symmetric:
+            _, x, info = dposv(full, right, lower=1, overwrite_a=1)
+        else:
+            _, _, x, info = dgesv(np.asfortranarray(full.T), right, overwrite_a=1)
+        if info != 0:
+            raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
+        return x
+    solver = pattern.solver.beside if beside else pattern.solver
+    return solver.solve(data, right, within, force, near)

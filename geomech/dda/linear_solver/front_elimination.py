@@ -1,0 +1,334 @@
+"""Elimination of dense fronts of 6×6 blocks, in double or single precision.
+
+A front F holds the rows of its own blocks P and of those B to which their elimination reaches. It is factored a panel
+of two blocks at a time,
+
+    Z = F_kk⁻¹,   U = −Z F_k·,   F_ij ← F_ij + F_ik U_j,
+
+and what is left of F_BB is added into its parent's front (Duff & Reid 1983). Arrays of the tree are those of
+`dissection.Tree`; ``child`` and ``sibling`` (n_fronts,) chain the children of a front.
+
+Factors lie in the order in which `triangular_solve` reads them, first what it reads on its way up, then what it reads on
+its way back: one core reads so 28 GB/s, but 9 where it skips every other few kilobytes (measured). ``at`` and ``back``
+(n_fronts,) say where a front's begin: at ``at`` for every panel F_k·, then Z, and behind all panels F_BP; at ``back``
+U of every panel, the last first. Each is a number of *sixes*: six rows, first a register of the first, of the second,
+…, then the next register of each, and what is left of each.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, types
+
+from .simd import (
+    BYTES,
+    load,
+    load_first,
+    load_six,
+    minus_product,
+    numbers,
+    plus,
+    plus_product,
+    spread,
+    store,
+    store_first,
+    store_six,
+    zeros,
+)
+from .small_products import small_product
+
+#: Kept with the kernel that calls them only, for they are made of what stands in other files, too. Sums may be
+#: reordered and fused: the products of whole fronts are summed as BLAS likes, too.
+_jit = njit(fastmath={"reassoc", "contract", "nsz"}, error_model="numpy", nogil=True)
+
+#: Unknowns eliminated at a time.
+PANEL = 12
+#: What so many do to the rows and columns behind them is one product, of BLAS where these are many.
+STRIP = 96
+#: Rows in which a panel is inverted: whole registers of either precision.
+SIDE = 16
+#: Numbers of a product from which BLAS is quicker: they no longer lie in the second cache.
+LARGE = 300_000
+
+#: BLAS's general products, as Numba itself binds them for np.dot: here with strides, and added in place.
+_gemm = types.ExternalFunction(
+    "numba_xxgemm",
+    types.intc(
+        types.char, types.char, types.char, types.intp, types.intp, types.intp, types.voidptr, types.voidptr,
+        types.intp,
+        types.voidptr, types.intp, types.voidptr, types.voidptr, types.intp,
+    ),
+)  # fmt: skip
+
+
+@_jit
+def _add_product(a, at_a, row_a, b, at_b, row_b, c, at_c, row_c, rows, k, n, keep, width, units):
+    """C ← A B, or C + A B to ``keep`` C: ``rows`` × k times k × n numbers, where in the arrays a, b and c each matrix
+    begins, and how far apart its rows are; ``units`` (2,) are 1 and 0."""
+    if rows * n < LARGE:
+        place = numbers(c)
+        small_product(place, at_c, row_c, numbers(a), at_a, row_a, numbers(b), at_b, row_b, rows, k, n, width, keep)
+    elif k > 0:
+        # Row-major arrays are their transposes to BLAS: cᵀ = bᵀaᵀ.
+        _gemm(
+            100 if c.itemsize == 8 else 115, 78, 78, n, rows, k, units[0:].ctypes, b[at_b:].ctypes, row_b,
+            a[at_a:].ctypes, row_a, units[0 if keep else 1 :].ctypes, c[at_c:].ctypes, row_c,
+        )  # fmt: skip
+    # What is found by its place is kept until here.
+    return len(a) + len(b) + len(c)
+
+
+@_jit
+def _invert(front, at, m, n, cell, others, swapped, width):
+    """Invert n × n numbers of a ``front`` with rows of m, from ``at`` on, in place: Gauss–Jordan with exchange of rows;
+    False if they are singular. ``cell`` (`SIDE`² + 1,) is room, ``others`` (`SIDE`²,) ones but for a diagonal of
+    zeros."""
+    whole, here, but = numbers(front), numbers(cell), numbers(others)
+    for i in range(n):
+        for q in range(0, SIDE, width):
+            store(here, SIDE * i + q, load_first(whole, at + i * m + q, min(max(n - q, 0), width)))
+    for k in range(n):
+        pivot, largest = k, abs(cell[SIDE * k + k])
+        for i in range(k + 1, n):
+            size = abs(cell[SIDE * i + k])
+            if size > largest:
+                pivot, largest = i, size
+        if not (largest > 0.0 and largest < np.inf):
+            return False
+        swapped[k] = pivot
+        if pivot != k:
+            for q in range(0, SIDE, width):
+                given = load(here, SIDE * k + q)
+                store(here, SIDE * k + q, load(here, SIDE * pivot + q))
+                store(here, SIDE * pivot + q, given)
+        cell[SIDE * SIDE] = 1 / cell[SIDE * k + k]
+        share = spread(here, SIDE * SIDE)
+        cell[SIDE * k + k] = 1
+        for q in range(0, SIDE, width):
+            store(here, SIDE * k + q, plus_product(zeros(here), share, load(here, SIDE * k + q)))
+        for i in range(n):
+            if i != k:
+                share = spread(here, SIDE * i + k)
+                for q in range(0, SIDE, width):
+                    rest = plus_product(zeros(here), load(here, SIDE * i + q), load(but, SIDE * k + q))
+                    store(here, SIDE * i + q, minus_product(rest, share, load(here, SIDE * k + q)))
+    for k in range(n - 1, -1, -1):
+        pivot = swapped[k]
+        if pivot != k:
+            for i in range(n):
+                cell[SIDE * i + k], cell[SIDE * i + pivot] = cell[SIDE * i + pivot], cell[SIDE * i + k]
+    for i in range(n):
+        for q in range(0, n, width):
+            store_first(whole, at + i * m + q, load(here, SIDE * i + q), min(n - q, width))
+    # What is found by its place is kept until here.
+    return len(front) + len(cell) + len(others) > 0
+
+
+@_jit
+def _clear(array):
+    """Fill the flat ``array`` with zeros."""
+    for k in range(len(array)):
+        array[k] = 0
+
+
+def places(own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """``at`` and ``back`` of fronts with so many blocks of their ``own`` and ``far`` ones (n_fronts,), and how many
+    numbers all factors are."""
+    p, b = 6 * own, 6 * far
+    panels, rest = p // PANEL, p % PANEL
+    # Σ h e over the panels of h rows up to the row e.
+    squares = PANEL**2 * panels * (panels + 1) // 2 + rest * p
+    up, down = squares + b * p, p * (p + b) - squares
+    return np.cumsum(up) - up, int(up.sum() + down.sum()) - np.cumsum(down), int(up.sum() + down.sum())
+
+
+@_jit
+def _leave_sixes(given, at, stride, rows, n, taken, to, width):
+    """Write ``rows`` so far apart, of n numbers each, as sixes; where they end."""
+    for i in range(at, at + rows * stride, 6 * stride):
+        j = 0
+        while j + width <= n:
+            for a in range(6):
+                store(taken, to + a * width, load(given, i + a * stride + j))
+            j, to = j + width, to + 6 * width
+        k = n - j
+        if k > 0:
+            for a in range(6):
+                store_first(taken, to + a * k, load_first(given, i + a * stride + j, k), k)
+            to += 6 * k
+    return to
+
+
+@_jit
+def _leave(front, p, m, factors, at, back):
+    """Write the factors of a ``front`` to where they belong."""
+    if p == 0:
+        return 0
+    width = BYTES // front.itemsize
+    here, there = numbers(front), numbers(factors)
+    for start in range(0, p, PANEL):
+        end = min(start + PANEL, p)
+        at = _leave_sixes(here, start * m, m, end - start, start, there, at, width)
+        at = _leave_sixes(here, start * m + start, m, end - start, end - start, there, at, width)
+    _leave_sixes(here, p * m, p, m - p, p, there, at, width)
+    for start in range(PANEL * ((p - 1) // PANEL), -1, -PANEL):
+        end = min(start + PANEL, p)
+        back = _leave_sixes(here, start * m + end, m, end - start, m - end, there, back, width)
+    # What is found by its place is kept until here.
+    return len(front) + len(factors)
+
+
+@_jit
+def _runs(met, own, begins):
+    """Where runs of blocks that stand side by side begin among the seats ``met`` (n,) in a front with ``own`` blocks:
+    in ``begins``, n behind the last; how many there are, and how many of them among its own."""
+    runs = mine = 0
+    for v in range(len(met)):
+        if v == 0 or met[v] != met[v - 1] + 1 or met[v] == own:
+            begins[runs] = v
+            runs += 1
+            mine += met[v] < own
+    begins[runs] = len(met)
+    return runs, mine
+
+
+@_jit
+def _add_runs(into, at, added, begin, met, begins, first, last, width):
+    """Add to the row of a front whose first number is ``into[at]`` the runs from ``first`` to before ``last`` of a
+    child's row that begins with ``added[begin]``."""
+    for r in range(first, last):
+        v, j = begin + 6 * begins[r], at + 6 * met[begins[r]]
+        n = 6 * (begins[r + 1] - begins[r])
+        while n >= 3 * width:
+            for q in range(0, 3 * width, width):
+                store(into, j + q, plus(load(into, j + q), load(added, v + q)))
+            j, v, n = j + 3 * width, v + 3 * width, n - 3 * width
+        for q in range(0, n, 6):
+            store_six(into, j + q, plus(load_six(into, j + q), load_six(added, v + q)))
+
+
+@_jit
+def eliminate(
+    first,
+    last,
+    touched,
+    data,
+    pivots,
+    reach,
+    seat,
+    entries,
+    entry,
+    row,
+    column,
+    stack,
+    at,
+    back,
+    child,
+    sibling,
+    room,
+    factors,
+    units,
+    space,
+):
+    """Eliminate the ``touched`` (n_fronts,) fronts from ``first`` to before ``last``; False if one is singular.
+    ``stack`` (n_fronts,): where S are left in the ``room``; ``units`` are 1 and 0; ``space`` as from
+    `working_space`."""
+    front, panel, begins, cell, others, swapped = space
+    width = BYTES // front.itemsize
+    here, further = numbers(front), numbers(room)
+    for f in range(first, last):
+        if not touched[f]:
+            continue
+        own, far = pivots[f + 1] - pivots[f], reach[f + 1] - reach[f]
+        p, b = 6 * own, 6 * far
+        m = p + b
+        # Rows of m of the own unknowns, then rows of p of the others; where F_BB is left.
+        lower, rest = p * m, stack[f]
+        _clear(front[: p * m + b * p])
+        for k in range(entries[f], entries[f + 1]):
+            i, j = row[k], column[k]
+            block = data[36 * entry[k] : 36 * entry[k] + 36]
+            to, apart = (6 * i * m + 6 * j, m) if i < own else (lower + 6 * (i - own) * p + 6 * j, p)
+            for a in range(6):
+                into = front[to + a * apart : to + a * apart + 6]
+                for c in range(6):
+                    into[c] = block[6 * a + c]
+        # What children leave in the rows and columns that are eliminated here; the rest of it below.
+        g = child[f]
+        while g >= 0:
+            met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+            runs, mine = _runs(met, own, begins)
+            for u in range(len(met)):
+                i, left = met[u], stack[g] + 6 * u * n
+                for a in range(6):
+                    if i < own:
+                        _add_runs(here, (6 * i + a) * m, further, left + a * n, met, begins, 0, runs, width)
+                    else:
+                        to = lower + (6 * (i - own) + a) * p
+                        _add_runs(here, to, further, left + a * n, met, begins, 0, mine, width)
+            g = sibling[g]
+        for begin in range(0, p, STRIP):
+            stop = min(begin + STRIP, p)
+            for start in range(begin, stop, PANEL):
+                end = min(start + PANEL, stop)
+                h, k, known = end - start, start - begin, begin * m + start
+                if k > 0:
+                    # What this strip's panels before do to the rows of this one, and to the columns below.
+                    small_product(
+                        here, start * m + start, m, here, start * m + begin, m, here, known, m, h, k, m - start, width,
+                        True,
+                    )  # fmt: skip
+                    small_product(
+                        here, end * m + start, m, here, end * m + begin, m, here, known, m, p - end, k, h, width, True
+                    )
+                    small_product(here, lower + start, p, here, lower + begin, p, here, known, m, b, k, h, width, True)
+                if not _invert(front, start * m + start, m, h, cell, others, swapped, width):
+                    return False
+                for i in range(h):
+                    copied = panel[i * (m - end) : (i + 1) * (m - end)]
+                    given = front[(start + i) * m + end : (start + i + 1) * m]
+                    for j in range(len(copied)):
+                        copied[j] = -given[j]
+                small_product(
+                    here, start * m + end, m, here, start * m + start, m, numbers(panel), 0, m - end, h, h, m - end,
+                    width, False,
+                )  # fmt: skip
+            k, known = stop - begin, begin * m + stop
+            if stop < p:
+                _add_product(
+                    front, stop * m + begin, m, front, known, m, front, stop * m + stop, m, p - stop, k, m - stop, True,
+                    width, units,
+                )  # fmt: skip
+                _add_product(
+                    front, lower + begin, p, front, known, m, front, lower + stop, p, b, k, p - stop, True, width, units
+                )
+        if p > 0:
+            _add_product(front, lower, p, front, p, m, room, rest, b, b, p, b, False, width, units)
+        else:
+            _clear(room[rest : rest + b * b])
+        _leave(front, p, m, factors, at[f], back[f])
+        g = child[f]
+        while g >= 0:
+            met, n = seat[reach[g] : reach[g + 1]], 6 * (reach[g + 1] - reach[g])
+            runs, mine = _runs(met, own, begins)
+            for u in range(begins[mine], len(met)):
+                i, left = 6 * (met[u] - own), stack[g] + 6 * u * n
+                for a in range(6):
+                    to = rest + (i + a) * b - p
+                    _add_runs(further, to, further, left + a * n, met, begins, mine, runs, width)
+            g = sibling[g]
+    # What is found by its place is kept until here.
+    return len(room) + len(front) + len(panel) > 0
+
+
+@_jit
+def working_space(pivots, reach, factors):
+    """What `eliminate` works in: room for a front but for its F_BB, for a panel, and for numbers."""
+    most, far, size = 0, 0, 0
+    for f in range(len(reach) - 1):
+        p, b = 6 * (pivots[f + 1] - pivots[f]), 6 * (reach[f + 1] - reach[f])
+        most, far, size = max(most, p + b), max(far, b), max(size, p * (p + 2 * b))
+    front, panel = np.empty(size, factors.dtype), np.empty(PANEL * most, factors.dtype)
+    cell, others = np.empty(SIDE * SIDE + 1, factors.dtype), np.ones(SIDE * SIDE, factors.dtype)
+    others[:: SIDE + 1] = 0
+    return front, panel, np.empty(far // 6 + 1, np.int64), cell, others, np.empty(PANEL, np.int64)

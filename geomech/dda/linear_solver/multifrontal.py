@@ -1,0 +1,238 @@
+"""Elimination of 6×6-block systems front by front, on all cores.
+
+Subtrees of the dissection know nothing of each other, so that fronts are work for several threads (`task_pool`);
+each is eliminated as it would be by one thread (`front_elimination`), and what comes out is the same to the bit. Pivots are sought
+within a panel only: the diagonal of a block system carries inertia and springs. What that, or single precision, costs
+in digits is won back by refinement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...compiled import kept
+from .blas_threads import blas_threads
+from .front_elimination import eliminate, places, working_space
+from .nested_dissection import Tree, plan
+from .task_pool import add_at_once, await_value, crew
+from .triangular_solve import backward, forward
+
+_jit = kept(fastmath=False, error_model="numpy", nogil=True)
+
+#: Blocks from which they are factored, and solutions substituted, on all cores.
+THREADED, THREADED_SOLUTION = 500, 4000
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _eliminate_shared(
+    claimed,
+    awaited,
+    told,
+    tasks,
+    above,
+    touched,
+    data,
+    pivots,
+    reach,
+    seat,
+    entries,
+    entry,
+    row,
+    column,
+    stack,
+    at,
+    back,
+    child,
+    sibling,
+    room,
+    factors,
+    units,
+):
+    """Claim ``tasks`` by ``claimed`` (1,) until none are left, and wait until all are done; ``awaited`` (k,) says of
+    how many each still waits for what they pass on, ``told`` (2,) how many are done, and how many have failed."""
+    space = None
+    while True:
+        q = add_at_once(claimed, 0, 1)
+        if q >= len(tasks):
+            break
+        if space is None:
+            space = working_space(pivots, reach, factors)
+        await_value(awaited, q, 0)
+        if not eliminate(
+            tasks[q, 0], tasks[q, 1], touched, data, pivots, reach, seat, entries, entry, row, column, stack, at, back,
+            child, sibling, room, factors, units, space,
+        ):  # fmt: skip
+            add_at_once(told, 1, 1)
+        if above[q] >= 0:
+            add_at_once(awaited, above[q], -1)
+        add_at_once(told, 0, 1)
+    await_value(told, 0, len(tasks))
+
+
+@_jit
+def _take(right, order, size, out):
+    """``out`` ← ``right`` / ``size``, block by block in this ``order``."""
+    for k in range(len(order)):
+        for a in range(6):
+            out[6 * k + a] = right[6 * order[k] + a] / size
+
+
+@_jit
+def _give(out, order, size, x):
+    """``x`` ← ``out`` ``size``, back from this ``order``."""
+    for k in range(len(order)):
+        for a in range(6):
+            x[6 * order[k] + a] = out[6 * k + a] * size
+
+
+@_jit
+def _mark_above(touched, parent):
+    """Mark the parents of marked fronts, and theirs."""
+    for f in range(len(parent)):
+        if touched[f] and parent[f] >= 0:
+            touched[parent[f]] = True
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _substitute_shared(
+    claimed,
+    awaited,
+    told,
+    tasks,
+    above,
+    out,
+    pivots,
+    reach,
+    seat,
+    boundary,
+    at,
+    back,
+    child,
+    sibling,
+    factors,
+    passed,
+):
+    """As `_eliminate_shared`: forward through the tasks in their order, then backward through them the other way, each
+    behind the one above it."""
+    k = len(tasks)
+    while True:
+        q = add_at_once(claimed, 0, 1)
+        if q >= 2 * k:
+            break
+        if q < k:
+            await_value(awaited, q, 0)
+            forward(tasks[q, 0], tasks[q, 1], out, pivots, reach, seat, at, child, sibling, factors, passed)
+            # −1: this one has gone forward.
+            add_at_once(awaited, q, -1)
+            if above[q] >= 0:
+                add_at_once(awaited, above[q], -1)
+        else:
+            q = 2 * k - 1 - q
+            if above[q] >= 0:
+                await_value(awaited, above[q], -2)
+            else:
+                await_value(awaited, q, -1)
+            backward(tasks[q, 0], tasks[q, 1], out, pivots, reach, boundary, back, factors)
+            # −2: and back.
+            add_at_once(awaited, q, -1)
+        add_at_once(told, 0, 1)
+    await_value(told, 0, 2 * k)
+
+
+class Factors:
+    """The factors of one pattern of 6×6 blocks, in ``dtype`` float64 or float32.
+
+    ``points`` (n, 2) m, where the blocks lie; ``rows`` and ``columns`` (n_entries,) of the matrix's blocks, both
+    triangles and the diagonal, sorted by row then column. The order of elimination is internal, or that of a ``tree``
+    already planned for the same pattern. ``again``: whether fronts may be eliminated again one by one.
+    """
+
+    def __init__(
+        self,
+        points: np.ndarray,
+        rows: np.ndarray,
+        columns: np.ndarray,
+        dtype: type = np.float64,
+        tree: Tree | None = None,
+        again: bool = True,
+    ):
+        self.tree: Tree = plan(points, rows, columns) if tree is None else tree
+        parent = self.tree.parent
+        self._child, self._sibling = np.full(len(parent), -1), np.full(len(parent), -1)
+        for f in range(len(parent) - 1, -1, -1):
+            if parent[f] >= 0:
+                self._sibling[f] = self._child[parent[f]]
+                self._child[parent[f]] = f
+        self._order = np.argsort(self.tree.rank)
+        self._front = np.searchsorted(self.tree.pivots, self.tree.rank, side="right") - 1
+        above = self.tree.above
+        self._awaited = np.bincount(above[above >= 0], minlength=len(above))
+        self._at, self._back, size = places(np.diff(self.tree.pivots), np.diff(self.tree.reach))
+        self._factors = np.empty(size, dtype)
+        # Whether factors may be made anew in part, and whether those at hand may: every S is where it was left.
+        again = again and self.tree.kept
+        self._room = np.empty(self.tree.own_room_size if again else self.tree.stack_size, dtype)
+        self._again, self._left = again, False
+        self._passed = np.empty(6 * self.tree.reach[-1], dtype)
+        self._units = np.array([1.0, 0.0], dtype)
+
+    @property
+    def single(self) -> bool:
+        """Whether the factors are in single precision."""
+        return self._factors.dtype == np.float32
+
+    @property
+    def idle_room(self) -> np.ndarray:
+        """(…,) float64 that nothing is kept in from one factorisation to the next, for others to use in between."""
+        return self._room[: 0 if self._again else len(self._room) // 2 * 2].view(np.float64)
+
+    def factor(self, data: np.ndarray, changed: np.ndarray | None = None, again: bool = True) -> float:
+        """Factor the matrix of the blocks ``data`` (36 n_entries,), each row by row; the share of it that was done.
+
+        Where only rows and columns of the blocks ``changed`` (n,) differ from the matrix factored before, only their
+        fronts and those above are eliminated again, unless it was not to be done ``again``. Raises
+        numpy.linalg.LinAlgError when the matrix is singular.
+        """
+        t = self.tree
+        touched = np.ones(len(t.parent), np.bool_)
+        if changed is not None and self._left:
+            touched[:] = False
+            touched[self._front[changed]] = True
+            _mark_above(touched, t.parent)
+        self._left = self._again and (again or not touched.all())
+        with blas_threads(1):
+            told = self._shared(
+                _eliminate_shared, THREADED, touched, data, t.pivots, t.reach, t.seat, t.entries, t.entry, t.row,
+                t.column, t.own_room if self._left else t.stack, self._at, self._back, self._child, self._sibling, self._room,
+                self._factors, self._units,
+            )  # fmt: skip
+        if told[1]:
+            raise np.linalg.LinAlgError("the block system is singular")
+        return float(np.diff(t.at)[touched].sum() / max(1, t.at[-1]))
+
+    def substitute(self, right: np.ndarray) -> np.ndarray:
+        """The solution of the factored system for ``right`` (6n,)."""
+        t = self.tree
+        # Single precision has no more than 38 decades: the right side is brought to its middle.
+        size = float(np.abs(right).max(initial=0.0)) or 1.0
+        out, x = np.empty(len(right), self._factors.dtype), np.empty(len(right))
+        _take(right, self._order, size, out)
+        self._shared(
+            _substitute_shared, THREADED_SOLUTION, out, t.pivots, t.reach, t.seat, t.boundary, self._at, self._back, self._child,
+            self._sibling, self._factors, self._passed,
+        )  # fmt: skip
+        _give(out, self._order, size, x)
+        return x
+
+    def _shared(self, work: Callable, least: int, *given) -> np.ndarray:
+        """Do the ``work`` of all tasks, from ``least`` blocks on by all cores; how many are done, and have failed."""
+        t = self.tree
+        told = np.zeros(2, np.int64)
+        task = np.zeros(1, np.int64), self._awaited.copy(), told, t.tasks, t.above
+        if len(t.rank) < least:
+            work(*task, *given)
+        else:
+            crew().share(work, *task, *given)
+        return told

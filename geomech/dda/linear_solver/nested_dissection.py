@@ -1,0 +1,350 @@
+"""The order in which a plane system of blocks is eliminated: nested dissection into fronts (George 1973).
+
+Blocks touch their neighbours in a plane, so a line of blocks parts a system in two halves that know nothing of each
+other, and each half again. Eliminated leaves first and separators last, the matrix fills in as little as it can. A
+*front* holds the rows of its own blocks and of those to which its elimination reaches (Duff & Reid 1983).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...compiled import kept, part
+
+#: Blocks in a leaf of the dissection: smaller ones cost more calls, larger ones more arithmetic (measured on walls).
+LEAF = 10
+#: Neither part of a cut has less than this part of the blocks.
+_LEAST = 0.3
+#: Cuts are sought across these directions (2, k), from so many blocks on across more: joints may be inclined.
+_LARGE = 200
+_TWO, _MANY = (np.stack([np.cos(t), np.sin(t)]) for t in (np.pi / 2 * np.arange(2), np.pi / 8 * np.arange(8)))
+#: Entries of all S together up to which they are kept: 1.2 GB in single precision, those of some fifty thousand blocks.
+KEPT = 300_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """The order of elimination. Fronts stand in postorder, blocks are numbered as they are eliminated.
+
+    rank          (n_blocks,)     the number of each block as given
+    pivots        (n_fronts + 1,) first own block of every front
+    parent        (n_fronts,)     −1 for a root
+    reach         (n_fronts + 1,) first entry of every front in ``boundary``
+    boundary      (…,)            blocks that a front's elimination reaches, ascending
+    seat          (…,)            where each of them stands in the parent's front
+    entries       (n_fronts + 1,) first matrix block of every front in ``entry``
+    entry, row, column            the matrix block, and where it stands in the front
+    kept          whether every S may have a room of its own, so that fronts can be eliminated again one by one
+    own_room      (n_fronts,)     where the front leaves its S then, in a room of ``own_room_size``
+    stack         (n_fronts,)     where it leaves it in a room of ``stack_size`` that others use after it: what is used
+                                  again soon is still at hand, and need not come from memory
+    at            (n_fronts + 1,) first entry of every front's factor
+    tasks         (k, 2)          ranges of fronts that are one thread's work at a time, each behind those it needs
+    above         (k,)            the task that needs what each task passes on, −1 without
+    """
+
+    rank: np.ndarray
+    pivots: np.ndarray
+    parent: np.ndarray
+    reach: np.ndarray
+    boundary: np.ndarray
+    seat: np.ndarray
+    entries: np.ndarray
+    entry: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+    kept: bool
+    own_room: np.ndarray
+    own_room_size: int
+    stack: np.ndarray
+    stack_size: int
+    at: np.ndarray
+    tasks: np.ndarray
+    above: np.ndarray
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _best_cut(order, pointer, neighbour, place, least):
+    """(price, k, whether the first part gives the separator) of the cheapest cut of the blocks in ``order`` into the
+    first k and the rest, neither below ``least``; ``place`` (n,) is room, −1 all over, and left so."""
+    m = len(order)
+    for q in range(m):
+        place[order[q]] = q
+    # Block q is in the separator of a cut before k if q < k ≤ the last neighbour's place, or the first one's < k ≤ q.
+    first, second = np.zeros(m + 2, np.int64), np.zeros(m + 2, np.int64)
+    for q in range(m):
+        low = high = q
+        for e in range(pointer[order[q]], pointer[order[q] + 1]):
+            r = place[neighbour[e]]
+            if r >= 0:
+                low, high = min(low, r), max(high, r)
+        first[q + 1] += 1
+        first[high + 1] -= 1
+        second[low + 1] += 1
+        second[q + 1] -= 1
+    for q in range(m):
+        place[order[q]] = -1
+    price, at, mine = np.inf, m // 2, True
+    a = b = 0
+    for k in range(1, m):
+        a += first[k]
+        b += second[k]
+        if least <= k <= m - least:
+            off = (2.0 * k - m) / m
+            here = min(a, b) * (1.0 + off * off)
+            if here < price:
+                price, at, mine = here, k, a <= b
+    return price, at, mine
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _meets(order, at, mine, pointer, neighbour, place):
+    """(m,) whether each block in ``order`` is of the first ``at`` (or, not ``mine``, of the rest) and meets one on the
+    other side."""
+    m = len(order)
+    out = np.zeros(m, np.bool_)
+    for q in range(m):
+        place[order[q]] = q
+    for q in range(m):
+        if (q < at) == mine:
+            for e in range(pointer[order[q]], pointer[order[q] + 1]):
+                r = place[neighbour[e]]
+                out[q] = out[q] or (r >= 0 and (r < at) != mine)
+    for q in range(m):
+        place[order[q]] = -1
+    return out
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _dissected(orders, pointer, neighbour, leaf, large, least_part, across):
+    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent. ``orders``
+    (k, n), overwritten: all blocks in order across each direction, ``across`` the ones that small parts are cut
+    across; the direction square to number d is d + k/2, or that of d − k/2 turned round."""
+    k, n = orders.shape
+    place, side = np.full(n, -1), np.empty(n, np.int64)
+    room = np.empty(n, np.int64)
+    blocks, begins, parent = np.empty(n, np.int64), np.zeros(2 * n + 2, np.int64), np.full(2 * n + 1, -1)
+    # Parts to be divided, as ranges of every order; and separators, as ranges and the number of their children: −1 for
+    # what is still to be divided.
+    work, waiting, done, ended = np.empty((2 * n + 8, 3), np.int64), 1, np.empty(2 * n + 1, np.int64), 0
+    work[0, 0], work[0, 1], work[0, 2] = 0, n, -1
+    fronts = 0
+    while waiting > 0:
+        waiting -= 1
+        first, last, children = work[waiting]
+        m = last - first
+        if children >= 0 or m <= leaf:
+            for _ in range(children):
+                ended -= 1
+                parent[done[ended]] = fronts
+            blocks[begins[fronts] : begins[fronts] + m] = orders[0, first:last]
+            done[ended] = fronts
+            ended += 1
+            begins[fronts + 1] = begins[fronts] + m
+            fronts += 1
+            continue
+        least = max(1, int(least_part * m))
+        best, price, at, mine = -1, np.inf, 0, True
+        for d in range(k):
+            if m >= large or across[d]:
+                here, begin, whose = _best_cut(orders[d, first:last], pointer, neighbour, place, least)
+                if here < price or best < 0:
+                    best, price, at, mine = d, here, begin, whose
+        order = orders[best, first:last]
+        cut = _meets(order, at, mine, pointer, neighbour, place)
+        halves = np.zeros(3, np.int64)
+        for q in range(m):
+            side[order[q]] = 2 if cut[q] else (0 if q < at else 1)
+            halves[side[order[q]]] += 1
+        one, two = first + halves[0], first + halves[0] + halves[1]
+        # Every order goes on in each of the three by itself.
+        for d in range(k):
+            if m >= large or across[d]:
+                to_first, to_second, to_cut = first, one, two
+                room[:m] = orders[d, first:last]
+                for q in range(m):
+                    b = room[q]
+                    if side[b] == 0:
+                        orders[d, to_first] = b
+                        to_first += 1
+                    elif side[b] == 1:
+                        orders[d, to_second] = b
+                        to_second += 1
+                    else:
+                        orders[d, to_cut] = b
+                        to_cut += 1
+        # A separator is eliminated from one end to the other.
+        if best + k // 2 < k:
+            orders[0, two:last] = orders[best + k // 2, two:last]
+        else:
+            orders[0, two:last] = orders[best - k // 2, two:last][::-1].copy()
+        work[waiting, 0], work[waiting, 1], work[waiting, 2] = two, last, (halves[0] > 0) + (halves[1] > 0)
+        waiting += 1
+        for begin, end in ((first, one), (one, two)):
+            if end > begin:
+                work[waiting, 0], work[waiting, 1], work[waiting, 2] = begin, end, -1
+                waiting += 1
+    return blocks, begins[: fronts + 1].copy(), parent[:fronts].copy()
+
+
+def dissect(points: np.ndarray, pointer: np.ndarray, neighbour: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The blocks (n,) front by front, where each front begins among them (n_fronts + 1,), and its parent (n_fronts,), in
+    postorder; ``points`` (n, 2) lie where the blocks do, ``pointer`` and ``neighbour`` say which meet.
+
+    Cut across one of several directions, where the separator, the smaller of the two rows of blocks along the cut, is
+    smallest: bricks are many to a metre upwards and few along a course.
+    """
+    directions = _MANY if len(points) >= _LARGE else _TWO
+    across = np.abs(directions).max(axis=0) > 1.0 - 1e-9
+    orders = np.ascontiguousarray(np.argsort(points @ directions, axis=0, kind="stable").T)
+    return _dissected(orders, pointer, neighbour, LEAF, _LARGE, _LEAST, across)
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _seat(number, front, pivots, reach, boundary):
+    """Where a block stands in a front: its own first, then its boundary."""
+    if number < pivots[front + 1]:
+        return number - pivots[front]
+    met = boundary[reach[front] : reach[front + 1]]
+    return pivots[front + 1] - pivots[front] + np.searchsorted(met, number)
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _reached(blocks, rank, pivots, parent, pointer, neighbour):
+    """``reach``, ``boundary`` and ``seat`` of a `Tree`; ``blocks`` (n,) in the order of elimination."""
+    n_fronts = len(parent)
+    reach, boundary, top = np.zeros(n_fronts + 1, np.int64), np.empty(4 * len(blocks) + 16, np.int64), 0
+    child, sibling, met = np.full(n_fronts, -1), np.full(n_fronts, -1), np.full(len(blocks), -1)
+    for f in range(n_fronts):
+        last = pivots[f + 1]
+        if len(boundary) < top + len(blocks):
+            more = np.empty(2 * len(boundary), np.int64)
+            more[:top] = boundary[:top]
+            boundary = more
+        for b in blocks[pivots[f] : last]:
+            for e in range(pointer[b], pointer[b + 1]):
+                r = rank[neighbour[e]]
+                if r >= last and met[r] != f:
+                    met[r], boundary[top] = f, r
+                    top += 1
+        g = child[f]
+        while g >= 0:
+            for k in range(reach[g], reach[g + 1]):
+                r = boundary[k]
+                if r >= last and met[r] != f:
+                    met[r], boundary[top] = f, r
+                    top += 1
+            g = sibling[g]
+        boundary[reach[f] : top] = np.sort(boundary[reach[f] : top])
+        reach[f + 1] = top
+        if parent[f] >= 0:
+            sibling[f], child[parent[f]] = child[parent[f]], f
+    seat = np.full(top, -1)
+    for f in range(n_fronts):
+        for k in range(reach[f], reach[f + 1]):
+            seat[k] = _seat(boundary[k], parent[f], pivots, reach, boundary)
+    return reach, boundary[:top].copy(), seat
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _places(row, column, entry, entries, pivots, reach, boundary):
+    """Where the rows and columns of the matrix blocks ``entry`` (…,), given by their blocks' numbers, stand in their
+    fronts."""
+    rows, columns = np.empty(len(entry), np.int64), np.empty(len(entry), np.int64)
+    for f in range(len(entries) - 1):
+        for k in range(entries[f], entries[f + 1]):
+            rows[k] = _seat(row[entry[k]], f, pivots, reach, boundary)
+            columns[k] = _seat(column[entry[k]], f, pivots, reach, boundary)
+    return rows, columns
+
+
+def plan(points: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> Tree:
+    """The tree for matrix blocks at (``rows``, ``columns``), both triangles and the diagonal, sorted by row then
+    column."""
+    n = len(points)
+    pointer = np.searchsorted(rows, np.arange(n + 1))
+    blocks, pivots, parent = dissect(points, pointer, columns)
+    n_fronts = len(parent)
+    rank = np.empty(n, np.int64)
+    rank[blocks] = np.arange(n)
+    reach, boundary, seat = _reached(blocks, rank, pivots, parent, pointer, columns)
+    own, far = np.diff(pivots), np.diff(reach)
+    row, column = rank[rows], rank[columns]
+    # A front without blocks of its own begins where the next one does: the last that begins there owns them.
+    front = np.searchsorted(pivots, np.minimum(row, column), side="right") - 1
+    entry = np.argsort(front, kind="stable")
+    entries = np.searchsorted(front[entry], np.arange(n_fronts + 1))
+    row, column = _places(row, column, entry, entries, pivots, reach, boundary)
+    tasks, above = _tasks(parent, own, far)
+    size = 36 * far**2
+    stack, stack_size = _stacked(parent, size, tasks)
+    return Tree(
+        rank=rank,
+        pivots=pivots,
+        parent=parent,
+        reach=reach,
+        boundary=boundary,
+        seat=seat,
+        entries=entries,
+        entry=entry,
+        row=row,
+        column=column,
+        kept=int(size.sum()) <= KEPT,
+        own_room=np.cumsum(size) - size,
+        own_room_size=int(size.sum()),
+        stack=stack,
+        stack_size=stack_size,
+        at=36 * np.concatenate([[0], np.cumsum(own * (own + 2 * far))]),
+        tasks=tasks,
+        above=above,
+    )
+
+
+def _tasks(parent: np.ndarray, own: np.ndarray, far: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Subtrees, as ranges of fronts in postorder, none of which holds more than an eighth of the arithmetic, and the
+    fronts above them one by one; and the task above each. First come those with most arithmetic on their way up."""
+    cost = own * (own + far) ** 2.0
+    alone, first = cost.copy(), np.arange(len(parent))
+    for f, p in enumerate(parent):
+        if p >= 0:
+            cost[p] += cost[f]
+            first[p] = min(first[p], first[f])
+    high = cost > cost[parent < 0].sum() / 8
+    tops = np.flatnonzero(high | (parent < 0) | high[parent])
+    first[high] = np.flatnonzero(high)
+    way = np.where(high, alone, cost)
+    for f in tops[::-1]:
+        if parent[f] >= 0:
+            way[f] += way[parent[f]]
+    order = tops[np.lexsort((tops, -way[tops]))]
+    number = np.full(len(parent) + 1, -1)
+    number[order] = np.arange(len(order))
+    return np.stack([first[order], order + 1], axis=1), number[parent[order]]
+
+
+def _stacked(parent: np.ndarray, size: np.ndarray, tasks: np.ndarray) -> tuple[np.ndarray, int]:
+    """Where each front leaves its S of ``size`` (n_fronts,), and the room that takes. Each task has two stacks, for
+    fronts an even and an odd number of levels from the root: a front's goes onto one while those of its children, the
+    last on the other, are used up."""
+    at, level = np.zeros(len(parent), np.int64), np.zeros(len(parent), np.int64)
+    for f in range(len(parent) - 1, -1, -1):
+        if parent[f] >= 0:
+            level[f] = level[parent[f]] + 1
+    base, below = 0, np.full(len(parent), -1)
+    for a, b in tasks:
+        top, most = [0, 0], [0, 0]
+        for f in range(a, b):
+            mine = level[f] % 2
+            # The first of its children, where they are of this task, lies lowest.
+            if below[f] >= a:
+                top[1 - mine] = at[below[f]]
+            at[f] = top[mine]
+            top[mine] += size[f]
+            most[mine] = max(most[mine], top[mine])
+            if parent[f] >= 0 and below[parent[f]] < a:
+                below[parent[f]] = f
+        at[a:b] += np.where(level[a:b] % 2 == 1, base + most[0], base)
+        base += sum(most)
+    return at, int(base)

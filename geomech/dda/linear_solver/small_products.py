@@ -1,0 +1,88 @@
+"""Products of small matrices whose rows come in sixes, as fronts are made of.
+
+A tile of C, six rows by two registers, stays in registers while it is summed. BLAS copies what it multiplies first, which
+pays in large products only.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from .simd import load, load_first, plus, plus_product, spread, store, store_first, zeros
+
+#: Kept with the kernel that calls them only, for they are made of what stands in other files, too.
+_jit = njit(error_model="numpy", nogil=True)
+
+
+@_jit
+def _put(c, at, sum_, n, width, keep):
+    """Write the first ``n`` of ``sum_`` to ``c``, or add them to what it ``keep``s."""
+    if n == width:
+        store(c, at, plus(load(c, at), sum_) if keep else sum_)
+    else:
+        store_first(c, at, plus(load_first(c, at, n), sum_) if keep else sum_, n)
+
+
+@_jit
+def _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, n, width, keep):
+    """`_put` of six rows, ``row_c`` apart."""
+    _put(c, at, s0, n, width, keep)
+    _put(c, at + row_c, s1, n, width, keep)
+    _put(c, at + 2 * row_c, s2, n, width, keep)
+    _put(c, at + 3 * row_c, s3, n, width, keep)
+    _put(c, at + 4 * row_c, s4, n, width, keep)
+    _put(c, at + 5 * row_c, s5, n, width, keep)
+
+
+@_jit
+def _two_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
+    """Six rows of C in two registers, of the second ``n``."""
+    s0 = s1 = s2 = s3 = s4 = s5 = t0 = t1 = t2 = t3 = t4 = t5 = zeros(c)
+    a0, a1, a2 = at_a, at_a + row_a, at_a + 2 * row_a
+    a3, a4, a5 = at_a + 3 * row_a, at_a + 4 * row_a, at_a + 5 * row_a
+    for _ in range(k):
+        v, w = load(b, at_b), load_first(b, at_b + width, n)
+        x, y, z = spread(a, a0), spread(a, a1), spread(a, a2)
+        s0, s1, s2 = plus_product(s0, x, v), plus_product(s1, y, v), plus_product(s2, z, v)
+        t0, t1, t2 = plus_product(t0, x, w), plus_product(t1, y, w), plus_product(t2, z, w)
+        x, y, z = spread(a, a3), spread(a, a4), spread(a, a5)
+        s3, s4, s5 = plus_product(s3, x, v), plus_product(s4, y, v), plus_product(s5, z, v)
+        t3, t4, t5 = plus_product(t3, x, w), plus_product(t4, y, w), plus_product(t5, z, w)
+        a0, a1, a2, a3, a4, a5, at_b = a0 + 1, a1 + 1, a2 + 1, a3 + 1, a4 + 1, a5 + 1, at_b + row_b
+    _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, width, width, keep)
+    _put_six(c, at + width, row_c, t0, t1, t2, t3, t4, t5, n, width, keep)
+
+
+@_jit
+def _one_wide(c, at, row_c, a, at_a, row_a, b, at_b, row_b, k, n, width, keep):
+    """Six rows of C, ``n`` numbers of a register wide."""
+    s0 = s1 = s2 = s3 = s4 = s5 = zeros(c)
+    a0, a1, a2 = at_a, at_a + row_a, at_a + 2 * row_a
+    a3, a4, a5 = at_a + 3 * row_a, at_a + 4 * row_a, at_a + 5 * row_a
+    for _ in range(k):
+        v = load_first(b, at_b, n)
+        s0, s1 = plus_product(s0, spread(a, a0), v), plus_product(s1, spread(a, a1), v)
+        s2, s3 = plus_product(s2, spread(a, a2), v), plus_product(s3, spread(a, a3), v)
+        s4, s5 = plus_product(s4, spread(a, a4), v), plus_product(s5, spread(a, a5), v)
+        a0, a1, a2, a3, a4, a5, at_b = a0 + 1, a1 + 1, a2 + 1, a3 + 1, a4 + 1, a5 + 1, at_b + row_b
+    _put_six(c, at, row_c, s0, s1, s2, s3, s4, s5, n, width, keep)
+
+
+@_jit
+def small_product(c, at, row_c, a, at_a, row_a, b, at_b, row_b, rows, k, n, width, keep):
+    """C ← A B, or C + A B to ``keep`` C: ``rows`` (sixes) × k times k × n numbers. Each matrix by where its numbers lie,
+    its first and the distance of its rows; ``width`` numbers are a register."""
+    j = 0
+    while j < n:
+        here = min(n - j, 2 * width)
+        for i in range(0, rows, 6):
+            if here > width:
+                _two_wide(
+                    c, at + i * row_c + j, row_c, a, at_a + i * row_a, row_a, b, at_b + j, row_b, k, here - width, width,
+                    keep,
+                )  # fmt: skip
+            else:
+                _one_wide(
+                    c, at + i * row_c + j, row_c, a, at_a + i * row_a, row_a, b, at_b + j, row_b, k, here, width, keep
+                )
+        j += here

@@ -1,0 +1,250 @@
+"""Bolts in a step: springs between two blocks along their axis and across it, that yield, go slack and break.
+
+T = P + k (l − l₀ − lₚ) along the axis from the first to the second end (P pretension, l₀ the length at installation, lₚ
+what it yielded), between its limits; across it a dowel, and the stiffness T/l that a taut bolt has against turning. The
+states are found with the step, not after it: a bolt that would carry more than it can is given its limit and the step
+solved again.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...conventions import normal_of
+from ...model import BOLT, GROUND, Bolt
+from ..kinematics.midpoint_configuration import Middle
+from ..open_close.equations import Unsettled
+from .force_records import POINT_FORCE
+from .prescribed_motion import Pairs
+
+log = logging.getLogger(__name__)
+
+#: Forces within this part of a limit are at it.
+_AT_LIMIT = 1e-9
+#: Elongations below this part of a bolt's length are round-off of its ends.
+_ROUND_OFF = 1e-14
+#: So often the states of bolts may change in a step before it is cut.
+ROUNDS = 25
+#: States along the axis (and, but for SLACK, across it).
+_ELASTIC, _YIELDS, _CRUSHED, _SLACK = 0, 1, -1, 2
+
+
+def check_bolts(bolts: Sequence[Bolt], fixed: np.ndarray) -> None:
+    """Raises ValueError naming a bolt that holds nothing that moves."""
+    for bolt in bolts:
+        if fixed[bolt.block] and (bolt.other == GROUND or fixed[bolt.other]):
+            raise ValueError(f"bolt {bolt.name!r} holds nothing: both its ends are fixed")
+
+
+def labels(bolts: Sequence[Bolt]) -> list[str]:
+    """A name a bolt, with its number where several share one."""
+    names = [bolt.name for bolt in bolts]
+    return [name if names.count(name) == 1 else f"{name}[{k}]" for k, name in enumerate(names)]
+
+
+@dataclass(eq=False)
+class BoltSet:
+    """The bolts that act in a step, along the axes that they have at its start; arrays (n,).
+
+    number        rows in the loads' bolts
+    ends          (n, 2, 2)  m, where they act, in the step's middle
+    length        m
+    trial, dowel  N, what they would carry if nothing moved: axial (positive in tension), across
+    geometric     N/m, stiffness of a taut bolt against turning
+    axial, across states
+    """
+
+    bolts: tuple[Bolt, ...]
+    number: np.ndarray
+    pairs: Pairs
+    ends: np.ndarray
+    length: np.ndarray
+    trial: np.ndarray
+    dowel: np.ndarray
+    stiffness: np.ndarray
+    shear_stiffness: np.ndarray
+    least: np.ndarray
+    most: np.ndarray
+    strength: np.ndarray
+    slack: np.ndarray
+    geometric: np.ndarray
+    axial: np.ndarray
+    across: np.ndarray
+
+    @classmethod
+    def of(
+        cls,
+        bolts: tuple[Bolt, ...],
+        memory: np.ndarray,
+        time: float,
+        point_at,
+        order: np.ndarray,
+        middle: Middle,
+        removed: np.ndarray | None,
+    ) -> tuple[BoltSet | None, np.ndarray]:
+        """The bolts that act from ``time`` on (None: none), and their BOLT rows with those newly installed;
+        ``point_at(block, at)`` is where points are as the step begins."""
+        memory = memory.copy() if len(memory) == len(bolts) else np.zeros(len(bolts), BOLT)
+        ends = np.zeros((len(bolts), 2, 2))
+        for k, bolt in enumerate(bolts):
+            if removed is not None and (removed[bolt.block] or (bolt.other != GROUND and removed[bolt.other])):
+                memory[k]["broken"], memory[k]["force"], memory[k]["shear_force"] = True, 0.0, 0.0
+                continue
+            ends[k, 0] = point_at(bolt.block, bolt.start)
+            ends[k, 1] = bolt.end if bolt.other == GROUND else point_at(bolt.other, bolt.end)
+            if not memory[k]["installed"] and time >= bolt.installation * (1 - 1e-12):
+                memory[k]["installed"], memory[k]["length"] = True, math.dist(*ends[k])
+        number = np.flatnonzero(memory["installed"] & ~memory["broken"])
+        if not len(number):
+            return None, memory
+        own, ends, rows = [bolts[k] for k in number], ends[number], memory[number]
+
+        def column(name: str) -> np.ndarray:
+            return np.array([getattr(bolt, name) for bolt in own], dtype=float)
+
+        along = ends[:, 1] - ends[:, 0]
+        length = np.hypot(along[:, 0], along[:, 1])
+        axis = along / length[:, None]
+        axes = np.stack([axis, normal_of(axis)], axis=1)
+        block, other = np.array([b.block for b in own]), np.array([b.other for b in own])
+        vectors = np.zeros((len(own), 2, 12))
+        for k in range(len(own)):
+            for side, (b, sign) in enumerate(((block[k], -1.0), (other[k], 1.0))):
+                if b == GROUND:
+                    continue
+                ends[k, side] = middle.points(ends[k, None, side], np.array([b]))[0]
+                if order[b] >= 0:
+                    h = np.sqrt(middle.moments[b, 0])
+                    t = axes[k] @ middle.displacement(ends[k, side], b) / [1.0, 1.0, h, h, h, h]
+                    vectors[k, :, 6 * side : 6 * side + 6] = sign * t
+        # A ground end has no unknowns: its half of the vectors is empty, and it may stand with the bolt's own block.
+        pairs = Pairs(block, other, vectors, ends, axes, -1.0, np.zeros((len(own), 2)))
+        k = column("stiffness")
+        trial = column("pretension") + k * (length - rows["length"] - rows["plastic"])
+        compression = np.array([bolt.compression for bolt in own])
+        most = column("yield_force")
+        bolt_set = cls(
+            bolts=bolts, number=number, pairs=pairs, ends=ends, length=length, trial=trial,
+            dowel=rows["shear_force"].copy(),
+            stiffness=k, shear_stiffness=column("shear_stiffness"), least=np.where(compression, -most, 0.0), most=most,
+            strength=column("shear_strength"), slack=~compression,
+            geometric=np.clip(trial, 0.0, most) / length, axial=np.zeros(len(own), int), across=np.zeros(len(own), int),
+        )  # fmt: skip
+        bolt_set.take_states(np.zeros((len(own), 2)))
+        return bolt_set, memory
+
+    def take_states(self, motion: np.ndarray) -> bool:
+        """Set the states that fit ``motion`` (n, 2) along and across; True when they were those already."""
+        force = self.trial + self.stiffness * motion[:, 0]
+        slip = self.dowel - self.shear_stiffness * motion[:, 1]
+        axial = np.where(force > self.most * (1 + _AT_LIMIT), _YIELDS, _ELASTIC)
+        low = np.where(self.slack, _SLACK, _CRUSHED)
+        # A slack bolt and one without force are told apart by what is round-off of its length.
+        slack = np.where(self.slack, _ROUND_OFF * self.stiffness * self.length, _AT_LIMIT * np.abs(self.least))
+        axial = np.where(force < self.least - slack, low, axial)
+        across = np.where(np.abs(slip) > self.strength * (1 + _AT_LIMIT), np.sign(slip).astype(int), 0)
+        same = bool((axial == self.axial).all() and (across == self.across).all())
+        self.axial, self.across = axial, across
+        return same
+
+    def springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """((n, 2) stiffness N/m, (n, 2) forces at no motion N on the second block along and across) in the present
+        states.
+
+        Forces are those that the pairs' vectors take to generalised ones: along, −T.
+        """
+        elastic = self.axial == _ELASTIC
+        k = np.where(elastic, self.stiffness, 0.0)
+        limit = np.select([self.axial == _YIELDS, self.axial == _CRUSHED], [self.most, self.least], 0.0)
+        held = self.across == 0
+        ks = np.where(held, self.shear_stiffness, 0.0) + self.geometric
+        dowel = np.where(held, self.dowel, self.across * np.where(held, 0.0, self.strength))
+        return np.stack([k, ks], axis=1), np.stack([-np.where(elastic, self.trial, limit), dowel], axis=1)
+
+    def forces(self, motion: np.ndarray) -> np.ndarray:
+        """(n, 2) N on the second block after ``motion``."""
+        k, at_rest = self.springs()
+        return at_rest - k * motion
+
+    def motion(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
+        """(n, 2) m, elongation and relative motion across, of the solver's ``unknowns`` (n_free, 6)."""
+        out = self.pairs.shift.copy()
+        for side, owner in enumerate((self.pairs.block, self.pairs.other)):
+            row = np.where(owner >= 0, order[owner], -1)
+            free = row >= 0
+            part = self.pairs.vectors[free, :, 6 * side : 6 * side + 6]
+            out[free] += np.einsum("nka,na->nk", part, unknowns[row[free]])
+        return out
+
+    def stiffen_turning(self, matrix: np.ndarray, order: np.ndarray, moments: np.ndarray) -> None:
+        """Add to ``matrix`` (n_free, 6, 6), in place, that a taut bolt turns the block it hangs on back: its force F at
+        the arm a from the centroid has the moment a × F − ϑ a·F after a turn ϑ. Found too late, it would swing ever
+        further."""
+        tension = np.clip(self.trial, 0.0, self.most)
+        for side, owner in enumerate((self.pairs.block, self.pairs.other)):
+            pull = (1.0, -1.0)[side] * tension[:, None] * self.pairs.axes[:, 0]
+            arm = self.ends[:, side] - moments[owner, 1:3]
+            row = np.where(owner >= 0, order[owner], -1)
+            turning = np.maximum(np.sum(arm * pull, axis=1), 0.0) / moments[owner, 0]
+            np.add.at(matrix, (row[row >= 0], 2, 2), turning[row >= 0])
+
+    def assemble(
+        self, matrix: np.ndarray, right: np.ndarray, order: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(matrix, right) with the bolts' diagonal blocks and forces, and the (n, 6, 6) blocks (first block,
+        second)."""
+        matrix, right = matrix.copy(), right.copy()
+        k, at_rest = self.springs()
+        push = at_rest - k * self.pairs.shift
+        stiff = np.einsum("nk,nka,nkb->nab", k, self.pairs.vectors, self.pairs.vectors)
+        load = np.einsum("nk,nka->na", push, self.pairs.vectors)
+        for side, owner in enumerate((self.pairs.block, self.pairs.other)):
+            row, part = np.where(owner >= 0, order[owner], -1), slice(6 * side, 6 * side + 6)
+            free = row >= 0
+            np.add.at(matrix, row[free], stiff[free, part, part])
+            np.add.at(right, row[free], load[free, part])
+        return matrix, right, stiff[:, :6, 6:]
+
+    def remember(self, memory: np.ndarray, motion: np.ndarray, point_at) -> None:
+        """Write into the BOLT rows ``memory`` what the step did; ``point_at(block, at)`` is where points are after
+        it."""
+        forces = self.forces(motion)
+        for row, k in enumerate(self.number):
+            bolt, kept = self.bolts[k], memory[k]
+            tension = -forces[row, 0]
+            if self.axial[row] in (_YIELDS, _CRUSHED):
+                kept["plastic"] += (self.trial[row] + bolt.stiffness * motion[row, 0] - tension) / bolt.stiffness
+            # What turns with the bolt is its tension, not the dowel's memory.
+            dowel = self.dowel[row] - bolt.shear_stiffness * motion[row, 1]
+            if self.across[row]:
+                limit = self.across[row] * bolt.shear_strength
+                kept["slid"] += abs(dowel - limit) / bolt.shear_stiffness
+                dowel = limit
+            kept["force"], kept["shear_force"] = tension, dowel
+            end = bolt.end if bolt.other == GROUND else point_at(bolt.other, bolt.end)
+            strain = math.dist(point_at(bolt.block, bolt.start), end) / kept["length"] - 1.0
+            if strain > bolt.breaking_strain:
+                log.warning("bolt %r breaks at a strain of %.3g", bolt.name, strain)
+                kept["broken"] = True
+
+    def point_rows(self, forces: np.ndarray) -> np.ndarray:
+        """POINT_FORCE rows of both ends of every bolt (those in the ground left out) under ``forces`` (n, 2) as in
+        `forces`."""
+        rows = np.zeros(2 * len(self.number), POINT_FORCE)
+        on_second = np.einsum("nk,nkd->nd", forces, self.pairs.axes)
+        own = [self.bolts[k] for k in self.number]
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            part = rows[side::2]
+            part["block"] = [(bolt.block, bolt.other)[side] for bolt in own]
+            part["at"] = [(bolt.start, bolt.end)[side] for bolt in own]
+            part["point"], part["force"] = self.ends[:, side], sign * on_second
+        return rows[rows["block"] != GROUND]
+
+    def unsettled(self) -> Unsettled:
+        """That its states do not agree with the motion, for the step to be cut."""
+        return Unsettled(f"the states of bolts {[self.bolts[k].name for k in self.number]} did not settle")

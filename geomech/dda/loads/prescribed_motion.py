@@ -1,0 +1,277 @@
+"""Motion that is given in a step, of blocks, of points and of the base: what is known of the unknowns before they are
+solved for, exactly, and what it takes to impose it.
+
+A block whose motion is given in part, C d = δ with C (m, 6), changes to the unknowns z of d = Q z, where C = (Rᵀ 0) Qᵀ
+(the QR factors of Cᵀ): the first m of them are known, z₁ = R⁻ᵀ δ, and leave the equations as any prescribed unknown
+does. A fixed block has no unknowns: its contacts see it move as a shift of their gaps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import UNKNOWNS, BaseMotion, BlockMotion, Blocks, Loads, PointMotion
+from ..kinematics.midpoint_configuration import Middle
+from .force_records import POINT_FORCE
+
+#: Rows of C that are combinations of others to this relative size contradict or repeat one another.
+_DEPENDENT = 1e-10
+
+
+@dataclass(eq=False)
+class _Given:
+    """What is given of one moving block: rows of C, their increments and rates at the end of the step, and which point
+    motion each comes from (−1: the block's own)."""
+
+    rows: list[np.ndarray]
+    increment: list[float]
+    rate: list[float]
+    source: list[int]
+
+
+@dataclass(eq=False)
+class _Changed:
+    """A moving block in its changed unknowns; its own equations and contacts as they were, for what holds it."""
+
+    block: int
+    basis: np.ndarray  # Q (6, 6)
+    known: np.ndarray  # z₁ (m,)
+    constraint: np.ndarray  # C (m, 6) of the scaled unknowns
+    rate: np.ndarray
+    source: list[int]
+    matrix: np.ndarray
+    right: np.ndarray
+    pairs: list[tuple[np.ndarray, np.ndarray]]  # its rows in each set of pairs, and its (k, 2, 6) part of their vectors
+
+
+@dataclass(eq=False)
+class Pairs:
+    """Two blocks each that feel one another, contacts or bolts: ``vectors`` (n, 2, 12) of their relative motion in two
+    directions, ``points`` (n, 2, 2) where it is that of the first and of the second block, ``axes`` (n, 2, 2) the
+    directions; the motion counts as that of the first less that of the second block, times ``sense``. ``shift`` (n, 2)
+    is what given motion adds to it."""
+
+    block: np.ndarray
+    other: np.ndarray
+    vectors: np.ndarray
+    points: np.ndarray
+    axes: np.ndarray
+    sense: float
+    shift: np.ndarray
+
+
+class ImposedMotion:
+    """The motion that ``loads`` give from ``start`` to ``end`` (s), acting where blocks are in the ``middle`` of the
+    step.
+
+    ``totals`` (k,) is what they have imposed at ``end``, ``before`` the same at the start as an earlier step has left
+    it (else taken at ``start``): statics may seek equilibrium at one time in many steps. ``increment`` and ``rate``
+    (n_blocks, 6): of fixed blocks, zero elsewhere. Raises ValueError naming the block whose given motions contradict or
+    repeat one another, a fixed one whose point is moved, and one that is to be strained though fixed.
+    """
+
+    def __init__(
+        self, blocks: Blocks, fixed: np.ndarray, removed: np.ndarray | None, loads: Loads, middle: Middle, point_at,
+        before: np.ndarray,
+        start: float, end: float,
+    ) -> None:  # fmt: skip
+        n = blocks.n_blocks
+        self.blocks, self.fixed, self.moments = blocks, fixed, middle.moments
+        self._middle = middle
+        self.increment, self.rate = np.zeros((n, 6)), np.zeros((n, 6))
+        self._given: dict[int, _Given] = {}
+        self._springs: list[tuple[int, int, np.ndarray, np.ndarray]] = []
+        self._changed: list[_Changed] = []
+        self._points = loads.point_motions
+        self._rows = np.zeros(len(loads.point_motions), POINT_FORCE)
+        removed = np.zeros(n, bool) if removed is None else removed
+        base = [loads.base] if loads.base is not None and loads.base.frame == "ground" else []
+        given = [*base, *loads.block_motions, *loads.point_motions]
+        totals = [motion.total(end) for motion in given]
+        self.totals = np.concatenate(totals)
+        if len(before) != len(self.totals):
+            before = np.concatenate([motion.total(start) for motion in given])
+        by = np.split(self.totals - before, np.cumsum([len(total) for total in totals])[:-1])
+        for motion, change in zip(base, by):
+            self._base(motion, removed, change, end)
+        for motion, change in zip(loads.block_motions, by[len(base) :]):
+            if not removed[motion.block]:
+                self._block(motion, change, start, end)
+        for k, (motion, change) in enumerate(zip(loads.point_motions, by[len(base) + len(loads.block_motions) :])):
+            if not removed[motion.block]:
+                self._point(k, motion, change, point_at(motion.block, motion.at), start, end)
+        self.moving_base = bool(self.increment.any())
+
+    def _base(self, base: BaseMotion, removed: np.ndarray, by: np.ndarray, end: float) -> None:
+        shaken = self.blocks.fixed & ~removed
+        if base.blocks is not None:
+            shaken &= np.isin(np.arange(len(shaken)), base.blocks)
+        self.increment[shaken, :2] = by
+        self.rate[shaken, :2] = base.acceleration.integral(end)
+
+    def _block(self, motion: BlockMotion, by: np.ndarray, start: float, end: float) -> None:
+        rate = motion.rate(start, end)
+        at = [UNKNOWNS.index(name) for name in motion.unknowns]
+        if self.fixed[motion.block]:
+            if max(at) > 2:
+                raise ValueError(
+                    f"{self._name(motion.block)} is fixed, and so rigid: its strains cannot be imposed, only u0, v0 "
+                    "and r0"
+                )
+            self.increment[motion.block, at] += by
+            self.rate[motion.block, at] += rate
+            return
+        for k, unknown in enumerate(at):
+            self._add(motion.block, np.eye(6)[unknown], by[k], rate[k], -1)
+
+    def _point(
+        self, number: int, motion: PointMotion, by: np.ndarray, now: np.ndarray, start: float, end: float
+    ) -> None:
+        b = motion.block
+        acts = self._middle.points(now[None], np.array([b]))[0]
+        self._rows[number]["block"], self._rows[number]["at"], self._rows[number]["point"] = b, motion.at, acts
+        if self.fixed[b]:
+            raise ValueError(f"a point of {self._name(b)} is to be moved, but the block is fixed: give its own motion")
+        rows = motion.axes @ self._middle.displacement(acts, b)
+        if motion.kind == "displacement":
+            # To where the point is to be, so that what the turn of a step leaves out is made up for in the next.
+            by = motion.history.at(end) - motion.axes @ (now - np.asarray(motion.at, dtype=float))
+        if motion.stiffness is not None:
+            self._springs.append((number, b, rows, by))
+            return
+        for row, value, speed in zip(rows, by, motion.rate(start, end), strict=True):
+            self._add(b, row, value, speed, number)
+
+    def _add(self, block: int, row: np.ndarray, by: float, rate: float, source: int) -> None:
+        given = self._given.setdefault(block, _Given([], [], [], []))
+        given.rows.append(row)
+        given.increment.append(float(by))
+        given.rate.append(float(rate))
+        given.source.append(source)
+
+    def _name(self, block: int) -> str:
+        return repr(self.blocks.names[block]) if self.blocks.names else f"block {block}"
+
+    def _scale(self, block: int) -> np.ndarray:
+        """(6,) the solver's unknowns over the motion's: lengths all of them."""
+        h = float(np.sqrt(self.moments[block, 0]))
+        return np.array([1.0, 1.0, h, h, h, h])
+
+    def take_held(self, held: np.ndarray) -> np.ndarray:
+        """What remains of ``held`` (n_blocks, 6) when blocks with given motion take theirs as given zero."""
+        rest = held.copy()
+        for b, given in self._given.items():
+            taken = {int(row.argmax()) for row, source in zip(given.rows, given.source, strict=True) if source < 0}
+            for unknown in set(np.flatnonzero(held[b]).tolist()) - taken:
+                self._add(b, np.eye(6)[unknown], 0.0, 0.0, -1)
+            rest[b] = False
+        self._springs = [(number, b, rows * ~rest[b], by) for number, b, rows, by in self._springs]
+        return rest
+
+    # -- before the step is solved -------------------------------------------------------------------------------------
+
+    def impose(self, matrix: np.ndarray, right: np.ndarray, sets: list[Pairs], order: np.ndarray) -> None:
+        """Take what is given out of the equations, in place (`assembly`'s arrays): matrix, right side, and the vectors
+        of the pairs in ``sets``, whose shift is what the given motion alone makes of them."""
+        for number, b, rows, by in self._springs:
+            rows, k = rows / self._scale(b), self._points[number].stiffness
+            matrix[order[b]] += k * rows.T @ rows
+            right[order[b]] += k * rows.T @ by
+        if self.moving_base:
+            for pairs in sets:
+                pairs.shift += self._of_base(pairs)
+        size = np.abs(matrix).max(initial=0.0)
+        for b, given in self._given.items():
+            self._change(b, given, matrix, right, sets, order[b], size)
+
+    def _of_base(self, pairs: Pairs) -> np.ndarray:
+        """(n, 2) relative motion that the fixed blocks' motion makes."""
+        moved = np.zeros((len(pairs.block), 2))
+        for k, (owner, sign) in enumerate(((pairs.block, 1.0), (pairs.other, -1.0))):
+            arm = pairs.points[:, k] - self.moments[owner, 1:3]
+            u = np.where((owner >= 0)[:, None], self.increment[owner], 0.0)
+            moved += sign * np.stack([u[:, 0] - u[:, 2] * arm[:, 1], u[:, 1] + u[:, 2] * arm[:, 0]], axis=1)
+        return pairs.sense * np.einsum("nkd,nd->nk", pairs.axes, moved)
+
+    def _change(self, b, given: _Given, matrix, right, sets: list[Pairs], row: int, size: float) -> None:
+        constraint = np.array(given.rows) / self._scale(b)
+        m = len(constraint)
+        if m > 6:
+            raise ValueError(f"{self._name(b)}: {m} motions are imposed on its six unknowns")
+        basis, r = np.linalg.qr(constraint.T, mode="complete")
+        if np.abs(np.diag(r)).min() <= _DEPENDENT * np.abs(r).max():
+            raise ValueError(f"{self._name(b)}: the motions imposed on it contradict or repeat one another")
+        known = np.linalg.solve(r[:m].T, np.array(given.increment))
+        before, own = (matrix[row].copy(), right[row].copy()), []
+        for pairs in sets:
+            for side, owner in enumerate((pairs.block, pairs.other)):
+                at, part = np.flatnonzero(owner == b), slice(6 * side, 6 * side + 6)
+                vectors = pairs.vectors[at, :, part]
+                own.append((at, vectors))
+                turned = vectors @ basis
+                pairs.shift[at] += turned[:, :, :m] @ known
+                turned[:, :, :m] = 0.0
+                pairs.vectors[at, :, part] = turned
+        self._changed.append(_Changed(b, basis, known, constraint, np.array(given.rate), given.source, *before, own))
+        matrix[row] = basis.T @ matrix[row] @ basis
+        right[row] = basis.T @ right[row] - matrix[row][:, :m] @ known
+        matrix[row, :m], matrix[row, :, :m] = 0.0, 0.0
+        matrix[row, range(m), range(m)] = size
+        right[row, :m] = 0.0
+
+    # -- after ---------------------------------------------------------------------------------------------------------
+
+    def recover(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
+        """(n, 6) the solver's ``unknowns`` (n, 6) with the given ones, as they were before `impose`."""
+        unknowns = unknowns.copy()
+        for c in self._changed:
+            z = unknowns[order[c.block]]
+            z[: len(c.known)] = c.known
+            unknowns[order[c.block]] = c.basis @ z
+        return unknowns
+
+    def free_part(self, unknowns: np.ndarray, order: np.ndarray) -> np.ndarray:
+        """(n, 6) the same of a change of the ``unknowns``, given ones standing still."""
+        unknowns = unknowns.copy()
+        for c in self._changed:
+            z = unknowns[order[c.block]]
+            z[: len(c.known)] = 0.0
+            unknowns[order[c.block]] = c.basis @ z
+        return unknowns
+
+    def correct_velocity(self, velocity: np.ndarray) -> None:
+        """Make the rates at the end of the step those that are given, in place: the integration's own swing about
+        them."""
+        velocity[self.fixed] = self.rate[self.fixed]
+        for c in self._changed:
+            scale = self._scale(c.block)
+            found = velocity[c.block] * scale
+            found += c.constraint.T @ np.linalg.solve(c.constraint @ c.constraint.T, c.rate - c.constraint @ found)
+            velocity[c.block] = found / scale
+
+    def reactions(
+        self, unknowns: np.ndarray, pushes: list[np.ndarray], order: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What it takes: (n_blocks, 6) generalised forces (N, N m) of the blocks' given unknowns, about their
+        centroids, and POINT_FORCE rows of the points that are moved. ``unknowns`` as `recover` gives them; ``pushes``
+        (n, 2) N the forces of each set of pairs."""
+        of_blocks = np.zeros((self.blocks.n_blocks, 6))
+        at_points = np.zeros((len(self._points), 2))
+        for number, b, rows, by in self._springs:
+            missing = by - rows / self._scale(b) @ unknowns[order[b]]
+            at_points[number] += self._points[number].stiffness * missing @ self._points[number].axes
+        for c in self._changed:
+            left = c.matrix @ unknowns[order[c.block]] - c.right
+            for (at, vectors), push in zip(c.pairs, [p for p in pushes for _ in range(2)], strict=True):
+                left = left - np.einsum("nk,nka->a", push[at], vectors)
+            multiplier = np.linalg.lstsq(c.constraint.T, left, rcond=None)[0]
+            for value, row, source in zip(multiplier, c.constraint, c.source, strict=True):
+                if source < 0:
+                    of_blocks[c.block] += value * row * self._scale(c.block)
+            for number in {s for s in c.source if s >= 0}:
+                mine = [value for value, source in zip(multiplier, c.source, strict=True) if source == number]
+                at_points[number] += np.array(mine) @ self._points[number].axes
+        self._rows["force"] = at_points
+        return of_blocks, self._rows

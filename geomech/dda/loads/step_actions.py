@@ -1,0 +1,222 @@
+"""What acts in a step beyond forces: motion that is given, and bolts, whose states are found together with the
+contacts'."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...model import BOLT, GROUND, Blocks, Loads, State
+from ..kinematics.midpoint_configuration import Middle
+from ..linear_solver.assembly import Links, Pattern
+from ..open_close.contact_set import ContactSet
+from ..open_close.settled_states import Settled
+from ..results import contact_resultants
+from .bolts import ROUNDS, BoltSet, check_bolts, labels
+from .force_records import POINT_FORCE
+from .load_vectors import LoadMap
+from .prescribed_motion import ImposedMotion, Pairs
+
+#: (pattern, matrix, right side, contacts, gaps) → settled contacts.
+Settle = Callable[[Pattern, np.ndarray, np.ndarray, ContactSet, np.ndarray], Settled]
+
+
+def felt_gravity(loads: Loads, start: float, acting: float, dt: float, static: bool, ahead: float = 0.0) -> np.ndarray:
+    """(2,) m/s² gravity at the time ``acting``, less the acceleration of a base that the blocks are seen from: its mean
+    over the time ``dt`` from ``start`` + ``ahead``, that over the step (``ahead`` 0) so that velocities are exact, or
+    in statics its value at ``acting``."""
+    gravity = loads.gravity.at(acting)
+    if loads.base is None or loads.base.frame != "base":
+        return gravity
+    record = loads.base.acceleration
+    if static:
+        return gravity - record.at(acting)
+    return gravity - (record.integral(start + ahead + dt) - record.integral(start + ahead)) / dt
+
+
+class StepActions:
+    """Given motion and bolts of one attempt at a step, in the order in which the step goes."""
+
+    def __init__(
+        self, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
+        order: np.ndarray, removed: np.ndarray | None, end: float,
+    ) -> None:  # fmt: skip
+        self.blocks, self.order, self.loads, self.load_map = blocks, order, loads, load_map
+        self.moments = middle.moments
+        vertices = state.vertices
+
+        def point_at(block: int, at: tuple[float, float]) -> np.ndarray:
+            return load_map.point(block, at, vertices)
+
+        self.imposed: ImposedMotion | None = None
+        shaken = loads.base is not None and loads.base.frame == "ground"
+        if shaken or loads.block_motions or loads.point_motions:
+            self.imposed = ImposedMotion(
+                blocks, fixed, removed, loads, middle, point_at, state.imposed, state.time, end
+            )
+        self.bolts: BoltSet | None = None
+        self.memory = np.empty(0, BOLT)
+        if loads.bolts:
+            check_bolts(loads.bolts, blocks.fixed)
+            self.bolts, self.memory = BoltSet.of(loads.bolts, state.bolts, state.time, point_at, order, middle, removed)
+        #: (n_contacts,) m: what the fixed blocks' motion makes of the contacts' motion along their edges.
+        self.along = np.zeros(0)
+        self._motion = np.zeros((0 if self.bolts is None else len(self.bolts.number), 2))
+
+    @classmethod
+    def of(
+        cls, blocks: Blocks, fixed: np.ndarray, loads: Loads, state: State, load_map: LoadMap, middle: Middle,
+        order: np.ndarray, removed: np.ndarray | None, end: float,
+    ) -> StepActions | None:  # fmt: skip
+        """None where the loads are forces only."""
+        shaken = loads.base is not None and loads.base.frame == "ground"
+        if not (shaken or loads.block_motions or loads.point_motions or loads.bolts):
+            return None
+        return cls(blocks, fixed, loads, state, load_map, middle, order, removed, end)
+
+    @property
+    def linked(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Pairs of blocks that bolts link; None without. A bolt to the ground links its block with itself."""
+        if self.bolts is None:
+            return None
+        pairs = self.bolts.pairs
+        return pairs.block, np.where(pairs.other == GROUND, pairs.block, pairs.other)
+
+    def held(self, held: np.ndarray | None) -> np.ndarray | None:
+        """What of the unknowns ``held`` (n_blocks, 6) the step has to hold itself: not those of blocks whose motion is
+        given in part, which hold them with what is given."""
+        if held is None:
+            return None
+        if self.imposed is not None:
+            held = self.imposed.take_held(held)
+        if self.bolts is not None:
+            pairs = self.bolts.pairs
+            for side, owner in enumerate((pairs.block, pairs.other)):
+                mine = owner >= 0
+                pairs.vectors[mine, :, 6 * side : 6 * side + 6] *= ~held[owner[mine], None]
+        return held
+
+    def settle(
+        self, pattern: Pattern, matrix: np.ndarray, right: np.ndarray, vectors: np.ndarray, acting: np.ndarray,
+        found: ContactSet, gap: np.ndarray, settle: Settle,
+    ) -> tuple[Settled, np.ndarray]:  # fmt: skip
+        """Settled contacts and the solver's unknowns (n_free, 6), given ones among them. Changes matrix, right side and
+        vectors in place, to those of the equations that are solved; given motion adds to what contacts' gaps and
+        ``stretch`` begin with. ``acting`` (n, 7): the contacts' geometry where they act. Raises `Unsettled`."""
+        if self.bolts is not None:
+            self.bolts.stiffen_turning(matrix, self.order, self.moments)
+        shift = np.zeros((len(found), 2))
+        self.along = shift[:, 1]
+        if self.imposed is not None:
+            point, normal = acting[:, 5:7], acting[:, 1:3]
+            along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+            contacts = Pairs(
+                found.block, found.other, vectors, np.stack([point, point], axis=1), np.stack([normal, along], axis=1),
+                1.0, shift,
+            )  # fmt: skip
+            self.imposed.impose(matrix, right, [contacts, *self._bolted()], self.order)
+        if shift.any():
+            geometry = found.geometry.copy()
+            geometry[:, 3] += shift[:, 0]
+            found = replace(found, geometry=geometry, stretch=found.stretch + shift[:, 1])
+            gap = gap + shift[:, 0]
+        settled = self._with_bolts(pattern, matrix, right, found, gap, settle)
+        unknowns = settled.unknowns
+        if self.imposed is not None:
+            unknowns = self.imposed.recover(unknowns, self.order)
+        return settled, unknowns
+
+    def _bolted(self) -> list[Pairs]:
+        return [] if self.bolts is None else [self.bolts.pairs]
+
+    def _with_bolts(self, pattern, matrix, right, found, gap, settle: Settle) -> Settled:
+        if self.bolts is None:
+            return settle(pattern, matrix, right, found, gap)
+        for _ in range(ROUNDS):
+            own, side, across = self.bolts.assemble(matrix, right, self.order)
+            settled = settle(replace(pattern, links=self._links(pattern, across)), own, side, found, gap)
+            self._motion = self.bolts.motion(settled.unknowns, self.order)
+            if self.bolts.take_states(self._motion):
+                return settled
+        raise self.bolts.unsettled()
+
+    def _links(self, pattern: Pattern, across: np.ndarray) -> Links:
+        """The blocks ``across`` (n, 6, 6) between the two ends of every bolt, and their transposes."""
+        pairs, n = self.bolts.pairs, len(self.bolts.number)
+        row, column = self.order[pairs.block], np.where(pairs.other == GROUND, -1, self.order[pairs.other])
+        both = np.flatnonzero((row >= 0) & (column >= 0))
+        at = len(pattern.upper) - n + both
+        a, b = np.arange(6)[:, None], np.arange(6)
+        upper = pattern.upper[at, None, None] + a * pattern.stride[row[both], None, None] + b
+        lower = pattern.lower[at, None, None] + a * pattern.stride[column[both], None, None] + b
+        return Links(
+            row=np.concatenate([row[both], column[both]]),
+            column=np.concatenate([column[both], row[both]]),
+            places=np.concatenate([upper, lower]),
+            blocks=np.concatenate([across[both], across[both].transpose(0, 2, 1)]),
+        )
+
+    # -- after ---------------------------------------------------------------------------------------------------------
+
+    def bolt_forces(self) -> np.ndarray:
+        """(n, 2) N of the bolts that act, as their pairs' vectors take them to generalised ones."""
+        return np.zeros((0, 2)) if self.bolts is None else self.bolts.forces(self._motion)
+
+    @property
+    def largest_bolt_force(self) -> float:
+        """N."""
+        return float(np.abs(self.bolt_forces()).max(initial=0.0))
+
+    def with_bolt_forces(self, right: np.ndarray) -> np.ndarray:
+        """(n_free, 6) the right side that was solved with, and the bolts' forces on it."""
+        if self.bolts is None:
+            return right
+        pairs, push = self.bolts.pairs, np.einsum("nk,nka->na", self.bolt_forces(), self.bolts.pairs.vectors)
+        spare = np.vstack([right, np.zeros((1, 6))])
+        np.add.at(spare, self.order[pairs.block], push[:, :6])
+        np.add.at(spare, np.where(pairs.other == GROUND, -1, self.order[pairs.other]), push[:, 6:])
+        return spare[:-1]
+
+    def work_forces(self, reaction: np.ndarray | None, contacts: np.ndarray, centroid: np.ndarray) -> np.ndarray:
+        """(n_blocks, 6) N, N m whose work given motion does: ``reaction`` on moving blocks, on fixed ones what holds
+        them against their CONTACT rows."""
+        out = np.zeros((self.blocks.n_blocks, 6)) if reaction is None else reaction.copy()
+        if self.imposed is not None and self.imposed.moving_base:
+            driven = self.imposed.increment.any(axis=1)
+            out[driven, :3] -= contact_resultants(contacts, self.blocks.n_blocks, centroid)[driven]
+        return out
+
+    def acted(
+        self, settled: Settled, unknowns: np.ndarray, contacts: np.ndarray, points: np.ndarray, new_vertices: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray | None, dict[str, float]]:
+        """(POINT_FORCE rows ``points`` with those of bolts and moved points, (n_blocks, 6) N and N m that it takes to
+        give moving blocks their motion (None without), statistics), and the bolts remember the step. ``contacts``
+        CONTACT rows."""
+        rows, reaction, statistics = [points], None, {}
+        if self.imposed is not None:
+            pushes = [
+                np.stack([settled.normal_force, settled.shear_force], axis=1),
+                *([self.bolt_forces()] * len(self._bolted())),
+            ]
+            reaction, at_points = self.imposed.reactions(unknowns, pushes, self.order)
+            rows.append(at_points)
+        if self.bolts is not None:
+            forces = self.bolt_forces()
+            self.bolts.remember(self.memory, self._motion, lambda b, at: self.load_map.point(b, at, new_vertices))
+            rows.append(self.bolts.point_rows(forces))
+        if self.loads.bolts:
+            for label, row in zip(labels(self.loads.bolts), self.memory, strict=True):
+                statistics[f"bolt:{label}"] = float(row["force"])
+        all_points = np.concatenate([part.astype(POINT_FORCE, copy=False) for part in rows])
+        for k, motion in enumerate(self.loads.point_motions):
+            fx, fy = at_points[k]["force"]
+            statistics[f"reaction_x:point {k + 1}"], statistics[f"reaction_y:point {k + 1}"] = float(fx), float(fy)
+        driven = [motion.block for motion in self.loads.block_motions]
+        held = -contact_resultants(contacts, self.blocks.n_blocks, self.moments[:, 1:3]) if driven else None
+        for b in driven:
+            force = reaction[b] if self.order[b] >= 0 else held[b]
+            for axis, value in zip("xy", force.tolist()):
+                statistics[f"reaction_{axis}:{self.blocks.names[b]}"] = value
+        return all_points, reaction, statistics

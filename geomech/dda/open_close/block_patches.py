@@ -1,0 +1,87 @@
+"""Contact states of a few blocks among many: the open-close iteration of a patch, with all blocks around it held where
+they are.
+
+Where Newton's method on the states of all contacts does not end, the contacts that are still wrong mostly lie in a few
+places: one block that wedges itself between its neighbours. Their states are found on the blocks about them alone, in
+small systems that cost next to nothing, and the iteration on all contacts goes on from there (a nonlinear Schwarz
+method with the patches that need it; Cai & Keyes 2002).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..joint_laws.coulomb_return import moved
+from ..joint_laws.penalty_springs import Springs
+from ..linear_solver import assembly
+from .equations import Answer, Equations, States, Unsettled
+from .settled_states import Settled
+
+#: A patch reaches so many blocks beyond those whose contacts are wrong, fewer where it would take more than this part of
+#: all blocks, or more than so many: its factors stand beside those of all.
+_RINGS, _LARGEST, _MOST = 2, 0.4, 2000
+
+
+def settled_in_patch(
+    equations: Equations, which: np.ndarray, states: States, answer: Answer, settle: Callable[..., Settled],
+) -> tuple[States | None, float]:  # fmt: skip
+    """``states`` with those of the contacts about ``which`` (n,) bool as ``settle`` finds them while all blocks farther
+    off move as in the ``answer``, None where it finds none; and what it took, in solutions of the whole system."""
+    pattern, found = equations.pattern, equations.found
+    order, n = pattern.order, pattern.n
+    if pattern.links is not None or equations.curved is not None:
+        return None, 0.0
+    ends = order[found.block], order[found.other]
+    inside, some, rows = np.zeros(n, bool), which, None
+    for _ in range(_RINGS + 1):
+        wider = np.append(inside, False)
+        for end in ends:
+            wider[end[some]] = True
+        wider[-1] = False
+        if wider.sum() > min(_LARGEST * n, _MOST):
+            break
+        inside, some = wider[:-1], wider[ends[0]] | wider[ends[1]]
+        rows = np.flatnonzero(some)
+    if rows is None or not inside.any():
+        return None, 0.0
+    number = np.append(np.where(inside, np.cumsum(inside) - 1, -1), -1)
+    within = number[order]
+    around = np.where(within >= 0, -1, order)
+    part = found.part(rows)
+    vectors = np.ascontiguousarray(equations.vectors[rows])
+    springs = Springs(**{name: value[rows] for name, value in vars(answer.springs).items()})
+    apart, along = moved(answer.unknowns, part.block, part.other, around, vectors).T
+    bonded = states.bonded[rows]
+    part = replace(
+        part, shear=part.shear - springs.shear * along,
+        tried=(states.state[rows], states.direction[rows], bonded),
+    )  # fmt: skip
+    # Bonds are lost when all else is right, not here.
+    holds = np.where(bonded > 0, np.inf, 0.0)
+    springs = replace(springs, cohesion=springs.cohesion + holds, tension=springs.tension + holds)
+    gap = answer.gap[rows] + apart - springs.lift * along
+    if inside.sum() <= assembly.DENSE_BLOCKS:
+        own = assembly.dense_pattern(within, part.block, part.other)
+    else:
+        points = np.zeros((len(order), 2))
+        points[order >= 0] = pattern.solver.points[order[order >= 0]]
+        own = assembly.sparse_pattern(within, part.block, part.other, points)
+        own.solver.work = pattern.solver.work
+    try:
+        settled = settle(
+            own, equations.matrix[inside], equations.right[inside], part, vectors, springs, gap,
+            equations.slack[rows], expected=_of(equations.expected, inside),
+        )  # fmt: skip
+    except Unsettled:
+        return None, 0.0
+    state, direction = states.state.copy(), states.direction.copy()
+    state[rows], direction[rows] = settled.state, settled.direction
+    return States(state, direction, states.bonded), settled.iterations * float(inside.sum()) / n
+
+
+def _of(unknowns: np.ndarray | None, inside: np.ndarray) -> np.ndarray | None:
+    """(6 k,) of the ``unknowns`` (6 n,), those of the blocks ``inside`` (n,) bool."""
+    return None if unknowns is None else unknowns.reshape(-1, 6)[inside].ravel()

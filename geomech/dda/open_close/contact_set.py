@@ -1,0 +1,247 @@
+"""The contacts of a step as it begins: where they are, what they remember, what holds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...model import CONTACT, SLIP
+from ..contact_detection.contact_records import fill
+from ..contact_detection.face_quadrature import FacePoints
+from ..joint_laws.bonds import BondedFaces
+from ..joint_laws.penalty_springs import Springs
+from ..joint_laws.whole_faces import WholeFaces
+from .settled_states import Settled
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSet:
+    """Contacts (n,) as a step begins.
+
+    vertex, edge, block, other, law   as in CONTACT rows
+    corner      (n,)     the corner of the edge's block that the vertex meets where both are rounded corners
+                         (`rounded_corners`), −1 where the vertex meets the edge's line
+    tilt        (n,)     rad, from the edge's normal to that along which rounded corners meet; 0 where a line is met
+    precision   (n,)     m, to which the gaps of blocks that turn are followed
+    geometry    (n, 7)   position along the edge, outward normal (2), gap, tributary length, vertex (2): or, of the
+                faces in ``points``, where their springs stand
+    springs              stiffness and strengths
+    state, direction, bonded   what was carried over: state and sense of sliding to try first, bond
+    normal, shear, slip        forces N and sliding m
+    wear, lift                 m: way slid to and fro, and how far that has forced the faces apart (negative where they
+                               have to come nearer than the geometry says to meet)
+    stretch                    m: motion along the edge, still to be taken back, that the force of a sticking contact
+                               does not count yet: what multipliers have left of it, and what given motion makes of it
+                               in the step
+    inset       (n,)     bool: a bond's springs stand inside its face, for its blocks to bend
+    bare        (n,)     part of its face, from its corner on, that did not touch as the last step ended; −1: not known
+    released             J/m that shear had stored where faces part, and springs before they were eased, and that the new
+                         springs do not hold
+    unbent               J/m that the springs of bonds that break in this step had stored more inside their faces than
+                         at the corners
+    relies_on_glue             corners have been left out that hold as long as all bonds do
+    faces                      those that bonds hold at both ends; None without any
+    by_length   (n,)           contacts whose shear stiffness is that of a law
+    points, lumped             faces whose springs stand inside them, and the contacts with theirs at the corners; None
+                               without any
+    arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the
+                straight one
+    swing       (n,)     m that it adds so to the motion along the edge
+    cohesive    (n,)     m of its face whose cohesion the contact holds; None: its tributary length
+    whole                      faces that keep their cohesion while they touch anywhere (`whole_faces`); None without any
+    tried                      state, direction and bond that open–close iterations begin with, where these are others
+    """
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    block: np.ndarray
+    other: np.ndarray
+    law: np.ndarray
+    corner: np.ndarray
+    tilt: np.ndarray
+    precision: np.ndarray
+    geometry: np.ndarray
+    springs: Springs
+    state: np.ndarray
+    direction: np.ndarray
+    bonded: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    slip: np.ndarray
+    wear: np.ndarray
+    lift: np.ndarray
+    stretch: np.ndarray
+    inset: np.ndarray
+    bare: np.ndarray
+    released: float = 0.0
+    unbent: float = 0.0
+    relies_on_glue: bool = False
+    faces: BondedFaces | None = None
+    by_length: np.ndarray | None = None
+    points: FacePoints | None = None
+    lumped: ContactSet | None = None
+    cohesive: np.ndarray | None = None
+    whole: WholeFaces | None = None
+    arc: np.ndarray | float = 0.0
+    swing: np.ndarray | float = 0.0
+    tried: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    def trying(self, rows: np.ndarray, without_lost: bool = False) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with the states of CONTACT ``rows``, if these are
+        rows of the same contacts: those with which another attempt at the step has ended; ``without_lost`` of its bonds
+        that were lost there."""
+        if len(rows) != len(self) or not all(
+            np.array_equal(rows[name], getattr(self, name)) for name in ("vertex", "edge")
+        ):
+            return self
+        way = np.where(rows["state"] == SLIP, np.sign(rows["shear_force"]), 0.0)
+        # A bond that was lost in the other attempt may hold in this one; and which way what slides without force is not
+        # known.
+        known = (self.bonded == 0) | (rows["bonded"] == self.bonded) | without_lost
+        known &= (rows["state"] != SLIP) | (way != 0) | (self.springs.friction == 0)
+        bonded = rows["bonded"].copy() if without_lost else self.bonded
+        return replace(
+            self, tried=(np.where(known, rows["state"], self.state), np.where(known, way, self.direction), bonded)
+        )
+
+    def part(self, rows: np.ndarray) -> ContactSet:
+        """The contacts ``rows`` (k,) alone, without the faces that they are ends of."""
+        n = len(self)
+
+        def of(value):
+            if isinstance(value, np.ndarray) and len(value) == n:
+                return value[rows]
+            return (
+                Springs(**{name: each[rows] for name, each in vars(value).items()}) if value is self.springs else value
+            )
+
+        own = {field.name: of(getattr(self, field.name)) for field in fields(self)}
+        tried = None if self.tried is None else tuple(each[rows] for each in self.tried)
+        return ContactSet(**own | {"faces": None, "whole": None, "points": None, "lumped": None, "tried": tried})
+
+    def expecting(self, state: np.ndarray, direction: np.ndarray) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with these (n,)."""
+        if np.array_equal(state, self.state):
+            return self
+        return replace(self, tried=(state, direction, self.bonded))
+
+    def trying_again(self, settled: Settled) -> ContactSet:
+        """The same contacts, of which open–close iterations begin with the states so ``settled`` with springs that stood
+        elsewhere. (The sense of sliding is that of each spring: forces at the corners of a face may have another.)"""
+        # A bond that was lost there may hold here.
+        bonded = self.bonded if self.tried is None else self.tried[2]
+        known = (bonded == 0) | (settled.bonded == bonded)
+        tried = np.where(known, settled.state, self.state), np.where(known, settled.direction, self.direction), bonded
+        return replace(self, tried=tried)
+
+    def like(self, rows: np.ndarray) -> ContactSet:
+        """The same contacts `trying` the states of ``rows``, with the springs of faces on the parts that these press
+        on."""
+        again = self.trying(rows)
+        if again is self or self.points is None:
+            return again
+        return replace(self.lumped.placed(self.points.pressed_by(rows["normal_force"])), tried=again.tried)
+
+    def placed(self, points: FacePoints | None) -> ContactSet:
+        """These contacts, found at the corners, with the springs of faces where ``points`` say. Where a face parts, the
+        shear stress there goes; where it comes to touch there is none."""
+        if points is None:
+            return self
+        was, springs = points.before(self.bare, self.by_length), points.springs(self.springs, self.by_length)
+        if self.whole is not None:
+            springs = replace(springs, cohesion=self.springs.cohesion)
+        shear = points.passed_on(self.shear, was)
+        stored = self.shear**2 / was.springs(self.springs, self.by_length).shear - shear**2 / springs.shear
+        return replace(
+            self,
+            geometry=points.geometry(),
+            springs=springs,
+            shear=shear,
+            released=self.released + 0.5 * float(stored[points.ends].sum()),
+            normal=points.at_points(self.normal),
+            lift=points.between_corners(self.lift),
+            faces=None if self.faces is None else points.on_bonded(self.faces),
+            points=points,
+            lumped=self,
+            arc=points.between_corners(self.arc) if isinstance(self.arc, np.ndarray) else self.arc,
+            swing=points.along_faces(self.swing) if isinstance(self.swing, np.ndarray) else self.swing,
+        )
+
+    def misplaced(self, settled: Settled) -> ContactSet | None:
+        """The contacts with the springs of faces where the step, so ``settled``, has left them in contact; None if they
+        stand so."""
+        if self.points is None:
+            return None
+        better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
+        return None if better is None else self.lumped.placed(better)
+
+    def sharing_cohesion(self, state: np.ndarray, bonded: np.ndarray) -> ContactSet:
+        """The contacts, of which those that are closed in ``state`` with ``bonded`` (n,) hold all the cohesion of their
+        whole faces; these ones if they do already."""
+        if self.whole is None:
+            return self
+        cohesive = self.whole.cohesive(state, bonded)
+        if self.cohesive is not None and np.array_equal(cohesive, self.cohesive):
+            return self
+        found = self if self.lumped is None else self.lumped
+        springs = replace(found.springs, cohesion=self.whole.cohesion * cohesive)
+        return replace(found, cohesive=cohesive, springs=springs).placed(self.points)
+
+    def along(self, arc: np.ndarray, swing: np.ndarray) -> ContactSet:
+        """The contacts with gaps that follow an ``arc`` and motion along the edges that follows a ``swing`` (n,) m at
+        their corners."""
+        if self.points is None:
+            return replace(self, arc=arc, swing=swing)
+        return replace(self.lumped, arc=arc, swing=swing).placed(self.points)
+
+    @property
+    def arcs(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) m each: the arc and the swing of the contacts at their corners."""
+        found = self if self.lumped is None else self.lumped
+        return found.arc + np.zeros(len(self)), found.swing + np.zeros(len(self))
+
+    def cornered(self, better: ContactSet) -> ContactSet:
+        """The contacts with springs at the corners of those faces that ``better``, by `misplaced`, has on other
+        parts."""
+        return self.lumped.placed(self.points.but(better.points))
+
+    @cached_property
+    def gap_before(self) -> np.ndarray:
+        """(n,) m from where the faces meet, negative where the vertex penetrates."""
+        return self.geometry[:, 3] - self.lift
+
+    @cached_property
+    def gap(self) -> np.ndarray:
+        """(n,) m: the gap from which the step's straight motion leads to the one at its end."""
+        return self.gap_before + self.arc
+
+    def blocks_of(self, contact: int) -> tuple[int, ...]:
+        """The two blocks of a ``contact``; none for −1."""
+        return () if contact < 0 else (int(self.block[contact]), int(self.other[contact]))
+
+    def __len__(self) -> int:
+        return len(self.vertex)
+
+    def rows(self, settled: Settled, acting: np.ndarray | None = None) -> np.ndarray:
+        """CONTACT rows of the finished step, on the geometry on which it was assembled: ``acting`` (n, 7) of the corners
+        where the forces acted, None where the step began."""
+        geometry, lift, points = self.geometry, self.lift, self.points
+        gap, normal, shear = settled.gap, settled.normal_force, settled.shear_force
+        if points is not None:
+            geometry, lift = points.corners, self.lumped.lift
+            normal, shear = points.at_corners(normal), points.at_corners(shear)
+            gap = points.gap_at_corners(gap)
+        rows = np.empty(len(self), CONTACT)
+        fill(
+            rows, self.vertex, self.edge, self.block, self.other, self.law, self.inset, settled.state, settled.bonded,
+            gap, normal, shear, self.slip, self.wear, settled.slip, lift, settled.lifted,
+            geometry if acting is None else acting, np.ascontiguousarray(geometry[:, 4]), self.tilt,
+            (self if self.lumped is None else self.lumped).springs.normal,
+        )  # fmt: skip
+        if points is not None:
+            rows["bare"][points.ends] = np.abs(points.part - [0.0, 1.0])
+        if np.any(settled.stretch):
+            rows["stretch"] = settled.stretch
+        return rows

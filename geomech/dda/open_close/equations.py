@@ -1,0 +1,252 @@
+"""The equations of a step in given contact states: what motion they make, and what states it calls for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import OPEN, SLIP
+from ..joint_laws.bonds import BondedFaces, check_faces, first_to_break
+from ..joint_laws.coulomb_return import check_states, contact_forces
+from ..joint_laws.nonlinear_laws import CurvedJoints
+from ..joint_laws.penalty_springs import Springs
+from ..linear_solver import assembly
+from ..linear_solver.block_solver import RESIDUAL
+from .contact_set import ContactSet
+from .local_complementarity import clusters, settled_together, with_neighbours
+from .settled_states import Settled
+
+#: No more than so many contacts have their states sought together.
+_JOINED = 80
+#: What solutions with residuals below this part of the forces tell wrong states is not asked for more digits.
+_ROUGHLY = 1e-8
+#: Bonds that come to their strengths within this part of the same load break at once.
+_AT_ONCE = 1e-6
+
+
+class Unsettled(Exception):
+    """The open–close iterations found no consistent states; ``contact`` is the row that still disagrees (or −1)."""
+
+    def __init__(self, reason: str, contact: int = -1) -> None:
+        super().__init__(reason)
+        self.contact = contact
+
+
+def plastic_slip(forces: np.ndarray, state: np.ndarray, shear_force: np.ndarray, springs: Springs) -> np.ndarray:
+    """(n,) m of slip in the step: the motion of sliding contacts without what their shear springs took up."""
+    return np.where(state == SLIP, forces[:, 3] - (shear_force - forces[:, 1]) / springs.shear, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """What each contact (n,) is tried as."""
+
+    state: np.ndarray
+    direction: np.ndarray
+    bonded: np.ndarray
+
+    @property
+    def key(self) -> bytes:
+        return self.state.tobytes() + self.direction.tobytes() + self.bonded.tobytes()
+
+    def without_open_bonds(self) -> States:
+        """These states, without the bonds that are open."""
+        return States(self.state, self.direction, np.where(self.state == OPEN, 0, self.bonded))
+
+    def switched(self, wrong: np.ndarray, to: States) -> States:
+        """These states, and where ``wrong`` those of ``to``."""
+        pairs = ((self.state, to.state), (self.direction, to.direction), (self.bonded, to.bonded))
+        return States(*(np.where(wrong, theirs, mine) for mine, theirs in pairs))
+
+    def sliding(self, which: np.ndarray, shear: np.ndarray) -> States:
+        """These states, with the contacts ``which`` that have no bond sliding under ``shear`` (n,) N."""
+        which = which & (self.bonded == 0) & (shear != 0)
+        return States(np.where(which, SLIP, self.state), np.where(which, np.sign(shear), self.direction), self.bonded)
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The motion (6 n,) and forces (n, 4) that states make, the states they call for, by how much each is wrong (N),
+    whether the lines agree with curved laws, and the lines."""
+
+    unknowns: np.ndarray
+    forces: np.ndarray
+    called: States
+    violation: np.ndarray
+    missed: np.ndarray | None
+    slip: np.ndarray
+    springs: Springs
+    gap: np.ndarray
+
+
+@dataclass(eq=False)
+class Equations:
+    """The step's equations but for the states; arguments as for `settle`."""
+
+    pattern: assembly.Pattern
+    matrix: np.ndarray
+    right: np.ndarray
+    found: ContactSet
+    vectors: np.ndarray
+    springs: Springs
+    gap: np.ndarray
+    slack: np.ndarray
+    curved: CurvedJoints | None
+    statics: bool
+    expected: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        self._data = np.empty(self.pattern.size)
+        self._side = np.empty(6 * self.pattern.n)
+        self._held: tuple[np.ndarray, ...] | None = None
+        self._near: np.ndarray | None = None
+        self._force = float(np.abs(self.right).max(initial=0.0))
+        self._sides = assembly.sides_of(self.pattern.n, self.pattern.order, self.found.block, self.found.other)
+
+    def room(self) -> np.ndarray:
+        """The flat matrix, for others to fill until the next answer: one of 100 000 blocks takes 200 MB."""
+        self._held = None
+        return self._data
+
+    def together(self, which: np.ndarray, states: States, answer: Answer, budget: int) -> tuple[States | None, int]:
+        """``states`` with those of the contacts ``which`` (n,) bool sought together, those that have a free block in
+        common at a time; where none are found, as the ``answer`` calls for. And the solutions spent; None where they
+        would be more than the ``budget``."""
+        found, spent = self.found, 0
+        fixed = found, self.vectors, answer.springs, answer.gap
+        parts = clusters(which, found, self.pattern.order)
+        if 2 * which.sum() + len(parts) > budget:
+            return None, 0
+        for some in parts:
+            proposal = None
+            wider = with_neighbours(some, states.state, states.bonded, found, self.pattern.order)
+            for group in (some, wider):
+                cost = 2 * int(group.sum()) + 1
+                if proposal is None and group.sum() <= _JOINED and spent + cost <= budget:
+                    spent += cost
+                    try:
+                        proposal = settled_together(
+                            group,
+                            states.state,
+                            states.direction,
+                            self.pattern,
+                            self.matrix,
+                            self.right,
+                            *fixed,
+                            self.room,
+                        )
+                    except np.linalg.LinAlgError:
+                        # In statics nothing else may hold their blocks.
+                        break
+            called = some & (answer.violation > 0)
+            states = states.switched(called, answer.called) if proposal is None else States(*proposal, states.bonded)
+        return states, spent
+
+    def answer(self, states: States, normal_force: np.ndarray, slip: np.ndarray) -> Answer:
+        """Solve with ``states``; forces and slip (n,) as last known bend the lines of curved laws. Raises
+        `Unsettled`."""
+        pattern, found, springs, gap = self.pattern, self.found, self.springs, self.gap
+        state, direction, bonded = states.state, states.direction, states.bonded
+        if self.curved is not None:
+            plastic = np.where(state == SLIP, slip, 0.0)
+            springs, gap = self.curved.lines(
+                self.springs, self.gap, found, state, direction, bonded, normal_force, plastic
+            )
+        symmetric, held = assembly.assemble_contacts(
+            pattern, self._data, self._side, self.matrix, self.right, pattern.upper, pattern.lower, found.block,
+            found.other, pattern.order, self.vectors, state, direction, gap, springs.normal, springs.shear,
+            springs.friction, springs.sliding, springs.lift, found.shear, self._sides, self._held,
+        )  # fmt: skip
+        # Dense matrices are overwritten by their factors, links added to all.
+        self._held = held if pattern.solver is not None and pattern.links is None else None
+        if self._held is not None:
+            answer = self._answered(states, springs, gap, slip, symmetric, _ROUGHLY)
+            forces = max(self._force, float(np.abs(self._side).max(initial=0.0)))
+            if (answer.violation > 0).any() or pattern.solver.left <= RESIDUAL * forces:
+                return answer
+        return self._answered(states, springs, gap, slip, symmetric, RESIDUAL)
+
+    def _answered(
+        self, states: States, springs: Springs, gap: np.ndarray, slip: np.ndarray, symmetric: bool, within: float
+    ) -> Answer:
+        """The answer of the system as it is assembled, of lines with these ``springs`` and ``gap``, solved to a residual
+        ``within`` that part of the forces."""
+        pattern, found = self.pattern, self.found
+        state, direction, bonded = states.state, states.direction, states.bonded
+        try:
+            unknowns = assembly.solve(
+                pattern, self._data, self._side, symmetric, self._force, near=self._near, within=within
+            )
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        if not np.isfinite(unknowns).all():
+            raise Unsettled("the step's matrix is singular")
+        self._near = unknowns
+        forces = contact_forces(
+            unknowns, found.block, found.other, pattern.order, self.vectors, state, direction, gap, springs.normal,
+            springs.shear, springs.friction, springs.sliding, springs.lift, found.shear,
+        )  # fmt: skip
+        known, missed = springs, None
+        if self.curved is not None:
+            slip = plastic_slip(forces, state, found.shear, springs)
+            known, known_gap = self.curved.lines(
+                self.springs, self.gap, found, state, direction, bonded, forces[:, 0], slip
+            )
+            missed = self.curved.misfit(springs, gap, known, known_gap, state, forces)
+        *called, violation = check_states(
+            forces, state, direction, bonded, known.normal, known.shear, known.friction, known.sliding,
+            known.peak, known.hold, known.cohesion, known.tension, known.keeps, found.shear, self.slack,
+        )  # fmt: skip
+        if (faces := found.faces) is not None:
+            check_faces(
+                faces.start, faces.rows, faces.arm, faces.length, forces, found.normal, found.shear, state, bonded,
+                known.normal, known.shear, known.friction,
+                known.peak, known.hold, known.cohesion, known.tension, known.keeps, self.slack, *called, violation,
+            )  # fmt: skip
+        return Answer(unknowns, forces, States(*called), violation, missed, slip, springs, gap)
+
+    def first_bonds(self, states: States, answer: Answer, which: np.ndarray) -> np.ndarray:
+        """(n,) True for those of the bonds ``which`` (n,) bool that break first on either of their blocks' faces, as a
+        load that grows evenly over the step would break them."""
+        found, springs = self.found, answer.springs
+        faces = BondedFaces.none() if found.faces is None else found.faces
+        when = first_to_break(
+            faces.start, faces.rows, faces.arm, faces.length, answer.forces, found.normal, found.shear, states.state,
+            states.bonded, answer.called.bonded, springs.peak, springs.hold, springs.cohesion, springs.tension,
+        )  # fmt: skip
+        when[~which] = np.inf
+        first = np.full(len(self.pattern.order), np.inf)
+        for blocks in (found.block, found.other):
+            np.minimum.at(first, blocks, when)
+        first[self.pattern.order < 0] = np.inf
+        least = np.minimum(first[found.block], first[found.other])
+        return which & (when <= least + _AT_ONCE * np.abs(least))
+
+    def settled(self, states: States, answer: Answer, iterations: int) -> Settled:
+        """The ``answer`` of consistent ``states``; bonds that hold no pull are lost where they are open by more than gaps
+        are known to: a face that opens by a micrometre because of how springs share its load, and closes as that
+        grows, is whole."""
+        forces, springs = answer.forces, answer.springs
+        known = np.maximum(self.slack, self.found.precision)
+        open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > known)
+        if self.found.whole is not None:
+            open_bonds &= ~self.found.whole.touch(states.state)
+        lifted = np.zeros(len(forces))
+        slip = plastic_slip(forces, states.state, self.found.shear, springs)
+        if self.curved is not None:
+            along = forces[:, 3] + self.found.stretch
+            lifted = springs.lift * np.where(springs.lift * states.direction < 0, slip, along)
+        return Settled(
+            unknowns=answer.unknowns.reshape(-1, 6),
+            state=states.state,
+            direction=states.direction,
+            bonded=np.where(open_bonds, 0, states.bonded),
+            normal_force=forces[:, 0],
+            shear_force=forces[:, 1],
+            gap=forces[:, 2] + springs.lift * forces[:, 3] - lifted - (answer.gap - self.found.gap),
+            slip=slip,
+            lifted=lifted,
+            springs=springs,
+            iterations=iterations,
+        )

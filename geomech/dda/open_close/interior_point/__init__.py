@@ -1,0 +1,1 @@
+"""Contact states along the central path of the complementarity problem."""

@@ -1,0 +1,328 @@
+"""Contact states found along the central path: what to try when switching contact by contact leads nowhere.
+
+Where many contacts open, close and slide at once, as in a wall on which its weight is put suddenly, each set of states
+moves the blocks so far that most of the next set is wrong too. The interior-point method never decides: every contact
+keeps a force N > 0 and a gap w > 0, and sliding contacts slip rates α, β > 0 beside the strengths S has left on either
+side,
+
+    w = g + N/kₙ,   N w = ε,       (μN + c ∓ S) (α, β) = ε,   Δs + (S − S₀)/kₛ = β − α,
+
+and ε is driven to zero by Newton's method with Mehrotra's (1992) predictor and corrector and Gondzio's (1996) further
+correctors, which bring products far from ε back towards it, for the linear complementarity problem of Coulomb friction
+in an implicit step (Klarbring 1986; Stewart & Trinkle 1996). Eliminated, a contact is a spring between stiff and none,
+so that each iteration is one factorisation of the matrix of the open–close iterations. Where steps become short the
+contacts are centred again about the motion at hand, with a larger ε. Bonds hold, as springs: whether they break is
+asked when all else is right. Friction on the present normal force is no gradient of an energy and nothing guarantees
+the end; what comes out is only a proposal, and the open–close iterations go on from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ....compiled import kept
+from ....model import OPEN, SLIP, STICK
+from ...contact_detection.contact_finder import ContactSet
+from ...joint_laws.coulomb_return import moved
+from ...joint_laws.penalty_springs import Springs
+from ...linear_solver import assembly
+from .contact_terms import LEAST_LEFT, SHORT_OF
+from .newton_steps import THREADED, PathSteps
+
+#: The bond of a contact that has slipped and not lost all cohesion: it may slide.
+SLIPPED = 2
+#: ε is counted in units of the squared load on the blocks about a contact over its stiffness. It starts at so many
+#: times the mean of N²/kₙ in the last open–close iteration (slopes of 400 to 1 000 blocks: 1 takes a third more
+#: iterations, 1 000 walls a tenth more), and not below the second number.
+_START, _LEAST_START = 100.0, 0.1
+#: Further correctors of a step at most, sought while it goes less far than this (with four, paths of slopes come to an
+#: end sooner; with none they take a quarter more iterations), …
+_CORRECTORS, _FAR = 3, 0.9
+#: … for steps longer by a factor and an amount, and that are worth while where a step gets so much of this.
+_FARTHER, _FURTHER, _GAIN = 1.2, 0.1, 0.1
+#: So often contacts are centred again where steps have become short, with so much larger an ε than then (with the same
+#: one the path ends where it did).
+_AGAIN, _LARGER = 4, 10.0
+#: A contact's load is the largest within so many blocks of it. (With the load of its own two blocks a pebble below a
+#: large block stops the path at once; with so many, slopes of 400 to 1 000 blocks take a tenth fewer iterations too.)
+_PASSED_ON = 3
+#: Where the step is as short as that because of so small a part of the contacts (or so few), those alone are centred
+#: again about the motion that the others allow, with so much larger an ε, at most so many times: those that stop it
+#: before so much of the way, and with none larger than at the start. (Friction on two neighbours' corners may leave no
+#: way along the path. On a slope of 1 000 blocks that slides, steps for which all contacts were centred again, in vain,
+#: took 250 iterations and now take 40; with ε 100 times larger one in three still does.)
+_ALONE, _ALONE_FEW, _ALONE_FAR, _ALONE_LARGER, _ALONE_AGAIN = 0.005, 8, 0.3, 1000.0, 40
+#: ε, in the units of the start, below which only round-off is left to decide; steps shorter than this lead nowhere, …
+_END, _STUCK = 1e-14, 1e-3
+#: … and so many in a row that are shorter than this, hardly.
+_BLOCKED, _SHORT = 5, 0.05
+#: Residual of a step, relative to its right side: what is left, the next step finds in the balance of forces. The
+#: predictor needs it too: a slope of 976 blocks under sudden weight takes 27 to 144 iterations with 1e-4 of that one
+#: alone, as the last digits fall, and 27 with 1e-5. (Walls ask for no more than 1e-4.)
+WITHIN = 1e-5
+
+
+@kept(fastmath={"contract"}, error_model="numpy", nogil=True)
+def add_forces(right, block, other, order, vectors, normal, shear):
+    """Add to ``right`` (6 n,) the forces ``normal`` and ``shear`` (n_contacts,) on the blocks."""
+    for c in range(block.shape[0]):
+        push, drag, n, t = normal[c], shear[c], vectors[c, 0], vectors[c, 1]
+        for side in range(2):
+            i, k = order[block[c]] if side == 0 else order[other[c]], 6 * side
+            if i < 0:
+                continue
+            here = right[6 * i : 6 * i + 6]
+            # All six before any is stored: only so they become vectors.
+            r0, r1 = here[0] + push * n[k] + drag * t[k], here[1] + push * n[k + 1] + drag * t[k + 1]
+            r2, r3 = here[2] + push * n[k + 2] + drag * t[k + 2], here[3] + push * n[k + 3] + drag * t[k + 3]
+            r4, r5 = here[4] + push * n[k + 4] + drag * t[k + 4], here[5] + push * n[k + 5] + drag * t[k + 5]
+            here[0], here[1], here[2], here[3], here[4], here[5] = r0, r1, r2, r3, r4, r5
+
+
+def solution_of(pattern: assembly.Pattern, data: np.ndarray) -> Callable[..., np.ndarray]:
+    """What solves with the matrix of ``data`` for one right side after the other, to a residual ``within`` that part of
+    it. Raises numpy.linalg.LinAlgError."""
+    pattern.add_links(data)
+    if pattern.solver is not None:
+        return pattern.solver.rough_solution(data)
+    from scipy.linalg.lapack import dgetrf, dgetrs
+
+    factors, pivots, info = dgetrf(data.reshape(6 * pattern.n, -1))
+    if info != 0:
+        raise np.linalg.LinAlgError(f"the step's matrix is singular (unknown {info - 1})")
+    return lambda right, within=WITHIN: dgetrs(factors, pivots, right)[0]
+
+
+class CentralPath:
+    """The path of one step's contacts, from no motion on; arguments as for `settle`, ``bonded`` (n,) the bonds, which
+    hold, ``forces`` (n,) N normal forces of the size to be expected, ``room`` gives each iteration the flat
+    matrix to fill; without, it takes its own. ``expected`` (6 n,) is the motion to begin with, that of the velocities,
+    None for none.
+
+    ``missed``: what is left out of balance, over the largest load; ``epsilon``: ε, in units of the squared loads over their
+    stiffness.
+    """
+
+    def __init__(
+        self,
+        pattern: assembly.Pattern,
+        matrix: np.ndarray,
+        right: np.ndarray,
+        found: ContactSet,
+        vectors: np.ndarray,
+        springs: Springs,
+        gap: np.ndarray,
+        bonded: np.ndarray,
+        forces: np.ndarray,
+        room: Callable[[], np.ndarray] | None = None,
+        expected: np.ndarray | None = None,
+    ) -> None:
+        self._pattern, self._matrix, self._right = pattern, matrix, right
+        self._n, self.bonded = len(found), bonded
+        slipped = bonded == SLIPPED
+        some, held = (np.flatnonzero(which) for which in ((bonded == 0) | slipped, (bonded > 0) & ~slipped))
+        order = pattern.order
+        if pattern.n >= THREADED:
+            # Beyond what caches hold, in the order of their blocks: what contacts need of one another then lies near.
+            one, two = order[found.block[some]], order[found.other[some]]
+            some = some[np.argsort(np.maximum(one, two) * pattern.n + np.minimum(one, two), kind="stable")]
+        self._some, self._held = some, held
+
+        def at(rows: np.ndarray) -> tuple[np.ndarray, ...]:
+            return found.block[rows], found.other[rows], order, np.ascontiguousarray(vectors[rows])
+
+        self._at, self._held_at = at(some), at(held)
+        self._all_at = at(np.concatenate([some, held])) if len(held) else self._at
+        self._sides = assembly.sides_of(pattern.n, order, *self._all_at[:2])
+        blocks, others, _, directions = self._at
+        self._steps = PathSteps(pattern.n, order[blocks], order[others], directions, springs.lift[some])
+        self._upper, self._lower, self._all_lift = (
+            np.concatenate([array[some], array[held]]) for array in (pattern.upper, pattern.lower, springs.lift)
+        )
+        # Bonds are springs either way.
+        self._bonds = springs.normal[held], springs.shear[held], gap[held], found.shear[held]
+        self._kn, self._ks = springs.normal[some], springs.shear[some]
+        self._rise = np.zeros(len(some))
+        slides = found.state[some] == SLIP
+        friction = np.where(slides, springs.friction[some], springs.peak[some])
+        firm = np.where(
+            slides, springs.sliding[some], springs.hold[some] + np.where(slipped, springs.cohesion, 0.0)[some]
+        )
+        self._rough = (friction > 0.0) | (firm > 0.0)
+        self._mu, self._base = np.where(self._rough, friction, 1.0), np.where(self._rough, firm, 0.0)
+
+        start = np.zeros(right.size) if expected is None else expected
+        # What moves on by itself is no load.
+        left = right - pattern.without_contacts(matrix, start)
+        load = np.append(np.abs(left).max(axis=1, initial=0.0), 0.0)
+        mine, others = order[self._at[0]], order[self._at[1]]
+        # Small blocks pass on what large ones press them with: contacts in units of a small block's own load would have
+        # forces that are nothing beside what they must balance, and no step of the path would get anywhere.
+        for _ in range(_PASSED_ON):
+            known = load.copy()
+            np.maximum.at(load, mine, known[others])
+            np.maximum.at(load, others, known[mine])
+            load[-1] = 0.0
+        load = np.maximum(load[mine], load[others])
+        # Blocks without load share a little of the others'; without any, any unit will do.
+        load = np.maximum(load, 1e-3 * load.mean()) if load.any() else np.ones(len(some))
+        self._unit = load * load / self._kn
+        self._room = room
+        self._unknowns = start.copy()
+        # Motions: what makes the gap and the motion along the edge 0 where no force acts.
+        apart, along = moved(start, *self._at).T
+        self._g = gap[some] + apart - springs.lift[some] * along
+        self._s = along - found.shear[some] / self._ks
+        self._load = max(float(np.abs(left).max()), 1e-300)
+        mean = float(np.mean(forces[some] ** 2 / self._kn / self._unit)) if len(some) else 0.0
+        self._start = max(_START * mean, _LEAST_START)
+        self._begin(self._start)
+
+    @property
+    def blocked(self) -> bool:
+        """Whether the last iterations hardly got ahead."""
+        return self._blocked >= _BLOCKED
+
+    @property
+    def stopped(self) -> bool:
+        """Whether contacts had to be centred again for the path to go on."""
+        return self._lone + self._again > 0
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the path ended where only round-off is left to decide."""
+        return self.ended and not self.epsilon > _END
+
+    @property
+    def unknowns(self) -> np.ndarray:
+        """(6 n,) the motion at hand."""
+        return self._unknowns
+
+    def _begin(self, epsilon: float) -> None:
+        """Begin with ``epsilon``, centred about the motion at hand."""
+        self.epsilon, self.missed, self.ended = epsilon, 1.0, not len(self._some)
+        self._blocked, self._again, self._lone = 0, 0, 0
+        self._centre(epsilon * self._unit)
+
+    def _centre(self, epsilon: np.ndarray) -> None:
+        """Forces, gaps and slips (n,) that fit the motion at hand and have all products at ``epsilon`` (n,) J."""
+        # The roots of w² − g w = ε/kₙ and of its like for N/kₙ, of which the smaller would cancel: their product is
+        # ε/kₙ.
+        larger = 0.5 * (np.sqrt(self._g**2 + 4.0 * epsilon / self._kn) + np.abs(self._g))
+        smaller = epsilon / self._kn / larger
+        self._width = np.where(self._g > 0.0, larger, smaller)
+        self._normal = self._kn * np.where(self._g > 0.0, smaller, larger)
+        strength = self._mu * self._normal + self._base
+        low, high = -strength, strength
+        # Nearer to the strength than its round-off S is not known, and nothing would be left to divide by.
+        least = LEAST_LEFT * strength
+        for _ in range(50):
+            shear = 0.5 * (low + high)
+            below, above = np.maximum(strength + shear, least), np.maximum(strength - shear, least)
+            less = shear / self._ks + self._s < epsilon / below - epsilon / above
+            low, high = np.where(less, shear, low), np.where(less, high, shear)
+        self._shear = np.where(self._rough, 0.5 * (low + high), 0.0)
+        self._slip = epsilon / np.stack(self._left())
+
+    def _left(self) -> tuple[np.ndarray, np.ndarray]:
+        """The strength left against sliding either way, N: above and below S."""
+        strength = self._mu * self._normal + self._base
+        least = LEAST_LEFT * strength
+        return np.maximum(strength - self._shear, least), np.maximum(strength + self._shear, least)
+
+    def advance(self) -> int:
+        """Go on by one iteration; the number of contacts still undecided. Raises numpy.linalg.LinAlgError."""
+        if self.ended:
+            return 0
+        pattern, steps, unit = self._pattern, self._steps, self._unit
+        total = steps.linearise(
+            (self._normal, self._width, self._slip, self._shear, self._g, self._s),
+            (self._kn, self._ks, self._mu, self._base, self._rough, self._rise, unit),
+            (self._right - pattern.without_contacts(self._matrix, self._unknowns)).ravel(),
+        )
+        epsilon = total / float((1 + 2 * self._rough).sum())
+        residual, laws = steps.residual, steps.laws
+        kn_held, ks_held, gap_held, before_held = self._bonds
+        springs = list(np.ascontiguousarray(laws.T[1:]))
+        if len(kn_held):
+            held = moved(self._unknowns, *self._held_at, self._all_lift[len(self._kn) :])
+            pulled, sheared = -kn_held * (gap_held + held[:, 0]), before_held - ks_held * held[:, 1]
+            add_forces(residual, *self._held_at, pulled, sheared)
+            none = np.zeros(len(kn_held))
+            springs = [np.concatenate(pair) for pair in zip(springs, (kn_held, ks_held, none, none), strict=True)]
+        stiff, stiff_along, slope, climb = springs
+        data = np.empty(pattern.size) if self._room is None else self._room()
+        assembly.assemble(
+            pattern, data, self._matrix, self._upper, self._lower, *self._all_at, stiff, stiff_along, slope,
+            self._all_lift - climb, self._sides,
+        )  # fmt: skip
+        solution = solution_of(pattern, data)
+
+        def solve(side: np.ndarray) -> np.ndarray:
+            return solution(side, WITHIN)
+
+        steps.predict(solve)
+        steps.accept()
+        target = epsilon * (steps.products() / total) ** 3
+        far = steps.correct(solve, target)
+        steps.accept()
+        for _ in range(_CORRECTORS):
+            if far > _FAR:
+                break
+            wanted = min(1.0, _FARTHER * far + _FURTHER)
+            if steps.centre(solve, target, wanted) < far + _GAIN * (wanted - far):
+                break
+            steps.accept()
+            far = steps.step.far
+        alone = None
+        if far < _SHORT and self._lone < _ALONE_AGAIN:
+            far, alone = self._without_few(steps.numbers.T, steps.step.changed.T, far)
+        self._unknowns += far * steps.step.unknowns
+        undecided = steps.go(far)
+        self.missed = (1.0 - far) * float(np.abs(residual).max()) / self._load
+        if alone is not None:
+            self._lone += 1
+            self._centre_alone(alone, max(epsilon, min(_ALONE_LARGER * epsilon, self._start)))
+        self._blocked = self._blocked + 1 if far < _SHORT else 0
+        self.epsilon = epsilon
+        if epsilon > _END and self._again < _AGAIN and (self.blocked or not far > _STUCK):
+            self._again += 1
+            self._blocked, self.epsilon = 0, _LARGER**self._again * epsilon
+            self._centre(self.epsilon * unit)
+            return len(self._g)
+        self.ended = not (epsilon > _END and far > _STUCK)
+        return undecided
+
+    def _without_few(self, numbers: np.ndarray, changed: np.ndarray, far: float) -> tuple[float, np.ndarray | None]:
+        """How far the changes (6, n) may go but for few contacts, and these, (n,) True; ``far`` and None where they
+        are many."""
+        falling = changed < 0.0
+        falling[2:] &= self._rough
+        reach = np.where(falling, -numbers / np.where(falling, changed, -1.0), np.inf).min(axis=0)
+        few = reach < _ALONE_FAR
+        if few.sum() > max(_ALONE_FEW, _ALONE * len(few)):
+            return far, None
+        return min(1.0, SHORT_OF * float(reach[~few].min(initial=np.inf))), few
+
+    def _centre_alone(self, which: np.ndarray, epsilon: float) -> None:
+        """`_centre` those contacts only. What that leaves out of balance is for the next step to find."""
+        known = self._normal, self._width, self._shear, self._slip
+        self._centre(epsilon * self._unit)
+        again = self._normal, self._width, self._shear, self._slip
+        self._normal, self._width, self._shear, self._slip = (
+            np.where(which, new, old) for new, old in zip(again, known, strict=True)
+        )
+        self.missed = 1.0
+
+    def states(self) -> tuple[np.ndarray, np.ndarray]:
+        """States and directions (n,) that the contacts approach."""
+        above, below = self._left()
+        sliding = np.where(self._ks * self._slip[0] > above, 1.0, np.where(self._ks * self._slip[1] > below, -1.0, 0.0))
+        closed = np.where(self._rough & (sliding == 0.0), STICK, SLIP)
+        state, direction = np.full(self._n, OPEN), np.zeros(self._n)
+        state[self._held] = STICK
+        state[self._some] = np.where(self._kn * self._width > self._normal, OPEN, closed)
+        direction[self._some] = np.where(self._rough & (state[self._some] == SLIP), sliding, 0.0)
+        return state, direction

@@ -1,0 +1,201 @@
+"""The contacts of one iteration of the central path, in compiled loops; see `central_path` for what the numbers are.
+
+Arrays of six columns (n, 6) are N, w, α, β and the strengths left above and below S; the products are those of N and w, of
+α and the strength above, of β and the one below. Of divisions, which take most of the time, there are as few as can be.
+Functions go through contacts from ``first`` to before ``last``, and what they sum is theirs. (Numbers without a sign,
+for with one every index is asked whether it counts from the end.)
+"""
+
+from __future__ import annotations
+
+from numba import uintp
+
+from ....compiled import kept
+
+# Sums in their order: told that they may be taken in another, LLVM makes vectors of several contacts' records, at three
+# times the time.
+_jit = kept(fastmath={"contract"}, error_model="numpy", nogil=True)
+
+#: No step goes farther than this part of the way to where a force or a gap vanishes.
+SHORT_OF = 0.99
+#: The part of a contact's strength that is left at least, however hard it is sheared: the round-off of their
+#: difference.
+LEAST_LEFT = 1e-14
+
+
+@_jit
+def linearise(
+    first, last, normals, widths, slip, shear, gap, along, kn, ks, mu, base, rough, rise, unit, numbers, missed, laws,
+    pulled,
+):  # fmt: skip
+    """The ``numbers`` (n, 6) of what is at hand, N ``normals`` (n,), w ``widths`` (n,), α and β ``slip`` (2, n) and S
+    ``shear`` (n,); what is ``missed`` (n, 2) m of gap and slip, and ``laws`` by which
+    contacts answer motions (n, 5): N m by which the product of N and w goes with N, −∂N/∂g, −∂S/∂s, ∂S/∂N, and by how
+    much the motion along the edge lifts; returns the sum of the products, each in its ``unit`` (n,) J. What is
+    ``pulled`` then, see `pull`, are the forces at hand."""
+    total = 0.0
+    for c in range(uintp(first), uintp(last)):
+        normal, width, back, ahead = normals[c], widths[c], slip[0, c], slip[1, c]
+        strength = mu[c] * normal + base[c]
+        least = LEAST_LEFT * strength
+        above, below = max(strength - shear[c], least), max(strength + shear[c], least)
+        flat = normal / kn[c]
+        missed[c, 0] = gap[c] + flat - width - rise[c] * (back + ahead)
+        missed[c, 1] = along[c] + shear[c] / ks[c] - (ahead - back)
+        less, more = back / above, ahead / below
+        stiff = ks[c] / (1.0 + ks[c] * (less + more)) if rough[c] else 0.0
+        slope = stiff * mu[c] * (less - more)
+        soft = width + flat + normal * rise[c] * (mu[c] * (less + more) - slope * (less - more))
+        numbers[c, 0], numbers[c, 1], numbers[c, 2] = normal, width, back
+        numbers[c, 3], numbers[c, 4], numbers[c, 5] = ahead, above, below
+        laws[c, 0], laws[c, 1], laws[c, 2], laws[c, 3] = soft, normal / soft, stiff, slope
+        laws[c, 4] = rise[c] * stiff * (less - more)
+        pulled[c, 0], pulled[c, 2] = normal, shear[c]
+        own = normal * width
+        if rough[c]:
+            own += back * above + ahead * below
+        total += own / unit[c]
+    return total
+
+
+@_jit
+def pull(first, last, goals, numbers, missed, laws, rise, pulled):
+    """``pulled`` (n, 3) N of a Newton step where blocks stand still: normal forces, shear forces without what answers
+    these, and with it. ``goals`` (n, 3) J for the products; slip lifts by ``rise``."""
+    for c in range(uintp(first), uintp(last)):
+        normal, width, above, below = numbers[c, 0], numbers[c, 1], numbers[c, 4], numbers[c, 5]
+        # One division for both.
+        share = 1.0 / (above * below)
+        more, less = goals[c, 2] * above * share - numbers[c, 3], goals[c, 1] * below * share - numbers[c, 2]
+        slid = more - less - missed[c, 1]
+        risen = laws[c, 4] * slid + (rise[c] * (more + less) if rise[c] > 0.0 else 0.0)
+        given = (goals[c, 0] - normal * (width + missed[c, 0] - risen)) / laws[c, 0]
+        sheared = laws[c, 2] * slid
+        pulled[c, 0], pulled[c, 1], pulled[c, 2] = given, sheared, sheared + laws[c, 3] * given
+
+
+@_jit
+def change(
+    first, last, unknowns, mine, theirs, vectors, lift, goals, numbers, missed, pulled, laws, kn, mu, rough, rise,
+    motion, changed, sheared,
+):  # fmt: skip
+    """The ``motion`` (n, 2) m of contacts that a step of the ``unknowns`` (6 n_blocks,) makes, gaps without what
+    sliding lifts, and what follows of it: how the numbers have ``changed`` (n, 6), S has ``sheared`` (n,), and how far
+    along that positive numbers stay so, at most 1. ``mine`` and ``theirs`` (n,) are the places of a contact's blocks,
+    −1 for fixed ones, ``pulled`` what `pull` gives."""
+    far = 1.0
+    for c in range(uintp(first), uintp(last)):
+        apart = along = 0.0
+        n, t = vectors[c, 0], vectors[c, 1]
+        # Six at once: only so they become vectors.
+        if mine[c] >= 0:
+            u = unknowns[6 * mine[c] : 6 * mine[c] + 6]
+            apart += n[0] * u[0] + n[1] * u[1] + n[2] * u[2] + n[3] * u[3] + n[4] * u[4] + n[5] * u[5]
+            along += t[0] * u[0] + t[1] * u[1] + t[2] * u[2] + t[3] * u[3] + t[4] * u[4] + t[5] * u[5]
+        if theirs[c] >= 0:
+            u = unknowns[6 * theirs[c] : 6 * theirs[c] + 6]
+            apart += n[6] * u[0] + n[7] * u[1] + n[8] * u[2] + n[9] * u[3] + n[10] * u[4] + n[11] * u[5]
+            along += t[6] * u[0] + t[7] * u[1] + t[8] * u[2] + t[9] * u[3] + t[10] * u[4] + t[11] * u[5]
+        apart -= lift[c] * along
+        motion[c, 0], motion[c, 1] = apart, along
+        back, ahead, above, below = numbers[c, 2], numbers[c, 3], numbers[c, 4], numbers[c, 5]
+        pushed = pulled[c, 0] - laws[c, 1] * (apart + laws[c, 4] * along)
+        drawn = pulled[c, 1] - laws[c, 2] * along + laws[c, 3] * pushed
+        more, less = mu[c] * pushed - drawn, mu[c] * pushed + drawn
+        share = 1.0 / (above * below)
+        backward = (goals[c, 1] - back * more) * below * share - back
+        forward = (goals[c, 2] - ahead * less) * above * share - ahead
+        wider = apart + pushed / kn[c] + missed[c, 0]
+        if rise[c] > 0.0:
+            wider -= rise[c] * (backward + forward)
+        changed[c, 0], changed[c, 1], changed[c, 2], changed[c, 3] = pushed, wider, backward, forward
+        changed[c, 4], changed[c, 5], sheared[c] = more, less, drawn
+        for k in range(6 if rough[c] else 2):
+            if -far * changed[c, k] > SHORT_OF * numbers[c, k]:
+                far = -SHORT_OF * numbers[c, k] / changed[c, k]
+    return far
+
+
+@_jit
+def products(numbers, changed, far, rough, unit):
+    """Sum of the products of all contacts, each in its ``unit`` (n,) J, ``far`` along the changes (n, 6)."""
+    total = 0.0
+    for c in range(len(unit)):
+        own = (numbers[c, 0] + far * changed[c, 0]) * (numbers[c, 1] + far * changed[c, 1])
+        if rough[c]:
+            own += (numbers[c, 2] + far * changed[c, 2]) * (numbers[c, 4] + far * changed[c, 4])
+            own += (numbers[c, 3] + far * changed[c, 3]) * (numbers[c, 5] + far * changed[c, 5])
+        total += own / unit[c]
+    return total
+
+
+@_jit
+def second_order(first, last, epsilon, unit, changed, goals):
+    """``goals`` (n, 3) J: what products are to be at first for ``epsilon`` units each, after what their factors'
+    changes make."""
+    for c in range(uintp(first), uintp(last)):
+        target = epsilon * unit[c]
+        goals[c, 0] = target - changed[c, 0] * changed[c, 1]
+        goals[c, 1] = target - changed[c, 2] * changed[c, 4]
+        goals[c, 2] = target - changed[c, 3] * changed[c, 5]
+
+
+@_jit
+def nearer(first, last, epsilon, unit, wanted, spread, numbers, changed, goals, better):
+    """``better`` (n, 3) J: ``goals`` corrected so that products which the step, taken as far as ``wanted``, would leave
+    beyond a factor ``spread`` of ``epsilon`` units come back to there, by no more than that above it (Gondzio 1996)."""
+    for c in range(uintp(first), uintp(last)):
+        target = epsilon * unit[c]
+        low, high = target / spread, target * spread
+        for k in range(3):
+            i, j = (0, 1) if k == 0 else (k + 1, k + 3)
+            product = (numbers[c, i] + wanted * changed[c, i]) * (numbers[c, j] + wanted * changed[c, j])
+            better[c, k] = goals[c, k] + max(min(max(product, low), high) - product, -high)
+
+
+@_jit
+def go(first, last, far, motion, changed, sheared, normals, widths, slip, shear, gap, along):
+    """Go ``far`` along the changes of what is at hand, see `linearise`."""
+    for c in range(uintp(first), uintp(last)):
+        normals[c] += far * changed[c, 0]
+        widths[c] += far * changed[c, 1]
+        slip[0, c] += far * changed[c, 2]
+        slip[1, c] += far * changed[c, 3]
+        shear[c] += far * sheared[c]
+        gap[c] += far * motion[c, 0]
+        along[c] += far * motion[c, 1]
+
+
+@_jit
+def undecided(first, last, normals, widths, slip, shear, kn, ks, mu, base, rough, clear):
+    """How many contacts have a force and a gap, or slip and strength left, that differ by less than a factor ``clear``
+    in units of the stiffness."""
+    number = 0
+    for c in range(uintp(first), uintp(last)):
+        normal, apart = normals[c], kn[c] * widths[c]
+        vague = clear * normal > apart and apart * clear > normal
+        if not vague and rough[c] and apart < normal:
+            strength = mu[c] * normal + base[c]
+            least = LEAST_LEFT * strength
+            above, below = max(strength - shear[c], least), max(strength + shear[c], least)
+            back, ahead = ks[c] * slip[0, c], ks[c] * slip[1, c]
+            vague = (back < clear * above and back * clear > above) or (ahead < clear * below and ahead * clear > below)
+        number += vague
+    return number
+
+
+@_jit
+def balance(first, last, start, side, vectors, pulled, along_normal, along_edge, given, out):
+    """``out`` (6 n_blocks,): the forces ``given`` on blocks from ``first`` to before ``last`` and those of their
+    contacts, the columns ``along_normal`` and ``along_edge`` of ``pulled`` (n, k); ``start`` and ``side`` as from
+    `assembly.sides_of`."""
+    for b in range(uintp(first), uintp(last)):
+        here, mine = given[6 * b : 6 * b + 6], out[6 * b : 6 * b + 6]
+        r0, r1, r2, r3, r4, r5 = here[0], here[1], here[2], here[3], here[4], here[5]
+        for q in range(uintp(start[b]), uintp(start[b + 1])):
+            c, k = uintp(side[q] >> 1), 6 * (side[q] & 1)
+            p, d = pulled[c, along_normal], pulled[c, along_edge]
+            n, t = vectors[c, 0, k : k + 6], vectors[c, 1, k : k + 6]
+            r0, r1, r2 = r0 + p * n[0] + d * t[0], r1 + p * n[1] + d * t[1], r2 + p * n[2] + d * t[2]
+            r3, r4, r5 = r3 + p * n[3] + d * t[3], r4 + p * n[4] + d * t[4], r5 + p * n[5] + d * t[5]
+        mine[0], mine[1], mine[2], mine[3], mine[4], mine[5] = r0, r1, r2, r3, r4, r5

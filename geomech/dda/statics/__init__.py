@@ -1,0 +1,1 @@
+"""Static equilibrium, in-situ stress, and the factor of safety by strength reduction."""

@@ -1,0 +1,135 @@
+"""Which strength is divided before, and along which joints, a factor of safety is sought.
+
+Design codes divide cohesion, tan φ and tensile strength by partial factors γ of their own (as EN 1997-1, 2.4.6.2) and
+ask whether what is left suffices: c/γ_c, tan φ/γ_φ, σₜ/γ_t. The factor that is found then comes on top of them, and
+the design holds from 1 on. Along chosen joints alone strength is reduced by laws of their own for their faces.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+from ...model import JointLaw, Problem
+from .strength_reduction import NothingToReduce
+
+#: What the edges along drawn joints are called: this, and the joint's name.
+_DRAWN = "joint:"
+
+
+@dataclass(frozen=True)
+class PartialFactors:
+    """What ``cohesion``, ``friction`` (tan φ) and tensile strength (``tension``) are divided by, residuals too. Raises
+    `NothingToReduce` for what is not a positive number."""
+
+    cohesion: float = 1.0
+    friction: float = 1.0
+    tension: float = 1.0
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
+                raise NothingToReduce(f"the partial factor on {each.name} must be a positive number, got {value!r}")
+
+    @classmethod
+    def of(cls, given: Mapping[str, float] | Iterable[str] | PartialFactors | None) -> PartialFactors:
+        """From a mapping, or from words as "cohesion=1.25". Raises `NothingToReduce` that names what is wrong."""
+        if given is None or isinstance(given, PartialFactors):
+            return given or cls()
+        if not isinstance(given, Mapping):
+            given = _read([given] if isinstance(given, str) else given)
+        names = [each.name for each in fields(cls)]
+        for name in given:
+            if name not in names:
+                raise NothingToReduce(f"no strength {name!r} to divide; there are {', '.join(names)}")
+        return cls(**given)
+
+    @property
+    def plain(self) -> bool:
+        """Whether nothing is divided."""
+        return self == PartialFactors()
+
+    def design(self, law: JointLaw) -> JointLaw:
+        """``law`` with its strengths divided; an angle of dilation is kept as long as it is below that of friction."""
+        if law.roughness is not None:
+            return replace(
+                law, roughness=replace(law.roughness, reduction=law.roughness.reduction * self.friction)
+            )  # fmt: skip
+
+        def angle(of: float | None) -> float | None:
+            return None if of is None else math.atan(math.tan(of) / self.friction)
+
+        friction = angle(law.friction_angle)
+        return replace(
+            law, friction_angle=friction, residual_friction_angle=angle(law.residual_friction_angle),
+            cohesion=law.cohesion / self.cohesion, residual_cohesion=law.residual_cohesion / self.cohesion,
+            tensile_strength=law.tensile_strength / self.tension, dilation_angle=min(law.dilation_angle, friction),
+        )  # fmt: skip
+
+    def __str__(self) -> str:
+        return f"cohesion by {self.cohesion:g}, tan φ by {self.friction:g}, tensile strength by {self.tension:g}"
+
+
+def _read(words: Iterable[str]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for word in words:
+        name, sign, value = word.partition("=")
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not sign or math.isnan(number):
+            raise NothingToReduce(f"a partial factor is given as cohesion=1.25, not {word!r}")
+        if name in found:
+            raise NothingToReduce(f"the partial factor on {name} is given twice")
+        found[name] = number
+    return found
+
+
+def design_problem(
+    problem: Problem, divide: PartialFactors, along: Sequence[str] | None = None
+) -> tuple[Problem, list[str] | None]:
+    """``problem`` with design strengths, and the names of its laws that are to be reduced (None: all of them).
+
+    ``along`` names joint laws, or joints as they were drawn ("bedding" or "joint:bedding"); faces of the latter get
+    laws of their own, called "LAW along JOINT". Raises `NothingToReduce` for a name that is neither.
+    """
+    laws = [divide.design(law) for law in problem.joints]
+    problem = replace(problem, joints=tuple(laws))
+    if along is None:
+        return problem, None
+    known = {law.name for law in laws}
+    drawn = {name.removeprefix(_DRAWN): name for name in problem.blocks.edge_names if name.startswith(_DRAWN)}
+    chosen: list[str] = []
+    edges: set[str] = set()
+    for name in dict.fromkeys(along):
+        edge = drawn.get(name.removeprefix(_DRAWN))
+        if name in known:
+            chosen.append(name)
+        elif edge is not None:
+            edges.add(edge)
+        else:
+            raise NothingToReduce(
+                f"no joint {name!r} to reduce; there are the joint laws {', '.join(map(repr, sorted(known)))}"
+                + (f", and the joints drawn as {', '.join(map(repr, sorted(drawn)))}" if drawn else "")
+            )
+    for edge in sorted(edges):
+        problem, new = _with_own_laws(problem, edge)
+        chosen += new
+    return problem, chosen
+
+
+def _with_own_laws(problem: Problem, edge: str) -> tuple[Problem, list[str]]:
+    """With laws of their own for the faces whose edges are called ``edge``, and these laws' names."""
+    laws, joint_of, new = list(problem.joints), dict(problem.joint_of), {}
+    for other in problem.blocks.edge_names:
+        law = problem.joint_index(edge, other)
+        if law not in new:
+            new[law] = len(laws)
+            name = f"{problem.joints[law].name} along {edge.removeprefix(_DRAWN)}"
+            laws.append(replace(problem.joints[law], name=name))
+        first, second = sorted((edge, other))
+        joint_of[(first, second)] = new[law]
+    return replace(problem, joints=tuple(laws), joint_of=joint_of), [laws[k].name for k in new.values()]

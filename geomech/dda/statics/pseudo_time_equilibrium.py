@@ -1,0 +1,232 @@
+"""Static equilibrium found by itself: pseudo-time continuation of static steps.
+
+A static step, which carries no velocity, solves (2M/dt² + K) d = F: of what is out of balance its inertia takes the
+part 2M d/dt². Small dt moves blocks gently until contacts have found one another, large dt is Newton's method for
+statics. dt therefore starts at some transits of sound through a block and grows from step to step (pseudo-transient
+continuation: Mulder & van Leer 1985; Kelley & Keyes 1998), until 2M d/dt² is as small as asked for. Where
+nothing holds the blocks it never is, and they move on: a collapse. So is what comes to rest only after it has moved
+farther than strains, joints and bolts explain (`displacement_limit`): a block that slides until it lands on a floor.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...model import OPEN, Loads, State
+from ..kinematics.simplex_integration import block_moments
+from ..results import CrackResponse, NotConverged, StepResult
+from ..system import BlockSystem
+from .displacement_limit import DisplacementLimit
+
+log = logging.getLogger(__name__)
+
+#: One row a static step on the way.
+RELAXATION_STEP = np.dtype(
+    [
+        ("dt", np.float64),  # s, of pseudo-time
+        ("unbalanced", np.float64),  # largest unbalanced force on a block over the mean force on blocks
+        ("kinetic_energy", np.float64),  # J/m, of the motion d/dt
+        ("displacement", np.float64),  # m, largest of a block's centroid in the step
+        ("iterations", np.int64),  # open–close iterations
+        ("cuts", np.int64),
+    ]
+)
+#: The first step is this many transits of sound through the smallest block. A wall of a thousand bricks settles in 103,
+#: 69, 65, 51 and 55 open–close iterations from 10, 30, 100, 300 and 1000 of them, the last after one cut; much shorter
+#: steps change forces by so little that round-off decides about contacts.
+_FIRST_TRANSITS = 100.0
+#: dt grows by this factor from step to step, unless blocks already move nearly as far as a step may move them.
+_GROWTH, _NEARLY = 4.0, 0.3
+#: Blocks that have gone this part of their size √area, with no more balance after so many steps than before them, go
+#: on; what flies freely, with nearly all its weight to move it, may still land. Walls and slopes that stand take 3 to
+#: 15 steps.
+_GONE, _IN_VAIN, _FLYING = 0.05, 25, 0.99
+#: Inertia stays above this part of the contacts' stiffness, so that blocks that nothing pushes stay put.
+_LEAST_INERTIA = 1e-10
+#: Penalty over E', for that comparison.
+_PENALTY = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """Where static relaxation ended.
+
+    state       at the time it began, with no velocity
+    converged   True: the unbalanced force is below the tolerance
+    collapsed   True: there is no equilibrium within reach; ``moving`` says which blocks go, the fastest first
+    reason      one sentence
+    history     RELAXATION_STEP rows, one a step
+    moved       (n_blocks,) m by which the farthest vertex of each block has moved; of blocks that were drawn apart from
+                all others since they have come to rest on one
+    result      the final StepResult: contact forces and what else acted (None if no step was made)
+    """
+
+    state: State
+    converged: bool
+    collapsed: bool
+    moving: tuple[int, ...]
+    reason: str
+    history: np.ndarray
+    moved: np.ndarray
+    result: StepResult | None
+
+
+def equilibrium(
+    system: BlockSystem,
+    state: State,
+    loads: Loads,
+    *,
+    load_time: float | None = None,
+    tolerance: float = 1e-6,
+    max_steps: int = 400,
+    reach: float | None = None,
+    crack: CrackResponse | None = None,
+    watch: Callable[[StepResult, np.void], None] | None = None,
+    limit: DisplacementLimit | None = None,
+) -> Equilibrium:
+    """Find where the blocks of ``system`` come to rest from ``state`` under ``loads`` at ``load_time`` (default:
+    state.time).
+
+    ``tolerance`` bounds the unbalanced force on any block over the mean force on blocks. Blocks that move farther than
+    ``limit`` allows (by default, one that begins here) have collapsed, and are followed to where they come to rest if
+    that is not far. A block that has gone ``reach`` m and is out of balance still is taken to have collapsed, too; by
+    default that is a tenth of the blocks' extent, or a twentieth of the block's own size once the unbalanced force has
+    stopped falling; with a ``reach`` of the caller's there is no other limit. ``watch`` sees every
+    step and its RELAXATION_STEP. Raises ValueError for a tolerance that is not positive; what is not found is told in
+    the answer.
+    """
+    if not tolerance > 0:
+        raise ValueError(f"the tolerance of the unbalanced force must be positive, got {tolerance!r}")
+    blocks = system.blocks
+    static = system if system.scheme.static else system.in_statics()
+    time = state.time if load_time is None else load_time
+    begin = state = replace(state, velocity=np.zeros_like(state.velocity), acceleration=None)
+    free = np.flatnonzero(~blocks.fixed)
+    if not len(free):
+        nothing = np.zeros(blocks.n_blocks)
+        return Equilibrium(state, True, False, (), "nothing moves", np.empty(0, RELAXATION_STEP), nothing, None)
+    judged = reach is None
+    size = np.sqrt(blocks.areas())
+    flights = 0
+    reach = 0.1 * float(np.hypot(*np.ptp(blocks.vertices, axis=0))) if reach is None else reach
+    dt, longest = _pseudo_times(static)
+    history: list[np.void] = []
+    result = None
+    travelled = np.zeros(blocks.n_blocks)
+    limit = limit or DisplacementLimit(static, begin, loads, time)
+    gone: tuple[int, ...] = ()
+
+    def answer(converged: bool, collapsed: bool, reason: str) -> Equilibrium:
+        moving = gone
+        if not converged and not gone and result is not None:
+            speed = np.hypot(*result.state.velocity[:, :2].T)
+            order = np.argsort(-speed, kind="stable")
+            moving = tuple(order[speed[order] > 0.1 * speed.max()].tolist())
+        if not converged and moving:
+            named = ", ".join(repr(blocks.names[b] if blocks.names else f"block {b}") for b in moving[:5])
+            reason += f"; {named}{' and others' if len(moving) > 5 else ''} move{'s' if len(moving) == 1 else ''}"
+        rest = replace(state, time=begin.time, velocity=np.zeros_like(state.velocity))
+        rows = np.array(history, RELAXATION_STEP) if history else np.empty(0, RELAXATION_STEP)
+        log.info("static equilibrium: %s (%d steps)", reason, len(rows))
+        return Equilibrium(rest, converged, collapsed, moving, reason, rows, limit.moved(state.vertices), result)
+
+    for _ in range(max_steps):
+        try:
+            result = static.step(state, loads, dt, crack, time, hasty=True)
+        except NotConverged as failure:
+            return answer(False, bool(gone), str(failure))
+        # Pseudo-time is no time: what the loads do at their times waits.
+        state = replace(result.state, time=begin.time)
+        statistics = result.statistics
+        unbalanced = unbalanced_force(static, result)
+        moved = np.hypot(*(result.forces.centroid - _centroids(static, state)).T)
+        row = np.array(
+            (
+                result.dt,
+                unbalanced,
+                statistics["kinetic_energy"],
+                moved.max(),
+                statistics["open_close_iterations"],
+                statistics["step_cuts"],
+            ),
+            RELAXATION_STEP,
+        )[()]
+        history.append(row)
+        if watch is not None:
+            watch(result, row)
+        limit.follow(result)
+        if judged and not gone:
+            gone = tuple(limit.beyond(state).tolist())
+        if unbalanced <= tolerance and gone:
+            far = limit.moved(state.vertices)[list(gone)].max()
+            return answer(False, True, f"no equilibrium where the blocks are: they come to rest {far:.3g} m farther")
+        if unbalanced <= tolerance:
+            return answer(True, False, f"unbalanced force {unbalanced:.2g} of the mean force")
+        travelled += moved
+        if travelled.max() > reach:
+            return answer(False, True, f"no equilibrium: blocks have moved {travelled.max():.3g} m and go on")
+        flights = len(history) if statistics["unbalanced_ratio"] > _FLYING else flights
+        since = len(history) - _IN_VAIN
+        if judged and since > flights and (travelled > _GONE * size).any():
+            forces = [float(row["unbalanced"]) for row in history]
+            if min(forces[since:]) >= min(forces[:since]):
+                return answer(
+                    False, True,
+                    f"no equilibrium: blocks have moved {travelled.max():.3g} m, and {_IN_VAIN} steps brought no more "
+                    "balance",
+                )  # fmt: skip
+        moves_far = statistics["limit_share"] > _NEARLY
+        dt = min(result.dt if moves_far else _GROWTH * result.dt, longest)
+    if gone:
+        return answer(
+            False, True, f"no equilibrium: blocks have moved {limit.moved(state.vertices).max():.3g} m and go on"
+        )
+    return answer(False, False, f"unbalanced force {history[-1]['unbalanced']:.2g} after {max_steps} steps")
+
+
+def _pseudo_times(system: BlockSystem) -> tuple[float, float]:
+    """First and longest step, s; blocks without mass have no say."""
+    free = ~system.blocks.fixed & (system.density > 0)
+    if not free.any():
+        return 1.0, 1.0
+    stiffness = np.array([m.plane_modulus for m in system.materials])[np.asarray(system.blocks.material, int)]
+    area = system.blocks.areas()
+    transit = np.sqrt(area * system.density / stiffness)[free].min()
+    lightest = (system.density * area)[free].min()
+    return _FIRST_TRANSITS * transit, float(np.sqrt(2 * lightest / (_LEAST_INERTIA * _PENALTY * stiffness.max())))
+
+
+def _centroids(system: BlockSystem, state: State) -> np.ndarray:
+    blocks = system.blocks
+    return block_moments(state.vertices, blocks.next_vertex, blocks.vertex_start)[:, 1:3]
+
+
+def rounding_force(system: BlockSystem) -> float:
+    """What springs like the stiffest contacts' give for the rounding of coordinates, N/m."""
+    modulus = max((m.plane_modulus for m in system.materials if not m.rigid), default=0.0)
+    return _PENALTY * modulus * system.rounding
+
+
+def unbalanced_force(system: BlockSystem, result: StepResult) -> float:
+    """Largest force (or moment over √area) out of balance on a free block in a static step: its inertia 2M d/dt², over
+    the mean of all forces on free blocks, contact forces and loads by their magnitudes; 0 where no force acts. What
+    contacts make of the rounding of coordinates is no force: blocks that have come apart without weight are at rest."""
+    free = ~system.blocks.fixed
+    f, a = result.forces, result.acceleration
+    h2 = f.area
+    mass = f.inertia.density * f.area
+    # For a rotation the moment of inertia is of the order m h²/6: the bound is enough.
+    out = mass * np.maximum(np.hypot(a[:, 0], a[:, 1]), np.sqrt(h2) / 6 * np.abs(a[:, 2]))
+    acting = mass * float(np.hypot(*f.inertia.gravity))
+    for rows in (f.points, f.edges):
+        np.add.at(acting, rows["block"], np.hypot(rows["force"][:, 0], rows["force"][:, 1]))
+    closed = result.contacts[result.contacts["state"] != OPEN]
+    push = np.hypot(closed["normal_force"], closed["shear_force"])
+    for side in ("block", "other"):
+        np.add.at(acting, closed[side], push)
+    mean = max(float(acting[free].mean()), rounding_force(system))
+    return float(out[free].max()) / mean if mean > 0 else 0.0

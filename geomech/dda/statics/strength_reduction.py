@@ -1,0 +1,351 @@
+"""Factor of safety by strength reduction: how much weaker the joints may be before the blocks go.
+
+tan φ, cohesion and tensile strength of the joints are divided by F (Zienkiewicz, Humpheson & Lewis 1975; Matsui & San
+1992), and the blocks are asked for a static equilibrium, each trial beginning where the last one that held came to
+rest. The criterion is a force, not a displacement: a static step of length dt leaves out of balance what moves the
+blocks by a dt²/2. In a stable trial the unbalanced force falls to round-off within a few steps; in an unstable one it
+stays (`stability_trial`), and for sliding it grows as A − B/F. Two unstable trials thus point at the factor between them,
+and few more close in.
+
+Sharp toes in re-entrant corners are rounded (`sharp_toes`), and faces keep all their cohesion while they touch anywhere
+(`whole_faces`), as limit equilibrium has it: what the factor would be otherwise is told beside.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..results import NotConverged
+from ..system import BlockSystem
+from .counted_resistance import (
+    bearing_toes,
+    hairline_faces,
+    parted_faces,
+    toes_in_the_way,
+    with_anchors,
+    with_hairlines,
+    with_parted_faces,
+    with_toes,
+)
+from .displacement_limit import DisplacementLimit
+from .pseudo_time_equilibrium import equilibrium
+from .reduced_strength import reduced
+from .safety_answer import FactorOfSafety, mechanism_of, moving_in
+from .sharp_toes import FREE, ROUNDED, SHARP
+from .stability_trial import Trial, TrialLoads, stability_trial
+
+log = logging.getLogger(__name__)
+
+#: So many steps of relaxation may go before the first trial.
+_RELAXING = 100
+#: What bounds the factor from above is tried again from just below it, if it was begun from farther than so many times
+#: the tolerance.
+_FROM_AFAR = 3.0
+#: The search for a trial that stands, and for one that does not, ends at this factor.
+_FARTHEST = 64.0
+#: From a factor that is known to be near, the search for one that stands goes down by this part of itself.
+_NEARBY = 0.85
+
+
+class NothingToReduce(ValueError):
+    """What was asked for has no factor of safety: no such strength, nothing that could fail, a load that statics do not
+    know."""
+
+
+def factor_of_safety(
+    blocks: Blocks,
+    materials: Sequence[Material],
+    joints: Sequence[JointLaw],
+    loads: Loads,
+    settings: DdaSettings | None = None,
+    *,
+    joint_index: Callable[[str, str], int | None] | None = None,
+    state: State | None = None,
+    load_time: float = 0.0,
+    reduce: Sequence[str] | None = None,
+    tolerance: float = 2e-3,
+    unbalanced: float = 1e-5,
+    time_step: float | None = None,
+    max_steps: int = 200,
+    watch: Callable[[Trial], None] | None = None,
+    toes: str = ROUNDED,
+    whole_faces: bool = True,
+    compare: bool = True,
+) -> FactorOfSafety:
+    """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
+
+    Loads are those of ``load_time`` s, after excavations up to then. ``state`` is where the first trial begins
+    (default: blocks at rest). ``reduce`` names the joint laws that are weakened (default: all). The answer is bracketed
+    to ``tolerance`` (relative); a trial stands when no block has more than the part ``unbalanced`` of the forces on it
+    left to move it. Static steps are ``time_step`` s long (default: free fall over it is a hundredth of the smallest
+    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `sharp_toes`; with ``whole_faces`` a face
+    keeps all its cohesion while it touches anywhere (`whole_faces`). With ``compare``, rounded toes whose tips would
+    hold, others that hold, and faces that have parted at one end, are told with the factor that it would be otherwise.
+
+    Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what
+    stands, and another way there may find a factor that differs by some thousandths where contacts slide and stick
+    again.
+
+    Raises `NothingToReduce` when there is no strength to reduce, nothing that moves, or a ground that does,
+    `NotConverged` when the blocks do not stand even with joints 64 times as strong.
+    """
+    names = [law.name for law in joints]
+    unknown = [name for name in reduce or () if name not in names]
+    if unknown:
+        raise NothingToReduce(
+            f"no joint {', '.join(map(repr, unknown))} to reduce; there are {', '.join(map(repr, names))}"
+        )
+    chosen = set(names if reduce is None else reduce)
+    if not any(_has_strength(law) for law in joints if law.name in chosen):
+        raise NothingToReduce("the joints have no friction, cohesion or tensile strength that could be reduced")
+    if not 0 < tolerance < 1:
+        raise NothingToReduce(f"the tolerance of the factor must lie between 0 and 1, got {tolerance!r}")
+    if blocks.fixed.all():
+        raise NothingToReduce("all blocks are fixed: none could fail")
+    if loads.base is not None and loads.base.frame == "ground":
+        raise NothingToReduce(
+            'statics know no ground that moves: leave the base\'s motion out, or give it the frame "base", in which it '
+            "is the"
+            " weight's own kind of force, the one of the time that is asked for"
+        )
+    under = TrialLoads(loads, load_time, unbalanced, max_steps, time_step)
+    rest = State.at_rest(blocks) if state is None else state
+    settings = replace(settings or DdaSettings(), dynamic_factor=0.0)
+    search = _Search(blocks, materials, joints, joint_index, settings, chosen, under, rest, tolerance)
+    counted = Counted(toes, whole_faces)
+    return search.answer(counted, watch) if compare else search.run(counted, watch=watch)
+
+
+@dataclass(frozen=True)
+class Counted:
+    """What a factor counts on beside strength: ``toes`` that are "rounded", "sharp" or "free" (`sharp_toes`), and the cohesion of
+    ``whole_faces`` (`whole_faces`)."""
+
+    toes: str = ROUNDED
+    whole_faces: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The search for a factor; arguments as for `factor_of_safety`, ``chosen`` the names of laws that are weakened."""
+
+    blocks: Blocks
+    materials: Sequence[Material]
+    joints: Sequence[JointLaw]
+    joint_index: Callable[[str, str], int | None] | None
+    settings: DdaSettings
+    chosen: Collection[str]
+    under: TrialLoads
+    rest: State
+    tolerance: float
+
+    def system(self, factor: float, counted: Counted) -> BlockSystem:
+        """The blocks with joints whose strength is divided by the ``factor``."""
+        laws = [reduced(law, factor) if law.name in self.chosen else law for law in self.joints]
+        system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, self.settings)
+        system.finder.toes, system.finder.whole_faces = counted.toes, counted.whole_faces
+        return system
+
+    def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> FactorOfSafety:
+        """The factor with what bolts hold, what toes do or would, and what faces count for that have parted."""
+        try:
+            found = self.run(counted, watch=watch)
+        except NotConverged:
+            if counted.toes != ROUNDED or not toes_in_the_way(self.system(1.0, counted), self.rest):
+                raise
+            sharp = replace(counted, toes=SHARP)
+            found = self.run(sharp)
+            return with_toes(self.blocks, found, self._bearing(found, sharp), None, True)
+        found = with_anchors(self.blocks, self.under.loads, found)
+        if counted.toes != FREE:
+            found = self._with_toes(found, counted)
+        return self._with_parted_faces(found, counted) if counted.whole_faces else found
+
+    def _with_toes(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+        bearing = self._bearing(found, counted)
+        if bearing:
+            return with_toes(self.blocks, found, bearing, self._otherwise(replace(counted, toes=FREE)), True)
+        if counted.toes == SHARP or not found.moving:
+            return found
+        bars = toes_in_the_way(self.system(found.lower, counted), found.state, found.failed)
+        if not bars:
+            return found
+        above = found.upper * (1.0 + 2.0 * self.tolerance)
+        sharp = self._otherwise(replace(counted, toes=SHARP), found.lower, above)
+        return found if sharp is None else with_toes(self.blocks, found, bars, sharp, False)
+
+    def _bearing(self, found: FactorOfSafety, counted: Counted):
+        return bearing_toes(self.system(found.lower, counted), found.state, self.under.loads, self.under.time)
+
+    def _with_parted_faces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+        system = self.system(found.lower, counted)
+        loose = hairline_faces(system, found.state)
+        if loose and math.isfinite(found.upper):
+            rigid = replace(self, materials=[replace(material, rigid=True) for material in self.materials])
+            above = found.upper * (1.0 + 2.0 * self.tolerance)
+            other = rigid._otherwise(counted, found.lower, above)
+            found = found if other is None else with_hairlines(self.blocks, found, loose, other)
+        parted = parted_faces(system, found.state)
+        if not parted:
+            return found
+        just_below = found.lower * (1.0 - 2.0 * self.tolerance)
+        other = self._otherwise(replace(counted, whole_faces=False), just_below, stands=True)
+        return found if other is None else with_parted_faces(self.blocks, found, parted, other)
+
+    def _otherwise(
+        self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False
+    ) -> FactorOfSafety | None:
+        """The answer with something else ``counted``; arguments as for `run`. None where the blocks do not stand, or the
+        answer is not another."""
+        try:
+            return self.run(counted, first, above, stands)
+        except (NotConverged, _NoOther):
+            return None
+
+    def run(
+        self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False,
+        watch: Callable[[Trial], None] | None = None,
+    ) -> FactorOfSafety:  # fmt: skip
+        """The bracket of the factor, from a trial at ``first`` on. Raises `_NoOther` where blocks stand there, if it is
+        asked whether any ``stands``, or do not stand at a factor ``above`` it, and `NotConverged` where they do at
+        none."""
+        bracket = _Bracket(self, counted, watch)
+        near = stands or math.isfinite(above)
+        trial = bracket.begin(first)
+        if trial.stable and stands:
+            raise _NoOther
+        while not trial.stable:
+            if trial.factor <= 1.0 / _FARTHEST:
+                raise NotConverged(
+                    f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
+                    "what moves is not held by joint strength, or the contacts find no states"
+                )
+            trial = bracket.begin((_NEARBY if near else 0.5) * trial.factor)
+        if math.isfinite(above) and not bracket.tried(above).stable:
+            raise _NoOther
+        return bracket.closed(self.tolerance)
+
+
+class _NoOther(Exception):
+    """With something else counted, the factor is not another."""
+
+
+class _Bracket:
+    """Trials of a ``search`` between which the factor lies."""
+
+    def __init__(self, search: _Search, counted: Counted, watch: Callable[[Trial], None] | None) -> None:
+        self._search, self._counted, self._watch = search, counted, watch
+        self._limit: DisplacementLimit | None = None
+        self._state = search.rest
+        self.trials: list[Trial] = []
+        # Of each trial, the factor from whose equilibrium it was begun.
+        self._began: dict[float, float] = {}
+        self.lower = 0.0
+
+    def begin(self, factor: float) -> Trial:
+        """Try a ``factor`` from where the blocks come to rest with it."""
+        search = self._search
+        self._state, self._limit = _relaxed(search.system(factor, self._counted), search.under, search.rest)
+        return self.tried(factor)
+
+    def tried(self, factor: float) -> Trial:
+        """Try a ``factor`` from the last equilibrium."""
+        search = self._search
+        system = search.system(factor, self._counted)
+        trial, end = stability_trial(system, self._state, search.under, factor, self._limit)
+        self.trials.append(trial)
+        self._began[factor] = self.lower
+        log.info("F = %.5g: %s", factor, trial.reason)
+        if self._watch is not None:
+            self._watch(trial)
+        if trial.stable:
+            self.lower, self._state = factor, end
+        return trial
+
+    def _known(self) -> list[Trial]:
+        # What has failed from far below may stand when it is come to by small steps.
+        last = {t.factor: t for t in self.trials if t.stable or t.factor > self.lower}
+        return list(last.values())
+
+    def closed(self, tolerance: float) -> FactorOfSafety:
+        """The answer, once no factor lies between trials that are farther apart than the ``tolerance``."""
+        while True:
+            known = self._known()
+            upper = min((t.factor for t in known if not t.stable), default=math.inf)
+            if math.isinf(upper):
+                if self.lower >= _FARTHEST:
+                    return self._answer(self.lower, None)
+                factor = 2.0 * self.lower
+            elif upper > self.lower * (1.0 + tolerance):
+                factor = _next_factor(known, self.lower, upper, tolerance)
+            elif self._from_afar(known, upper, tolerance):
+                factor = upper
+            else:
+                failed = next(t for t in known if t.factor == upper)
+                return self._answer(_pointed_at(known, self.lower, upper), failed)
+            self.tried(factor)
+
+    def _from_afar(self, known: list[Trial], upper: float, tolerance: float) -> bool:
+        """Whether what has failed at ``upper`` was begun from so far below that it may stand, unless the drift of failures
+        says that it does not."""
+        if self._began[upper] >= self.lower * (1.0 - _FROM_AFAR * tolerance):
+            return False
+        return _drift_ends(known, self.lower, upper) is None
+
+    def _answer(self, factor: float, failed: Trial | None) -> FactorOfSafety:
+        moving = () if failed is None else moving_in(failed)
+        lines = () if failed is None else mechanism_of(self._search.blocks, failed, moving)
+        return FactorOfSafety(
+            factor, self.lower, math.inf if failed is None else failed.factor, tuple(self.trials), moving, lines,
+            self._state, self._limit.moved(self._state.vertices),
+        )  # fmt: skip
+
+
+def _relaxed(system: BlockSystem, under: TrialLoads, state: State) -> tuple[State, DisplacementLimit]:
+    """Where the blocks come to rest from ``state``: what is dug out or bolted by the loads' time is so in the step that
+    follows; ``state`` itself if they do not. And how far they may move from there."""
+    limit = DisplacementLimit(system, state, under.loads, under.time)
+    found = equilibrium(system, state, under.loads, load_time=under.time, max_steps=_RELAXING, limit=limit)
+    if found.converged:
+        return replace(found.state, time=max(state.time, under.time)), limit
+    return state, DisplacementLimit(system, state, under.loads, under.time)
+
+
+def _has_strength(law: JointLaw) -> bool:
+    return law.friction_angle > 0 or law.cohesion > 0 or law.tensile_strength > 0 or law.roughness is not None
+
+
+def _pointed_at(trials: Sequence[Trial], lower: float, upper: float) -> float:
+    """Where the drift of failures ends between ``lower`` and ``upper``; the middle where it does not say."""
+    end = _drift_ends(trials, lower, upper)
+    return 2.0 * lower * upper / (lower + upper) if end is None else end
+
+
+def _drift_ends(trials: Sequence[Trial], lower: float, upper: float) -> float | None:
+    """Where the drift of the two weakest failures goes to nothing, drift = A − B/F; None if that is not between ``lower``
+    and ``upper``."""
+    failed = sorted((t for t in trials if not t.stable and math.isfinite(t.drift)), key=lambda t: t.factor)[:2]
+    if len(failed) < 2 or not failed[1].drift > failed[0].drift:
+        return None
+    (x, p), (y, q) = ((1.0 / t.factor, t.drift) for t in failed)
+    inverse = x + p * (x - y) / (q - p)
+    return 1.0 / inverse if 1.0 / upper < inverse < 1.0 / lower else None
+
+
+def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance: float) -> float:
+    """The F to try: just beside where the drift points, on the side that is farther off; the middle when it does not
+    point."""
+    middle = 2.0 * lower * upper / (lower + upper)
+    failed = [t for t in trials if not t.stable and math.isfinite(t.drift)]
+    if len(failed) < 2:
+        return middle
+    aim = _pointed_at(trials, lower, upper)
+    margin = 0.4 * tolerance
+    below, above = aim * (1.0 - margin), aim * (1.0 + margin)
+    if lower < below and not lower > aim * (1.0 - 2.0 * margin):
+        return below
+    return above if above < upper else middle

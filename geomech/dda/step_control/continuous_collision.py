@@ -1,0 +1,249 @@
+"""What has gone through the outline of a block in a step, found along the paths of vertices.
+
+In the frame of an edge, which moves with its block, a vertex goes from (s, g) to (s′, g′): its place along the edge and
+its gap as the step begins and as it ends; between them the path is straight but for r²/8 of its distance from the edge
+where the blocks turn by r (continuous collision detection: Provot 1997; Li et al. 2020, Lan et al. 2022 for affine
+bodies). Of two outlines a vertex of one goes first through an edge of the other, but for corners that meet tip to tip on
+a common line: there two edges cross in the end. A vertex has gone
+
+- *into* a block where it lies inside as the step ends, deeper than it did and than contacts of the block press;
+- *through* it where it leaves by an edge f, from deeper behind that than contacts press, and has come in by another, e,
+  and the way along the outline from there is longer than what a corner may be cut by.
+
+Contacts of the step hold what they are there to hold; what is found here went in where none was, or none was closed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import kept, part
+
+#: Vertices may lie in a block by this part of the smaller block's size, √area, the radius of corners, …
+_DEPTH = 1e-5
+#: … and by so many times what contacts at that vertex are pressed in by.
+_PRESSED = 2.0
+#: Where rounded corners pass each other, one may lie in the other by this part of their rounding length, so near to it
+#: in rounding lengths: an arc leaves 1 − cos 45° of the corner that it rounds.
+ROUNDED_OVERLAP, _NEAR = 0.3, 1.6
+#: What goes round a corner may cut it: by this part of the smaller block's size along the outline, or so many rounding
+#: lengths.
+_CORNER, _CUT = 1e-2, 2.5
+#: Edges of rounded corners that pass each other cross by so many rounding lengths at most.
+_TIPS = 1.2
+#: Kinds of crossings.
+INTO, THROUGH = 0, 1
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _depth(x, y, vertices, next_vertex, first, last):
+    """(how far (x, y) lies inside the polygon of the edges from ``first`` to ``last``, m, 0 outside; its nearest edge)."""
+    winding, least, nearest = 0, np.inf, -1
+    for e in range(first, last):
+        f = next_vertex[e]
+        ax, ay = vertices[e, 0] - x, vertices[e, 1] - y
+        bx, by = vertices[f, 0] - x, vertices[f, 1] - y
+        dx, dy = bx - ax, by - ay
+        cross = ax * by - ay * bx
+        if ay <= 0.0:
+            winding += by > 0.0 and cross > 0.0
+        else:
+            winding -= by <= 0.0 and cross < 0.0
+        t = min(1.0, max(0.0, -(ax * dx + ay * dy) / (dx * dx + dy * dy)))
+        px, py = ax + t * dx, ay + t * dy
+        square = px * px + py * py
+        if square < least:
+            least, nearest = square, e
+    return (np.sqrt(least) if winding != 0 else 0.0), nearest
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _seen(vertices, next_vertex, x, y, e):
+    """(gap, place along, length) of (x, y) before edge ``e``."""
+    f = next_vertex[e]
+    dx, dy = vertices[f, 0] - vertices[e, 0], vertices[f, 1] - vertices[e, 1]
+    length = np.sqrt(dx * dx + dy * dy)
+    px, py = x - vertices[e, 0], y - vertices[e, 1]
+    return (px * dy - py * dx) / length, (px * dx + py * dy) / (length * length), length
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _way(vertices, next_vertex, e, at, f, to):
+    """Length of the outline between a place ``at`` (0 to 1) on edge ``e`` and one ``to`` on edge ``f``, the shorter way
+    round; inf on different outlines of one block. m."""
+    if e == f:
+        _, _, length = _seen(vertices, next_vertex, 0.0, 0.0, e)
+        return abs(to - at) * length
+    forth = whole = 0.0
+    found = False
+    k = e
+    while True:
+        _, _, length = _seen(vertices, next_vertex, 0.0, 0.0, k)
+        whole += length
+        if k == e:
+            forth += (1.0 - at) * length
+        elif k == f:
+            forth += to * length
+            found = True
+        elif not found:
+            forth += length
+        k = next_vertex[k]
+        if k == e:
+            break
+    return min(forth, whole - forth) if found else np.inf
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _rounded_off(v, vertices, rounding, first, last):
+    """The rounding length of corner ``v`` with the nearest of those from ``first`` to ``last``, m; 0 where none is near."""
+    longest = 0.0
+    for w in range(first, last):
+        length = min(rounding[v], rounding[w])
+        dx, dy = vertices[v, 0] - vertices[w, 0], vertices[v, 1] - vertices[w, 1]
+        if dx * dx + dy * dy < _NEAR * _NEAR * length * length:
+            longest = max(longest, length)
+    return longest
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _crossed(vertices, next_vertex, start, a, b, pressed, least, length):
+    """A vertex and an edge of two blocks of which edges cross, and by how much the nearest end of both is beyond the
+    other's line, m; −1 where they cross by no more than contacts press there, ``least`` and the ``length`` of tips."""
+    for e in range(start[a], start[a + 1]):
+        f = next_vertex[e]
+        ex, ey = vertices[e, 0], vertices[e, 1]
+        x_lo, x_hi = min(ex, vertices[f, 0]), max(ex, vertices[f, 0])
+        y_lo, y_hi = min(ey, vertices[f, 1]), max(ey, vertices[f, 1])
+        for g in range(start[b], start[b + 1]):
+            h = next_vertex[g]
+            if min(vertices[g, 0], vertices[h, 0]) > x_hi or max(vertices[g, 0], vertices[h, 0]) < x_lo:
+                continue
+            if min(vertices[g, 1], vertices[h, 1]) > y_hi or max(vertices[g, 1], vertices[h, 1]) < y_lo:
+                continue
+            one, _, _ = _seen(vertices, next_vertex, ex, ey, g)
+            two, _, _ = _seen(vertices, next_vertex, vertices[f, 0], vertices[f, 1], g)
+            if one * two >= 0.0:
+                continue
+            three, _, _ = _seen(vertices, next_vertex, vertices[g, 0], vertices[g, 1], e)
+            four, _, _ = _seen(vertices, next_vertex, vertices[h, 0], vertices[h, 1], e)
+            if three * four >= 0.0:
+                continue
+            mine, theirs = min(abs(one), abs(two)), min(abs(three), abs(four))
+            deep = max(max(pressed[e], pressed[f]), max(pressed[g], pressed[h]))
+            if min(mine, theirs) <= _PRESSED * deep + least + length:
+                continue
+            if mine <= theirs:
+                return (e if abs(one) <= abs(two) else f), g, mine
+            return (g if abs(three) <= abs(four) else h), e, theirs
+    return -1, -1, 0.0
+
+
+@kept(fastmath=False, error_model="numpy", nogil=True)
+def _find(pairs, before, after, next_vertex, start, box, pressed, size, rounding, found):
+    """Number of crossings of ``pairs``, the first of them in ``found`` (m, 6) as far as it has room."""
+    count = 0
+    for k in range(pairs.shape[0]):
+        a, b = pairs[k, 0], pairs[k, 1]
+        if box[a, 0] > box[b, 2] or box[b, 0] > box[a, 2] or box[a, 1] > box[b, 3] or box[b, 1] > box[a, 3]:
+            continue
+        smaller = min(size[a], size[b])
+        least = _DEPTH * smaller
+        known = count
+        for role in range(2):
+            i, j = (a, b) if role == 0 else (b, a)
+            first, last = start[j], start[j + 1]
+            for v in range(start[i], start[i + 1]):
+                x0, y0, x1, y1 = before[v, 0], before[v, 1], after[v, 0], after[v, 1]
+                if max(x0, x1) < box[j, 0] or min(x0, x1) > box[j, 2]:
+                    continue
+                if max(y0, y1) < box[j, 1] or min(y0, y1) > box[j, 3]:
+                    continue
+                allowed = _PRESSED * pressed[v] + least
+                kind, edge, depth = -1, -1, 0.0
+                now, near = _depth(x1, y1, after, next_vertex, first, last)
+                was, beside = np.inf, -1
+                if now > allowed:
+                    allowed += ROUNDED_OVERLAP * _rounded_off(v, after, rounding, first, last)
+                if now > allowed:
+                    was, beside = _depth(x0, y0, before, next_vertex, first, last)
+                    if now > was + least:
+                        kind, edge, depth = INTO, near, now
+                if kind < 0 and now <= allowed:
+                    for f in range(first, last):
+                        g0, s0, _ = _seen(before, next_vertex, x0, y0, f)
+                        if g0 >= -allowed:
+                            continue
+                        g1, s1, _ = _seen(after, next_vertex, x1, y1, f)
+                        if g1 <= 0.0:
+                            continue
+                        left = g0 / (g0 - g1)
+                        out = s0 + left * (s1 - s0)
+                        if out < 0.0 or out > 1.0:
+                            continue
+                        if was == np.inf:
+                            was, beside = _depth(x0, y0, before, next_vertex, first, last)
+                        if was > 0.0 and was > allowed:
+                            continue  # it lay deep in the block before: no way out is the wrong one
+                        # By which edge it has come in: the last one before it left, or the one that it lay on.
+                        entry, at, when = -1, 0.0, -1.0
+                        for e in range(first, last):
+                            h0, r0, _ = _seen(before, next_vertex, x0, y0, e)
+                            h1, r1, _ = _seen(after, next_vertex, x1, y1, e)
+                            if h0 < 0.0 or h1 >= 0.0 or e == f:
+                                continue
+                            t = h0 / (h0 - h1)
+                            r = r0 + t * (r1 - r0)
+                            if 0.0 <= r <= 1.0 and when < t <= left:
+                                entry, at, when = e, r, t
+                        if entry < 0 and was > 0.0:
+                            _, at, _ = _seen(before, next_vertex, x0, y0, beside)
+                            entry, at = beside, min(1.0, max(0.0, at))
+                        if entry < 0:
+                            continue
+                        if _way(before, next_vertex, entry, at, f, out) > max(_CORNER * smaller, _CUT * rounding[v]):
+                            kind, edge, depth = THROUGH, entry, min(-g0, g1)
+                            break
+                if kind >= 0:
+                    if count < found.shape[0]:
+                        found[count, 0], found[count, 1], found[count, 2] = k, v, edge
+                        found[count, 3], found[count, 4] = kind, depth
+                    count += 1
+        if count > known:
+            continue
+        length = _TIPS * min(rounding[start[a]], rounding[start[b]])
+        vertex, edge, depth = _crossed(after, next_vertex, start, a, b, pressed, least, length)
+        if vertex >= 0 and _crossed(before, next_vertex, start, a, b, pressed, least, length)[0] < 0:
+            if count < found.shape[0]:
+                found[count, 0], found[count, 1], found[count, 2] = k, vertex, edge
+                found[count, 3], found[count, 4] = INTO, depth
+            count += 1
+    return count
+
+
+def crossings(
+    before: np.ndarray,
+    after: np.ndarray,
+    next_vertex: np.ndarray,
+    vertex_start: np.ndarray,
+    pairs: np.ndarray,
+    box: np.ndarray,
+    pressed: np.ndarray,
+    size: np.ndarray,
+    rounding: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Crossings of the ``pairs`` (k, 2) of blocks in a step from ``before`` to ``after`` (both (n_vertices, 2) m): pair,
+    vertex, the edge that it went in by, kind, and depth, m, (n,) each.
+
+    ``box`` (n_blocks, 4) holds each block before and after; ``pressed`` (n_vertices,) m is the deepest that contacts at
+    a vertex are pressed in by, ``size`` (n_blocks,) √area and ``rounding`` (n_vertices,) the lengths over which corners are
+    rounded, m.
+    """
+    room = 64
+    while True:
+        found = np.empty((room, 6))
+        count = _find(pairs, before, after, next_vertex, vertex_start, box, pressed, size, rounding, found)
+        if count <= room:
+            break
+        room = count
+    whole = found[:count, :4].astype(np.int64)
+    return whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3], found[:count, 4]

@@ -1,0 +1,276 @@
+"""What a step of blocks may do: how long it may be, where it looks for contacts, and whether something went through.
+
+Three limits shorten a step. No vertex moves by more than ``max_displacement_ratio`` of half the domain's diagonal, a
+bound on what the run is asked to resolve; no two blocks that touch, or may come to, move or turn against each other by
+more than the lines of their contacts are good for (`approach`); and nothing goes into or through a block
+(`crossings`). `Work.shortened` counts which blocks have shortened steps, and why.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model import OPEN, DdaSettings, Shortened
+from ..contact_detection.contact_finder import ContactFinder
+from ..contact_detection.neighbour_search import boxes
+from ..counters import Work
+from ..kinematics.midpoint_configuration import affine_motion
+from ..kinematics.simplex_integration import fastest_vertex
+from .continuous_collision import INTO, THROUGH, crossings
+from .relative_motion import Windows
+
+if TYPE_CHECKING:
+    from ..interfaces import AttemptedStep
+    from ..results import StepResult
+
+log = logging.getLogger(__name__)
+
+#: A step that speed limits uses this part of what it may move: round-off, arcs and what blocks hit take the rest, so
+#: that it need not be cut.
+_AIM = 0.99
+#: Where something went in, contacts are sought this many times as far as the blocks have moved.
+_WIDER = 1.5
+#: Blocks that are glued to each other, or to a third, misfit where they meet by this part of the smaller one's size at
+#: most, as their strains and rotations differ.
+_MISFIT = 1e-3
+
+
+#: Contacts pressed in by more than this part of the thinner block's size are asked whether that is through it.
+_DEEP = 0.01
+#: Overlaps that bring more than this part of the energy of all blocks in a step are none that they had.
+_GIVEN = 1e-3
+#: Why steps are shortened, and what to do about it.
+DISPLACEMENT, APPROACH, CROSSING, UNSETTLED = "displacement", "relative motion", "crossing", "contact states"
+WAY_OUT = {
+    DISPLACEMENT: "raise dda.max_displacement_ratio if motion need not be followed so finely",
+    APPROACH: "small blocks that move fast beside others shorten steps: merge them (geometry.smallest_block_m2)",
+    CROSSING: "what is thinner than a step's motion takes shorter steps: merge slivers (geometry.smallest_block_m2), or "
+    "shorten dda.time_step_s",
+    UNSETTLED: "shorten dda.time_step_s, or merge small blocks (geometry.smallest_block_m2)",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Used:
+    """The ``share`` of what it may move that a step has used; what has used it in words (``reason``), by its kind
+    (``why``) and its ``blocks``; and how far the pairs that touch have ``moved`` against each other."""
+
+    share: float
+    reason: str
+    moved: Windows
+    why: str
+    blocks: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Crossed:
+    """What went into or through a block in a step: ``reason`` in words, the ``pairs`` (k, 2) of blocks concerned with
+    how far they moved against each other, ``motion`` (k,) m; whether anything went ``through``, and the worst two
+    ``blocks``."""
+
+    reason: str
+    pairs: np.ndarray
+    motion: np.ndarray
+    through: bool
+    blocks: tuple[int, int]
+
+
+class StepLimits:
+    """The limits of one system's steps; ``half_diagonal`` (m) is that of the domain."""
+
+    def __init__(
+        self, finder: ContactFinder, settings: DdaSettings, half_diagonal: float, vertex_start: np.ndarray,
+        next_vertex: np.ndarray, work: Work,
+    ) -> None:  # fmt: skip
+        self._finder, self._size, self._start, self._next = finder, finder.widths, vertex_start, next_vertex
+        self.displacement = settings.max_displacement_ratio * half_diagonal
+        self._work = work
+        self._told: set[tuple[int, int]] = set()
+
+    def foreseen(
+        self, vertices: np.ndarray, carried: np.ndarray, moments: np.ndarray, dt: float, gravity: np.ndarray
+    ) -> float:
+        """``dt`` shortened where the velocity ``carried`` (n_blocks, 6) alone would go beyond the limits."""
+        if not carried.any():
+            return dt
+        g = float(np.hypot(*gravity))
+        speed, may = float(fastest_vertex(carried, vertices, self._start, moments)), _AIM * self.displacement
+        # Root of speed t + g t²/2 = may in the form that keeps its digits when g is small.
+        longest = 2.0 * may / (speed + np.sqrt(speed * speed + 2.0 * g * may))
+        shorter = min(dt, longest)
+        pair = None
+        if len(self._size) > 1:
+            affine = affine_motion(shorter * carried)
+            turn, centroid = shorter * carried[:, 2], np.ascontiguousarray(moments[:, 1:3])
+            shorter, pair = self._finder.approach.longest(vertices, affine, turn, centroid, shorter, g)
+        if pair is not None:
+            self.shortens(APPROACH, *pair)
+        elif shorter < dt:
+            self.shortens(DISPLACEMENT, int(np.argmax(np.abs(carried[:, :2]).max(axis=1))))
+        return shorter
+
+    def windows(
+        self, vertices: np.ndarray, carried: np.ndarray, moments: np.ndarray, dt: float, gravity: np.ndarray,
+        lift: float = 0.0,
+    ) -> Windows:  # fmt: skip
+        """Where a step of ``dt`` looks for contacts; ``lift`` m is the most by which any presses at a distance. Without
+        velocity nothing is foreseen."""
+        fall = float(np.hypot(*gravity)) * dt * dt if carried.any() else 0.0
+        return self._finder.approach.windows(
+            vertices, affine_motion(dt * carried), np.ascontiguousarray(moments[:, 1:3]), fall, lift
+        )
+
+    def used(self, attempt: AttemptedStep, result: StepResult) -> Used:
+        """What a step has used of what it may move."""
+        affine = affine_motion(attempt.increment)
+        closed = result.contacts[result.contacts["state"] != OPEN]
+        n = len(self._size)
+        keys = np.unique(
+            np.minimum(closed["block"], closed["other"]) * n + np.maximum(closed["block"], closed["other"])
+        )
+        pairs = np.stack([keys // n, keys % n], axis=1)
+        shares = self._finder.approach.shares(
+            pairs, attempt.vertices, affine, attempt.increment[:, 2], np.ascontiguousarray(attempt.moments[:, 1:3])
+        )
+        moved = Windows(pairs, shares[:, 0])
+        of_all = attempt.largest / self.displacement
+        worst = int(np.argmax(shares[:, 1])) if len(pairs) else -1
+        if worst >= 0 and shares[worst, 1] > of_all:
+            a, b = pairs[worst].tolist()
+            reason = (
+                f"{self._named(a)} and {self._named(b)} move {shares[worst, 0]:.3g} m and turn "
+                f"{abs(attempt.increment[a, 2] - attempt.increment[b, 2]):.3g} rad against each other, "
+                f"{shares[worst, 1]:.3g} times what their contacts are good for"
+            )
+            return Used(float(shares[worst, 1]), reason, moved, APPROACH, (a, b))
+        block = int(np.argmax(np.abs(attempt.increment[:, :2]).max(axis=1)))
+        reason = (
+            f"a vertex of {self._named(block)} moves {attempt.largest:.3g} m, the limit is {self.displacement:.3g} m"
+        )
+        return Used(float(of_all), reason, moved, DISPLACEMENT, (block,))
+
+    def crossed(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
+        """What has gone where contacts saw nothing come; None for nothing."""
+        if len(self._size) < 2:
+            return None
+        before, after = attempt.vertices, result.state.vertices
+        one, two = boxes(before, self._start[:-1]), boxes(after, self._start[:-1])
+        box = np.concatenate([np.minimum(one[:, :2], two[:, :2]), np.maximum(one[:, 2:], two[:, 2:])], axis=1)
+        pairs = self._finder.near_boxes(box)
+        rows = result.contacts
+        pressed = self._pressed(rows, len(before))
+        pair, vertex, edge, kind, depth = crossings(
+            before, after, self._next, self._start, pairs, box, pressed, self._size, self._finder.rounding
+        )
+        if len(pair):
+            real = self._finder.may_touch(vertex, edge)
+            shallow = (kind == INTO) & (depth <= _MISFIT * self._size[pairs[pair]].min(axis=1))
+            if shallow.any():
+                real &= ~(shallow & _glued(pairs[pair], rows[rows["bonded"] > 0]))
+            pair, vertex, kind, depth = pair[real], vertex[real], kind[real], depth[real]
+        if not len(pair):
+            return None
+        concerned = pairs[np.unique(pair)]
+        affine, centroid = affine_motion(attempt.increment), np.ascontiguousarray(attempt.moments[:, 1:3])
+        motion = self._finder.approach.shares(concerned, before, affine, attempt.increment[:, 2], centroid)[:, 0]
+        worst = int(np.argmax(kind * depth.max() + depth))
+        a, b = pairs[pair[worst]].tolist()
+        if int(np.searchsorted(self._start, vertex[worst], side="right")) - 1 != a:
+            a, b = b, a
+        x, y = after[vertex[worst]]
+        how = "goes through" if kind[worst] == THROUGH else f"goes {depth[worst]:.3g} m into"
+        reason = f"a corner of {self._named(a)} {how} {self._named(b)} near x = {x:.6g}, y = {y:.6g} m"
+        return Crossed(reason, concerned, _WIDER * motion, bool((kind == THROUGH).any()), (a, b))
+
+    def _pressed(self, rows: np.ndarray, n_vertices: int) -> np.ndarray:
+        """(n_vertices,) m: how deep CONTACT ``rows`` at each vertex, or at an edge that it ends, are pressed in. Nodes
+        within the faces of joints that give have no contacts: there it is the deepest of their block."""
+        # Faces that have to come nearer than the geometry says, to meet, lie in each other by that.
+        deep = np.maximum(0.0, -rows["lift"])
+        deep = np.where(rows["state"] != OPEN, np.maximum(deep, -(rows["gap"] + rows["lift"])), deep)
+        out = np.zeros(n_vertices)
+        if self._finder.has_face_nodes:
+            of_block = np.zeros(len(self._size))
+            for name in ("block", "other"):
+                np.maximum.at(of_block, rows[name], deep)
+            return np.repeat(of_block, np.diff(self._start))
+        for vertices in (rows["vertex"], rows["edge"], self._next[rows["edge"]]):
+            np.maximum.at(out, vertices, deep)
+        return out
+
+    def pressed_apart(self, attempt: AttemptedStep, result: StepResult) -> Crossed | None:
+        """What pushes blocks apart out of which they have not come in: contacts that close in a step with a vertex that
+        lay behind their edge as it began, if that brings more than `_GIVEN` of the energy there is; not what was drawn
+        so. A shorter step looks for contacts less far away, and meets them where they are met first."""
+        energy = result.energy
+        if energy.overlap <= _GIVEN * max(energy.stored, energy.before) or not len(attempt.state.contacts):
+            return None
+        _, a, b, deep, x, y = result.overlap
+        reason = (
+            f"{self._named(a)} and {self._named(b)} overlap by {deep:.3g} m near x = {x:.6g}, y = {y:.6g} m where they "
+            "first touch"
+        )
+        return Crossed(reason, np.zeros((0, 2), np.int64), np.zeros(0), False, (a, b))
+
+    def tell_pressed_through(self, result: StepResult) -> None:
+        """Log a warning, once for two blocks, where a corner is pressed in beyond the middle of what it presses on: there
+        springs no longer know from which side it came."""
+        rows = result.contacts
+        least = np.minimum(self._size[rows["block"]], self._size[rows["other"]])
+        rows = rows[(rows["state"] != OPEN) & (-(rows["gap"] + rows["lift"]) > _DEEP * least)]
+        if not len(rows):
+            return
+        vertices = np.ascontiguousarray(result.state.vertices)
+        vertex, edge = (np.ascontiguousarray(rows[name]) for name in ("vertex", "edge"))
+        for k in np.flatnonzero(self._finder.beyond_middle(vertices, vertex, edge)).tolist():
+            pair = int(rows["block"][k]), int(rows["other"][k])
+            if pair in self._told:
+                continue
+            self._told.add(pair)
+            x, y = vertices[vertex[k]]
+            log.warning(
+                "t = %g s: a corner of %s is pressed %.3g m into %s near x = %.6g, y = %.6g m, beyond the middle of what it "
+                "presses on: contacts are too soft for this speed (dda.normal_penalty_pa)",
+                result.state.time, self._named(pair[0]), -rows["gap"][k], self._named(pair[1]), x, y,
+            )  # fmt: skip
+
+    def shortens(self, why: str, *blocks: int) -> None:
+        """Count a step that one block has shortened, or two; the tenth, the hundredth … is logged."""
+        names = tuple(self._finder.names[b] for b in blocks[:2])
+        key = (why, *names, "", "")[:3]
+        self._work.shortened[key] += 1
+        count = self._work.shortened[key]
+        if count > 1 and math.log10(count).is_integer():
+            told = " and ".join(map(repr, names)) or "no one block"
+            log.info("%s: %s shortened a step for the %s time; %s", why, told, _ordinal(count), WAY_OUT[why])
+
+    def _named(self, block: int) -> str:
+        return repr(self._finder.names[block])
+
+
+def _glued(pairs: np.ndarray, bonded: np.ndarray) -> np.ndarray:
+    """(k,) whether the blocks of each of ``pairs`` (k, 2) are held to each other, or both to a third, by the CONTACT rows
+    ``bonded``."""
+    held: dict[int, set[int]] = {}
+    for a, b in zip(bonded["block"].tolist(), bonded["other"].tolist(), strict=True):
+        held.setdefault(a, {a}).add(b)
+        held.setdefault(b, {b}).add(a)
+    nothing: set[int] = set()
+    return np.array([bool(held.get(a, nothing) & held.get(b, nothing)) for a, b in pairs.tolist()], bool)
+
+
+def shortened(work: Work, most: int = 5) -> tuple[Shortened, ...]:
+    """The ``most`` frequent reasons for which steps were shortened, each with its blocks."""
+    return tuple(
+        Shortened(why, tuple(name for name in blocks if name), count, WAY_OUT[why])
+        for (why, *blocks), count in work.shortened.most_common(most)
+    )
+
+
+def _ordinal(count: int) -> str:
+    return {10: "tenth", 100: "hundredth", 1000: "thousandth"}.get(count, f"{count}th")

@@ -1,0 +1,102 @@
+"""A run of blocks alone: steps until an end time, with what a run has to watch over."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, Motion, State
+from .energy_balance import EnergyBudget
+from .excavation import until_next_event
+from .kinematics.strain_limits import ElasticRange
+from .results import NotConverged, StepResult
+from .statics.pseudo_time_equilibrium import equilibrium
+from .step_control.adaptive_time_step import StepLength
+from .step_control.overlap_energy import Overlap, OverlapWatch
+from .system import BlockSystem
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(eq=False)
+class _Watch:
+    """What is told of steps: energy that comes from nowhere or by overlaps, strains that are no longer elastic."""
+
+    blocks: Blocks
+    budget: EnergyBudget = field(default_factory=EnergyBudget)
+    range: ElasticRange = field(default_factory=ElasticRange)
+    overlaps: OverlapWatch = field(default_factory=OverlapWatch)
+
+    def look(self, before: State, result: StepResult) -> None:
+        state = result.state
+        budget = self.budget.cut() if state.removed is not before.removed else self.budget
+        self.budget = budget.after(result.energy, state.time)
+        overlap = None if result.overlap is None else Overlap(*result.overlap)
+        self.overlaps.check(self.budget, overlap, self.blocks.names, state.time)
+        self.range.check(Motion.of(self.blocks, state.vertices), self.blocks, state.time)
+
+    def set_down(self) -> None:
+        """Blocks have come to rest without steps of the run: what that stores is none of its residual."""
+        self.budget = self.budget.cut()
+
+
+def run(
+    blocks: Blocks,
+    materials: Sequence[Material],
+    joints: Sequence[JointLaw],
+    loads: Loads,
+    settings: DdaSettings,
+    end_time: float,
+    *,
+    joint_index: Callable[[str, str], int | None] | None = None,
+    state: State | None = None,
+    watch: Callable[[StepResult], None] | None = None,
+) -> Iterator[State]:
+    """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
+    long. ``watch`` sees every `StepResult`.
+
+    ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
+
+    ``settings.equilibrium`` "start" brings the blocks to rest before the first state, "loads" in statics at every load
+    too. Logs a warning when energy comes from nowhere, a block is strained beyond the elastic range, or dashpots have
+    nothing to brake in statics. Raises `NotConverged` where no step or equilibrium is found, or a block is strained by
+    more than a quarter, and ValueError for what makes no sense, before the first step as far as it can be told then.
+    """
+    if not end_time >= 0:
+        raise ValueError(f"end_time must not be negative, got {end_time!r} s")
+    system = BlockSystem(blocks, materials, joints, joint_index, settings)
+    if state is None:
+        state = State.at_rest(blocks)
+    state.refuse_misfit(blocks)
+    if system.scheme.static and loads.viscous_boundaries:
+        log.warning("viscous boundaries do nothing in a static run")
+    watched = _Watch(blocks)
+    if settings.equilibrium:
+        state = _at_rest(system, state, loads, state.time)
+    yield state
+    length = StepLength(settings)
+    at_every_load = settings.equilibrium == "loads" and system.scheme.static
+    while state.time < end_time * (1 - 1e-12):
+        dt, load_time = min(length.dt, end_time - state.time), None
+        if at_every_load:
+            load_time = state.time + until_next_event(loads, state.time, dt)
+            state = _at_rest(system, state, loads, load_time)
+            watched.set_down()
+        result = system.step(state, loads, dt, load_time=load_time)
+        length.after(result, dt)
+        watched.look(state, result)
+        if watch is not None:
+            watch(result)
+        state = result.state
+        yield state
+
+
+def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) -> State:
+    """``state`` brought to rest under the loads of ``load_time``."""
+    found = equilibrium(system, state, loads, load_time=load_time, tolerance=system.settings.unbalanced_tolerance)
+    if found.collapsed:
+        raise NotConverged(f"t = {load_time:g} s: {found.reason}")
+    if not found.converged:
+        log.warning("t = %g s: %s; going on from there", load_time, found.reason)
+    return found.state

@@ -1,0 +1,584 @@
+"""One step of a given length: the equations of blocks, the states of contacts in them, the motion, and what it took.
+
+`BlockSystem.step` attempts a step as long as it likes, and a shorter one where contacts do not settle or blocks move
+too far.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..conventions import rotate_stress
+from ..model import OPEN, SLIP, STICK, Loads, State
+from .contact_detection.contact_records import copied
+from .energy_balance import StepEnergy, sliding, step_energies
+from .joint_laws.coulomb_return import reserves
+from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, stop
+from .joint_laws.penalty_springs import Springs, end_of_step, over_a_step
+from .joint_laws.sheared_stick import stretched
+from .kinematics.constraints import balanced, hold, with_rigid_motion
+from .kinematics.midpoint_configuration import Middle
+from .kinematics.newmark import advance, assemble_blocks, turned
+from .kinematics.rigid_blocks import mean_stress
+from .kinematics.roundoff import tell_felt, undecided_gaps
+from .linear_solver import assembly
+from .loads.load_vectors import AppliedForces, Inertia, generalised
+from .loads.step_actions import StepActions, felt_gravity
+from .loads.viscous_boundary import QuietEdges
+from .open_close.augmented_lagrangian import settle_augmented
+from .open_close.contact_set import ContactSet
+from .open_close.equations import Unsettled
+from .open_close.iteration import hurries, settle
+from .open_close.settled_states import Settled
+from .results import CrackResponse, StepResult
+from .statics.out_of_balance import imbalance
+
+if TYPE_CHECKING:
+    from .interfaces import SteppedSystem
+
+#: A moving step whose faces still seek their place after this many times the iterations that states may take is cut, so
+#: often at most: two half steps take a tenth of them (a thousand blocks that slide: 400 for 24 000).
+_LABOUR, _EASED = 6, 3
+#: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
+_PLACED = 20
+#: … so often for which ends of faces hold the cohesion of all of them, …
+_SHARED = 8
+#: … and so often for the gaps that blocks which turn come to, until these are known to this part of the contacts'
+#: ``precision``; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
+#: (slabs that lean, of a tenth of that, as much in one step as all loads do).
+_BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
+
+
+class Attempt:
+    """A step of ``system`` by ``dt`` from ``state`` with the contacts ``found``; ``cuts`` steps were attempted in vain
+    before.
+
+    ``carried`` (n_blocks, 6) is the velocity that the step begins with, ``moments`` those of the blocks of
+    ``vertices``. Raises `Unsettled` where contacts find no states.
+    """
+
+    def __init__(
+        self,
+        system: SteppedSystem,
+        state: State,
+        vertices: np.ndarray,
+        carried: np.ndarray,
+        moments: np.ndarray,
+        loads: Loads,
+        dt: float,
+        crack: CrackResponse | None,
+        found: ContactSet,
+        cuts: int,
+        load_time: float | None,
+        patient: bool = True,
+    ) -> None:
+        self.system, self.state, self.vertices, self.carried, self.moments = system, state, vertices, carried, moments
+        self.dt, self.found, self.cuts, scheme = dt, found, cuts, system.scheme
+        self.time, self.patient = state.time + dt, patient
+        # Mass stays, whatever the strain does to the area.
+        self.density = system.mass / moments[:, 0]
+        self.given, self.n_free = crack is not None, len(system.moving)
+        self.crack_compliance = (
+            np.ascontiguousarray(crack.compliance, dtype=float) if self.given else system.no_compliance
+        )
+        self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
+        self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
+        self.iterations = 0
+        if not scheme.static and found.tried is None and len(found):
+            self.found = found.expecting(*self._expected_states())
+        self._edges_along: tuple[np.ndarray | None, np.ndarray] = None, np.zeros((0, 2))
+        foreseen = self._foreseen()
+        self._place(foreseen)
+        if scheme.place == 1.0 and foreseen is not None:
+            # From the end's arms the arc is long, but known as well as these.
+            self._follow(foreseen, self.middle.vertices)
+        for bends in range(_BENDS, -1, -1):
+            self._act(loads, load_time)
+            self._assemble()
+            self._absorb(loads, load_time)
+            self._settle()
+            if not bends or not self._bent():
+                break
+        self._move()
+
+    def _expected_states(self) -> tuple[np.ndarray, np.ndarray]:
+        """States and senses of sliding (n,) that open-close iterations begin with: those carried over, but of contacts
+        whose blocks part, meet or slide so fast that it would take more than all that they bear to keep them from it in
+        a step."""
+        found, system = self.found, self.system
+        centroid = np.ascontiguousarray(self.moments[:, 1:3])
+        apart, along = contact_speeds(found, found.geometry, self.carried, centroid).T
+        mass = np.where(system.fixed, np.inf, system.mass)
+        largest = np.where(system.fixed, np.inf, 0.0)
+        for blocks in (found.block, found.other):
+            np.maximum.at(largest, blocks, found.normal)
+        least = np.minimum(mass[found.block], mass[found.other]), np.minimum(largest[found.block], largest[found.other])
+        fast, slides = (least[0] * np.abs(speed) / self.dt > least[1] for speed in (apart, along))
+        after, loose = found.gap_before + self.dt * apart, found.bonded == 0
+        parts = fast & (found.state != OPEN) & loose & (after > 0.0)
+        closed = np.where(found.state == OPEN, fast & (after < 0.0), ~parts)
+        slides &= closed & loose & ((found.springs.friction > 0.0) | (found.springs.sliding > 0.0))
+        state = np.where(slides, SLIP, np.where(closed, np.where(found.state == OPEN, STICK, found.state), OPEN))
+        return state, np.where(slides, -np.sign(along), np.where(parts, 0.0, found.direction))
+
+    def _foreseen(self) -> np.ndarray | None:
+        """(n_blocks, 6) what the velocity makes of this step; None in statics, which carry none."""
+        system = self.system
+        if system.scheme.static or not self.n_free:
+            return None
+        return self.dt * system.scheme.begun(self.carried, self.state.acceleration, self.dt)[0]
+
+    def _place(self, increment: np.ndarray | None) -> None:
+        """Put the forces of the step where blocks are in the middle of ``increment`` (n_blocks, 6)."""
+        system = self.system
+        self.middle = Middle.of(increment, system.scheme.place, self.vertices, system.owner, self.moments)
+        self.turn = np.zeros(len(self.moments)) if self.middle.turn is None else self.middle.turn
+
+    def _act(self, loads: Loads, load_time: float | None) -> None:
+        """Forces, imposed motion and bolts of this step."""
+        system, state, scheme, dt, middle = self.system, self.state, self.system.scheme, self.dt, self.middle
+        acting = state.time + scheme.weight * dt if load_time is None else load_time
+        self.gravity = felt_gravity(loads, state.time, acting, dt, scheme.static, scheme.ahead(state.acceleration, dt))
+        self.points, self.edges = system.load_map.rows(loads, acting, middle.vertices, state.rotation + self.turn)
+        self.load = middle.loads_back(generalised(self.points, self.edges, middle.centroid))
+        end = self.time if load_time is None else load_time
+        self.actions = StepActions.of(
+            system.blocks, system.fixed, loads, state, system.load_map, middle, system.free, system.taken_out, end
+        )
+
+    def _assemble(self) -> None:
+        """The equations of blocks without their contacts."""
+        system, scheme, found, dt = self.system, self.system.scheme, self.found, self.dt
+        self.begun, self.heavier = scheme.begun(self.carried, self.state.acceleration, dt)
+        linked = None if self.actions is None else self.actions.linked
+        self.pattern = system.pattern_of(found.block, found.other, self.moments, linked) if self.n_free else None
+        self.order = system.free if self.pattern is None else self.pattern.order
+        if self.pattern is not None and self.pattern.solver is not None:
+            # What is cut at the first sign needs no factors in double, of 100 000 blocks another 1.6 GB.
+            self.pattern.solver.single_only = hurries(self.patient, scheme.static, self.n_free)
+        self.matrix, self.right, self.tangent, self.stress0 = assemble_blocks(
+            self.order, self.moments, self.density, system.stiffness, system.compliance, self.begun, self.stress,
+            self.crack_strain, self.given, self.crack_compliance, self.crack_offset, self.gravity, self.load, dt,
+            self.heavier,
+            scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.n_free,
+        )  # fmt: skip
+
+    def _absorb(self, loads: Loads, load_time: float | None) -> None:
+        """Add what viscous boundaries do."""
+        system, state = self.system, self.state
+        self.quiet = None
+        if loads.viscous_boundaries and not system.scheme.static and self.n_free:
+            time = state.time + 0.5 * self.dt if load_time is None else load_time
+            self.quiet = QuietEdges.of(
+                loads.viscous_boundaries, system.blocks, self.middle.vertices, time, system.density, system.stiffness,
+                system.fixed,
+            )  # fmt: skip
+            self.quiet.assemble(self.matrix, self.right, self.order, self.middle, self.dt)
+
+    def _held(self) -> np.ndarray | None:
+        """(n_blocks, 3) bool: what is held of the blocks' motion in this step; None where nothing is."""
+        system, actions, held = self.system, self.actions, self.system.held
+        alone = system.scheme.static and system.blocks.n_blocks == 1 and self.n_free and actions is None
+        weight = system.mass[0] * self.gravity if alone else None
+        if alone and balanced(self.load[0], self.points, self.edges, weight, self.moments[0]):
+            held = with_rigid_motion(held)
+        return held if actions is None else actions.held(held)
+
+    def _settle(self) -> None:
+        """The states of contacts and the unknowns; faces with a stiffness are tried on other parts until they fit."""
+        actions, found, order, middle = self.actions, self.found, self.order, self.middle
+        held = self._held()
+        own, shared = (self.matrix, self.right), 0
+        for tries in range(1, 2 * _PLACED + 1):
+            if found.points is not None or tries > 1:
+                self.matrix, self.right = own[0].copy(), own[1].copy()
+            springs, gap, weight, curved = self._over_the_step(found)
+            geometry = middle.contacts(found.geometry, found.block, found.other, self._along(found))
+            vectors = assembly.contact_vectors(found.block, found.other, geometry, order, middle.moments)
+            middle.turn_back(vectors, found.block, found.other, geometry)
+            if found.points is not None:
+                found.points.share_shear(vectors, found.block)
+            if held is not None and self.n_free:
+                hold(held, self.matrix, self.right, vectors, found.block, found.other, order)
+            if not self.n_free:
+                zero, self.slack = np.zeros(len(found)), np.full(len(found), self.system.rounding)
+                settled = Settled(
+                    np.zeros((0, 6)), found.state, zero, found.bonded, zero, zero, zero, zero, zero, found.springs, 0
+                )
+                unknowns = settled.unknowns
+            elif actions is None:
+                settled = self._settled(self.pattern, self.matrix, self.right, found, gap, vectors, springs, curved)
+                unknowns = settled.unknowns
+            else:
+                solve = partial(self._settled, vectors=vectors, springs=springs, curved=curved)
+                settled, unknowns = actions.settle(
+                    self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
+                )
+            self.iterations += settled.iterations
+            better = found.misplaced(settled)
+            if better is None and shared < _SHARED:
+                sharing = found.sharing_cohesion(settled.state, settled.bonded)
+                better, shared = (None if sharing is found else sharing), shared + 1
+            if better is None:
+                break
+            if self._laboured():
+                raise Unsettled(f"contacts have not settled in {self.iterations} open-close iterations")
+            if tries % _PLACED == 0:
+                # Which part touches may follow contacts that jump at any step: these faces stand on their corners in
+                # this one.
+                better = found.cornered(better)
+            found = better.trying_again(settled)
+        else:
+            raise Unsettled("faces do not settle on the part of them that touches")
+        self.found, self.settled, self.unknowns = found, settled, unknowns
+        self.vectors, self.weight, self.acting = vectors, weight, geometry
+
+    def _laboured(self) -> bool:
+        """Whether shorter steps are likely to come sooner to where this one goes."""
+        if self.system.scheme.static or self.cuts >= _EASED:
+            return False
+        return self.iterations > _LABOUR * self.system.settings.max_open_close_iterations
+
+    def _bent(self) -> bool:
+        """Give contacts the gaps that the motion really leads to, and the forces of the step the place that they have
+        in its middle; False if those are known."""
+        system, found, settled = self.system, self.found, self.settled
+        if not len(found) or not self.n_free:
+            return False
+        known = (_KNOWN_IN_STATICS if system.scheme.static else _KNOWN) * found.precision
+        # What turns by r while it moves by d leaves its chord by r d at most.
+        increment = self._increment(self.unknowns)
+        if 2.0 * np.abs(increment[:, 2]).max() * system.step_limit < known.min():
+            return False
+        vertices = self._advanced(increment)[0]
+        straight = settled.gap + settled.lifted + found.lift - found.arc
+        if found.points is not None:
+            straight = found.points.gap_at_corners(straight)
+        gap = system.finder.gaps(vertices, self.vertices, found if found.lumped is None else found.lumped)
+        arc, before = gap - straight, found.arc if found.lumped is None else found.lumped.arc
+        some = (settled.state != OPEN) | (gap < 0.0)
+        if not (np.abs(arc - before) > known)[some].any():
+            return False
+        tried = found.rows(settled)
+        if not system.scheme.static:
+            self._place(increment)
+        self._follow(increment, vertices)
+        # In statics bonds were first asked about blocks where they stand: on the arcs of one that has flown off, any
+        # would seem to hold.
+        self.found = self.found.trying(tried, without_lost=system.scheme.static)
+        return True
+
+    def _follow(self, increment: np.ndarray, vertices: np.ndarray) -> None:
+        """Let the contacts follow the arcs of ``increment`` (n_blocks, 6), which leads to ``vertices``: by what these
+        go beyond what the equations of this middle make of it."""
+        system, found, scaled = self.system, self.found, increment.copy()
+        if found.lumped is not None:
+            found = found.lumped
+        if not len(found):
+            return
+        blocks, all_blocks = (found.block, found.other), np.arange(len(increment))
+        scaled[:, 2:] *= np.sqrt(self.moments[:, :1])
+        along = self._along(found)
+        geometry = self.middle.contacts(found.geometry, *blocks, along)
+        vectors = assembly.contact_vectors(*blocks, geometry, all_blocks, self.middle.moments)
+        self.middle.turn_back(vectors, *blocks, geometry)
+        across, slid = (sliding(vectors, scaled, all_blocks, *blocks, way) for way in (0, 1))
+        end = Middle.of(increment, 1.0, self.vertices, system.owner, self.moments)
+        went = end.contacts(found.geometry, *blocks, along)[:, 0] - found.geometry[:, 0]
+        arc = system.finder.gaps(vertices, self.vertices, found) - found.geometry[:, 3] - across
+        self.found = self.found.along(arc, went * np.hypot(*along.T) - slid)
+
+    def _along(self, found: ContactSet) -> np.ndarray:
+        """(n, 2) m: the edges of ``found``."""
+        edge, along = self._edges_along
+        if found.edge is not edge:
+            along = self.vertices[self.system.next[found.edge]] - self.vertices[found.edge]
+            self._edges_along = found.edge, along
+        return along
+
+    def _over_the_step(self, found: ContactSet):
+        """What acts over the step of the contacts ``found``: springs, starting gaps (n,), how the step's end weighs,
+        curved laws."""
+        system = self.system
+        curved = system.finder.curved(found)
+        # Multipliers are forces at the end of the step.
+        weight = 1.0 if system.allowed_penetration else system.scheme.weight
+        if weight != 1.0 and curved is not None:
+            # The lines of a law that is curved are those of the end of the step.
+            weight = np.full(len(found), weight)
+            weight[curved.rows] = 1.0
+        mass = np.where(system.fixed, np.inf, system.mass)
+        springs, gap = over_a_step(
+            found.springs, np.ascontiguousarray(found.gap_before), (found.state != OPEN) & (found.bonded > 0),
+            np.minimum(mass[found.block], mass[found.other]), weight, system.scheme.block_damping, self.dt, found.arc,
+        )  # fmt: skip
+        return springs, gap, weight, curved
+
+    def _settled(self, pattern, matrix, right, found, gap, vectors, springs, curved) -> Settled:
+        system = self.system
+        # Loads at which contacts change are sought in statics, and known to the rounding.
+        slack = self.slack = (
+            np.full(len(found), system.rounding)
+            if system.scheme.static
+            else undecided_gaps(system.rounding, right, pattern.order, found.block, found.other, springs.normal)
+        )
+        if not system.rounding_told:
+            system.rounding_told = True
+            weight = np.where(system.fixed, np.inf, system.mass * np.hypot(*self.gravity))
+            tell_felt(system.rounding, weight, found.block, found.other, springs.normal, system.finder.names)
+
+        def solve(contacts: ContactSet, stiff: Springs, start: np.ndarray, stretch: np.ndarray) -> Settled:
+            def settled(contacts: ContactSet) -> Settled:
+                most = system.settings.max_open_close_iterations
+                return settle(
+                    pattern, matrix, right, contacts, vectors, stiff, start, slack, most, curved,
+                    system.scheme.static, self.patient, expected=self._expected_unknowns(),
+                )  # fmt: skip
+
+            return stretched(settled, contacts, stiff, start, stretch, curved) if stretch.any() else settled(contacts)
+
+        found = replace(found, stretch=found.stretch + found.swing)
+        if not system.allowed_penetration or not len(found):
+            return solve(found, springs, gap, found.stretch)
+        return settle_augmented(solve, found, springs, gap, system.finder.on_penalty(found), system.allowed_penetration)
+
+    def _expected_unknowns(self) -> np.ndarray | None:
+        """(6 n_free,) what the velocity makes of this step, in the unknowns of `assembly`; None in statics."""
+        if self.system.scheme.static:
+            return None
+        moving = self.system.moving
+        increment = self.dt * self.carried[moving]
+        increment[:, 2:] *= np.sqrt(self.moments[moving, :1])
+        out = np.empty_like(increment)
+        out[self.order[moving]] = increment
+        return out.ravel()
+
+    def _increment(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n_blocks, 6) displacements of all blocks in the step."""
+        system, increment = self.system, np.zeros((self.system.blocks.n_blocks, 6))
+        increment[system.moving] = unknowns[self.order[system.moving]]
+        increment[:, 2:] /= np.sqrt(self.moments[:, :1])
+        if self.actions is not None and self.actions.imposed is not None:
+            increment += self.actions.imposed.increment
+        return increment
+
+    def _advanced(self, increment: np.ndarray):
+        """As `advance` returns it."""
+        system = self.system
+        return advance(
+            increment, self.carried, self.dt, system.scheme.static, self.vertices, system.vertex_start, self.moments,
+            self.tangent, self.stress0, self.crack_compliance, self.crack_offset, self.given, self.crack_strain,
+            system.turns,
+        )  # fmt: skip
+
+    def _move(self) -> None:
+        """Blocks are moved; their velocities, stresses and accelerations at the end."""
+        scheme, found, dt = self.system.scheme, self.found, self.dt
+        carried, actions = self.carried, self.actions
+        increment = self._increment(self.unknowns)
+        imposed = None if actions is None else actions.imposed
+        self.new_vertices, velocity, self.new_stress, self.new_crack, self.largest = self._advanced(increment)
+        if self.quiet is not None:
+            absorbed = self.quiet.rows(increment, self.middle, dt)
+            self.edges = np.concatenate([self.edges, absorbed])
+            self.load = self.load + self.middle.loads_back(generalised(self.points[:0], absorbed, self.middle.centroid))
+        acceleration = 2.0 * (increment - carried * dt) / (dt * dt)
+        before = self._remembered(acceleration)
+        velocity, self.kept = scheme.corrected(velocity, before, acceleration, increment[:, 2], dt)
+        if self.heavier != 1.0:
+            acceleration = 2.0 * self.heavier * (increment - self.begun * dt) / (dt * dt)
+        self.slid = sliding(self.vectors, self.settled.unknowns, self.order, found.block, found.other)
+        if actions is not None and self.n_free:
+            self.slid += actions.along
+        self.rubbed = 0.0
+        if imposed is not None:
+            imposed.correct_velocity(velocity)
+        self.increment, self.velocity, self.acceleration = increment, velocity, acceleration
+        if not scheme.static and self.n_free:
+            self._stop(imposed)
+
+    def _remembered(self, mean: np.ndarray) -> np.ndarray | None:
+        """(n_blocks, 6) the acceleration that the step began with, as far as it still holds; None before there is any.
+
+        Where a contact has opened or closed it tells of forces that are gone, or not of those that have come, and what
+        a spring makes of it that the step does not resolve, k dt² > m, is noise that can grow from bounce to bounce:
+        there the ``mean`` of the step stands for it, with which no step gains energy."""
+        before, system = self.state.acceleration, self.system
+        if before is None or system.scheme.alpha or not system.scheme.memory:
+            return before
+        found, closed = self.found, self.settled.state != OPEN
+        changed = np.where(closed, (found.state == OPEN) & (found.gap_before >= 0.0), found.state != OPEN)
+        stiffness = np.where(closed, found.springs.normal, 0.0) * self.dt**2
+        before = before.copy()
+        for blocks in (found.block, found.other):
+            forgets = blocks[changed | (stiffness > system.mass[blocks])]
+            before[forgets] = mean[forgets]
+        return before
+
+    def _stop(self, imposed) -> None:
+        """Take off the velocity what the step cannot bring about (`friction_arrest`); the energy (J/m) that this takes."""
+        system, found, velocity = self.system, self.found, self.velocity
+        mass = np.where(system.fixed, np.inf, system.mass)
+        if not len(found):
+            return
+        end = Middle.of(self.increment, 1.0, self.vertices, system.owner, self.moments)
+        geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
+        speeds = contact_speeds(found, geometry, velocity, end.centroid)
+        stopped = Stopped.of(found, self.settled, self.slid, speeds[:, 1], mass, self.dt, system.rounding)
+        unresolved = Unresolved.of(found, self.settled, self.slid, speeds, mass, self.dt)
+        if stopped is None and unresolved is None:
+            return
+        try:
+            change, rubbed = stop(
+                stopped, unresolved, self.pattern, self.matrix, self.vectors, found, self.settled, self.dt
+            )  # fmt: skip
+        except np.linalg.LinAlgError as error:
+            raise Unsettled(str(error)) from error
+        if imposed is not None:
+            change = imposed.free_part(change, self.order)
+        rates = np.zeros_like(velocity)
+        rates[system.moving] = change[self.order[system.moving]] * (2.0 / self.dt)
+        rates[:, 2:] /= np.sqrt(self.moments[:, :1])
+        rates, taken = dissipating(
+            turned(rates, self.increment[:, 2]), velocity, self.moments, self.density, system.fixed
+        )
+        self.velocity, self.rubbed = velocity + rates, min(max(rubbed, 0.0), taken)
+
+    def result(self) -> StepResult:
+        """The step as it is told of."""
+        system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
+        state, actions, dt, gravity, middle = self.state, self.actions, self.dt, self.gravity, self.middle
+        acting = self.acting
+        if found.points is not None:
+            acting = middle.contacts(found.points.corners, found.block, found.other, self._along(found))
+        rows = found.rows(settled, acting)
+        reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
+        points, load, turn = self.points, self.load, self.increment[:, 2]
+        if actions is not None:
+            points, reaction, acted = actions.acted(settled, self.unknowns, rows, points, self.new_vertices)
+            acting_right, largest_force = actions.with_bolt_forces(self.right), actions.largest_bolt_force
+            load = middle.loads_back(generalised(points, self.edges, middle.centroid))
+            load = load + actions.work_forces(reaction, rows, middle.centroid)
+        end_shear = end_of_step(found.shear, settled.shear_force, settled.state == STICK, self.weight)
+        energy = self._energy(load, end_shear)
+        residual, ratio = imbalance(
+            self.matrix, acting_right, self.vectors, found.block, found.other, self.order, settled.unknowns,
+            settled.normal_force, settled.shear_force, self.acceleration, self.density, self.moments, gravity, load,
+            largest_force,
+        )  # fmt: skip
+        new_stress, acceleration = self.new_stress, self.acceleration
+        if len(system.rigid):
+            from_outside = load.copy()
+            if reaction is not None:
+                # What holds the strains of a rigid block is its stress.
+                from_outside[:, 3:] -= reaction[:, 3:]
+            new_stress[system.rigid] = mean_stress(
+                system.rigid, rows, from_outside, middle.moments, self.density, acceleration, self.carried[:, 2], self.turn,
+                turn,
+            )  # fmt: skip
+        if scheme.mass_damping:
+            acceleration = acceleration + scheme.mass_damping / dt * self.increment
+        memory = rows
+        if scheme.weight != 1.0 or found.points is not None:
+            # Of what springs inside faces bear in shear, each goes on with its own.
+            memory = copied(rows)
+            memory["shear_force"] = end_shear
+        if system.taken_out is not None:
+            new_stress[system.taken_out] = 0.0
+        beyond = None
+        if not scheme.static:
+            beyond = scheme.overstress(
+                self.increment[:, 3:], self.tangent, self.stress0 - self.stress, system.stiffness, system.mass, dt
+            )
+        if middle.turn is not None:
+            acceleration = turned(acceleration, middle.turn)
+            beyond = None if beyond is None else rotate_stress(beyond, middle.turn)
+        inertia = Inertia(self.density, gravity, acceleration, self.carried[:, 2], system.fixed)
+        area = self.moments[:, 0].copy()
+        forces = AppliedForces(points, self.edges, middle.centroid, area, inertia, reaction, beyond)
+        imposed = None if actions is None else actions.imposed
+        new_state = State(
+            time=self.time,
+            vertices=self.new_vertices,
+            velocity=self.velocity,
+            stress=new_stress,
+            rotation=state.rotation + turn,
+            crack_strain=self.new_crack,
+            contacts=system.finder.carried(self.new_vertices, memory),
+            acceleration=self.kept,
+            bolts=state.bolts if actions is None else actions.memory,
+            imposed=state.imposed if imposed is None else imposed.totals,
+            removed=system.taken_out,
+        )
+        statistics = {
+            "open_close_iterations": self.iterations,
+            "dt": dt,
+            "step_cuts": self.cuts,
+            "kinetic_energy": energy.kinetic,
+            "elastic_energy": energy.elastic,
+            "contact_energy": energy.contact,
+            "worst_penetration": _deepest(settled.state != OPEN, found.gap_before, settled.gap),
+            "max_displacement_ratio": self.largest / system.half_diagonal,
+            "unbalanced": residual,
+            "unbalanced_ratio": ratio,
+            **acted,
+        }
+        reserve = reserves(
+            settled.state, settled.bonded, settled.normal_force, settled.shear_force, settled.gap, settled.springs,
+            self.slack,
+        )  # fmt: skip
+        return StepResult(
+            new_state, dt, rows, forces, acceleration, energy, reserve, middle.vertices, self.turn, found.arcs,
+            statistics, self._worst_overlap() if energy.overlap > 0.0 else None,
+        )  # fmt: skip
+
+    def _worst_overlap(self) -> tuple[float, int, int, float, float, float]:
+        """As `overlap_energy.Overlap`: of the contact that closed where its vertex lay deepest in the springs' terms."""
+        found = self.found
+        fresh = (found.state == OPEN) & (self.settled.state != OPEN)
+        given = np.where(fresh, 0.5 * found.springs.normal * np.minimum(found.gap_before, 0.0) ** 2, 0.0)
+        worst = int(np.argmax(given))
+        x, y = found.geometry[worst, 5:7].tolist()
+        return float(given[worst]), *found.blocks_of(worst), -float(found.gap_before[worst]), x, y
+
+    def _energy(self, load: np.ndarray, end_shear: np.ndarray) -> StepEnergy:
+        """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""
+        system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
+        weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
+        energy = StepEnergy._make(
+            step_energies(
+                self.increment, self.state.velocity, self.carried, self.velocity, self.acceleration, self.dt,
+                self.gravity,
+                load, scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.density,
+                self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance,
+                system.stiffness,
+                found.state, settled.state, found.bonded, settled.bonded, found.gap_before, settled.gap,
+                found.arc + np.zeros(len(found)), settled.lifted,
+                settled.slip, self.slid, settled.normal_force, found.shear, settled.shear_force, end_shear,
+                *self._real_springs(), weight, found.law, system.finder.closure,
+            ).tolist()
+        )  # fmt: skip
+        return energy._replace(
+            before=energy.before + found.unbent + found.released,
+            bond=energy.bond + found.unbent,
+            friction=energy.friction + self.rubbed,
+            # What springs back where faces part is a vibration that no step resolves.
+            scheme=energy.scheme - self.rubbed + found.released,
+        )
+
+    def _real_springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Contact springs that store energy, normal and shear: what multipliers hold does not."""
+        normal, shear = self.found.springs.normal, self.settled.springs.shear
+        if not self.system.allowed_penetration:
+            return normal, shear
+        held = self.system.finder.on_penalty(self.found)
+        return np.where(held[0], 0.0, normal), np.where(held[1], 0.0, shear)
+
+
+def _deepest(closed: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    """The deepest that ``closed`` contacts penetrate, m: as the step found them and as it leaves them."""
+    return float(max(0.0, -np.minimum(before, after)[closed].min())) if closed.any() else 0.0

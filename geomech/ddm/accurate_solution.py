@@ -1,0 +1,55 @@
+"""A body solved on finer and finer meshes, until its stress intensity factors are good to a target error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..model import Cracks, DdmSettings, Material
+from .adaptivity import HIGHEST, check_target, finer, of_order, order_for
+from .body import Body
+from .fracture.chord_error import chord_errors
+from .fracture.sif_error_estimate import floor, warn
+from .fracture.target_error import TargetMissed
+from .fracture.tip_factors import factors, largest, negligible
+from .kernels import shape_functions
+from .loads.body_loads import BodyLoad
+from .solution import Solution
+
+
+def solve_to(
+    loops: Sequence[np.ndarray],
+    cracks: Cracks,
+    material: Material,
+    load: BodyLoad,
+    target_error: float = 1e-6,
+    nodes: str = "chebyshev",
+    **body,
+) -> Solution:
+    """The body under ``load`` with stress intensity factors to ``target_error``, relative to the largest K.
+
+    Meshes of two orders, and of further ones while their K differ by more than the target. ``tip_errors`` of the
+    solution, which is that of the last mesh, is what it differs by from the one before: a bound of the error, ten times
+    as large as a rule. Raises `TargetMissed`, with the last solution, when the highest order does not reach the target.
+    ``body``: further arguments of `Body`.
+    """
+    check_target(target_error)
+    # What is graded for twice the target is a tenth finer the second time.
+    order = order_for(min(10 * target_error, 0.5))
+    settings = of_order(DdmSettings(nodes=nodes), min(order, HIGHEST - 2), min(2 * target_error, 0.5))
+    before = Body(loops, cracks, material, settings, **body).solve(load)
+    while settings.order < shape_functions.MAX_ORDER:
+        settings = finer(settings)
+        solution = before.body.remeshed(settings).solve(load)
+        k = factors(solution)
+        errors = np.abs(k - factors(before)) + floor(solution.body) * largest(k)
+        if errors.max(initial=0.0) <= target_error * largest(k) + negligible(solution):
+            solution.tip_errors = errors = errors + chord_errors(solution)
+            if errors.max(initial=0.0) > target_error * largest(k) + negligible(solution):
+                raise TargetMissed(solution, target_error)
+            warn(errors, k)
+            return solution
+        before = solution
+    solution.tip_errors = errors
+    raise TargetMissed(solution, target_error)

@@ -1,0 +1,1 @@
+"""Contact of crack faces: unilateral, frictional, cemented or filled."""

@@ -1,0 +1,171 @@
+"""The contact of a body's crack faces under one load, by the solver that their laws need."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..growth.crack_network import nearest_on
+from ..kernels import shape_functions
+from .face_laws import FaceMemory, FaceStates, carried_over
+from .frictional_contact import settle_rough
+from .frictionless_contact import NotConverged, Settled, settle
+
+if TYPE_CHECKING:
+    from ..interfaces import CrackedBody, SolvedBody
+
+#: Faces that no state of contact satisfies may be this part of their crack: what happens at the end of a blade of rock
+#: is not felt by a tip that is far away.
+UNDECIDED = 0.03
+#: Rock between a tip and a side, over the body's extent, that is worth a word when faces do not settle.
+BY_A_THREAD = 1e-2
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class FaceAnswer:
+    """``jumps`` slip and opening (times 2μ) and ``traction`` on the faces, (n_unknowns,); ``closed`` (n_unknowns,)
+    bool, the openings that are used up; ``solves`` it took; of faces that have one, ``memory``
+    after this load, and ``began`` before."""
+
+    jumps: np.ndarray
+    traction: np.ndarray
+    closed: np.ndarray
+    solves: int
+    memory: FaceMemory | None = None
+    began: FaceMemory | None = None
+
+
+def settle_faces(
+    body: CrackedBody,
+    load_traction: np.ndarray,
+    opened: np.ndarray,
+    pressure: np.ndarray | float,
+    warm: SolvedBody | None,
+    history: SolvedBody | FaceMemory | None = None,
+) -> FaceAnswer:
+    """The faces of ``body``; ``load_traction`` (n_unknowns,) is what loads do to closed faces, ``opened`` S⁻¹ of it,
+    ``pressure`` (n_elements, p+1) that of a fluid at the nodes. ``warm`` and ``history`` as in `Body.solve`."""
+    c = body.faces
+    n = c.n_unknowns
+    if n == 0:
+        return FaceAnswer(np.zeros(0), np.zeros(0), np.zeros(0, bool), 0)
+    applied = np.zeros((c.n, 2, c.per))
+    applied[:, 1] = -pressure
+    applied = applied.ravel()
+    right = applied - load_traction
+    if body.rough:
+        return _rough(body, right, applied, warm, history)
+    opened = body.crack_system.opened(applied) - opened if applied.any() else -opened
+    aperture, can_close, fixed = body.closing
+    stress_scale = max(float(np.abs(right).max()), np.finfo(float).tiny)
+    gap_scale = stress_scale * float(c.length.max())
+    state: dict[str, np.ndarray] = {}
+
+    def respond(closed):
+        w, reaction = body.crack_system.constrained(right, closed, fixed, opened)
+        state["w"], state["traction"] = w, applied - reaction
+        return (w + aperture) / gap_scale, reaction / stress_scale
+
+    closed = np.zeros(n, bool)
+    if not can_close.any():
+        respond(closed)
+        return FaceAnswer(state["w"], state["traction"], closed, 1)
+    warm = history if warm is None and not isinstance(history, FaceMemory) else warm
+    if warm is not None and warm.body.faces.per == c.per:  # a first guess: nodes of another order have none
+        at = c.found_in(warm.body.faces)
+        rows = np.zeros((c.n, 2 * c.per), bool)
+        rows[at >= 0] = warm.closed.reshape(-1, 2 * c.per)[at[at >= 0]]
+        closed = rows.ravel()
+    try:
+        settled = settle(respond, can_close, closed)
+    except NotConverged as failure:
+        raise NotConverged(f"{failure}{_whereabouts(body, None)}") from None
+    if settled.undecided.any():
+        _judge(body, settled)
+    return FaceAnswer(state["w"], state["traction"], settled.closed, settled.solves)
+
+
+def _whereabouts(body: CrackedBody, node: int | None) -> str:
+    """The crack on which the ``node`` is, and what rock there is between its tips and the outline where that is next to
+    none: a piece that hangs by it rattles."""
+    c, cracks, edges = body.faces, body.cracks, body.mesh.edges
+    said = ""
+    if node is not None:
+        element = node // c.per
+        x, y = c.nodes[element, node % c.per]
+        said = f", one of {cracks.names[cracks.crack[c.source[element]]]!r} at ({x:.6g}, {y:.6g})"
+    if len(edges) and len(cracks.tips):
+        left = np.min(
+            [[nearest_on(tuple(cracks.nodes[tip]), tuple(a), tuple(b))[0] for a, b in edges] for tip in cracks.tips],
+            axis=1,
+        )
+        tip = int(np.argmin(left))
+        if left[tip] < BY_A_THREAD * body._extent:
+            (x, y), crack = cracks.nodes[cracks.tips[tip]], body.tip_elements[0]["crack"][tip]
+            said += (
+                f"; from the tip of {cracks.names[crack]!r} at ({x:.6g}, {y:.6g}) only {left[tip]:.2g} m of rock are "
+                "left to a side"
+            )
+    return said
+
+
+def _judge(body: CrackedBody, settled: Settled) -> None:
+    """Log where the nodes are of which no state of contact was found. Raises NotConverged, which names the crack, when
+    they are more than a crack's last bit at a mouth or junction: then they matter."""
+    c, cracks = body.faces, body.cracks
+    at = np.flatnonzero(settled.undecided.reshape(c.n, -1).any(axis=1))
+    crack = cracks.crack[c.source]
+    for number in np.unique(crack[at]):
+        here = at[crack[at] == number]
+        length, own = float(c.length[here].sum()), float(c.length[crack == number].sum())
+        x, y = c.start[here[0]]
+        where = (
+            f"faces of {cracks.names[number]!r} beside ({x:.6g}, {y:.6g}) are open in no state that holds at all "
+            "their points"
+        )
+        if length > UNDECIDED * own or (c.kind[here] != shape_functions.ORDINARY).any():
+            raise NotConverged(f"{where}, over {length:.3g} m: give it an aperture, friction, or a finer mesh")
+        _log.warning(
+            "%s, over %.3g m; they are left with a violation of %.1e of the largest stress",
+            where,
+            length,
+            settled.violation,
+        )
+
+
+def _rough(
+    body: CrackedBody,
+    right: np.ndarray,
+    applied: np.ndarray,
+    warm: SolvedBody | None,
+    history: SolvedBody | FaceMemory | None,
+) -> FaceAnswer:
+    laws = body.laws
+    began = body.never_loaded if history is None else _memory(history, body)
+    first = history if warm is None else warm
+    guess: FaceStates | None = None if first is None else _memory(first, body).states
+    try:
+        w, reaction, memory, solves, missed = settle_rough(body.face_equations, right, began, guess)
+    except NotConverged as failure:
+        raise NotConverged(f"{failure}{_whereabouts(body, failure.node)}", failure.node) from None
+    if missed.undecided.any():
+        _judge(body, Settled(memory.states.closed, solves, missed.undecided, missed.violation))
+    closed = np.zeros(len(right), bool)
+    closed[laws.across] = memory.states.closed
+    return FaceAnswer(w, applied - reaction, closed, solves, memory, began)
+
+
+def _memory(of: SolvedBody | FaceMemory, body: CrackedBody) -> FaceMemory:
+    """What the faces of ``of`` remember, on the elements of ``body``."""
+    if isinstance(of, FaceMemory):
+        return carried_over(of, body.faces)
+    memory = of.memory
+    if memory is None:
+        c = of.body.faces
+        slip = of.jumps.reshape(c.n, 2, c.per)[:, 0].ravel()
+        memory = FaceMemory(c, slip, np.zeros(slip.size, bool), 0.0, of.face_states, *np.zeros((2, slip.size)))
+    return carried_over(memory, body.faces)

@@ -1,0 +1,194 @@
+"""What crack faces do to each other: laws node by node, the states they can be in, and what they remember.
+
+A law is a `JointLaw`. Faces press when the opening has used up the aperture (gap w_n + a = 0), rigidly, or through a
+filling of stiffness k_n: λ = −k_n (w_n + a)/2μ. Closed faces carry shear up to c + λ tan φ, and until then stick,
+rigidly or through k_s. Faces with tensile strength are cemented: they hold together, without aperture, until the normal
+traction passes the strength at a node; there cement and cohesion are lost for good. Cohesion otherwise is not used up
+by slip. Stiffness does not act across open faces.
+What grows is torn from whole rock: fresh faces have the friction of their crack's law, but no cohesion, cement or
+filling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...model import Cracks, JointLaw
+from ..kernels import shape_functions
+
+if TYPE_CHECKING:
+    from ..system.influence_matrix import ElementSet
+
+#: What faces do that nothing is said of.
+SMOOTH = (JointLaw("frictionless"),)
+#: A node belongs to a former element when it is nearer to it than this part of that element's length.
+_ON = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class FaceStates:
+    """Of every node (n,): ``closed``; ``way`` 0 where closed faces stick, ±1 where they slip along or against the
+    tangent; ``pulled``, whether cement is in tension. Smooth faces that are closed neither stick nor have a way."""
+
+    closed: np.ndarray
+    way: np.ndarray
+    pulled: np.ndarray
+
+    @classmethod
+    def open(cls, n: int) -> FaceStates:
+        return cls(np.zeros(n, bool), np.zeros(n, np.int8), np.zeros(n, bool))
+
+    @cached_property
+    def key(self) -> bytes:
+        return self.closed.tobytes() + self.way.tobytes() + self.pulled.tobytes()
+
+
+class Released(NamedTuple):
+    """J/m since the beginning. Of cement that broke, ``bond``: the mean of its strength and of what its faces bear
+    afterwards, on the way they part. Faces give way only once what they bear has come to their strength, while the
+    mean of a step's loads begins with the first of them: by so much more the loads did that were there when faces
+    slipped, ``slip_onset``, and parted, ``break_onset``."""
+
+    bond: float = 0.0
+    slip_onset: float = 0.0
+    break_onset: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class FaceMemory:
+    """What the faces of crack ``elements`` keep from load to load: ``rest`` (n,) the slip (times 2μ) at which they are
+    without shear, ``broken`` (n,) lost cement, ``work`` J/m done against friction since the beginning, ``states`` as
+    they were, ``pressure`` and ``shear`` (n,) Pa between them, ``released`` what giving way has come to."""
+
+    elements: ElementSet
+    rest: np.ndarray
+    broken: np.ndarray
+    work: float
+    states: FaceStates
+    pressure: np.ndarray
+    shear: np.ndarray
+    released: Released = field(default_factory=Released)
+
+    @classmethod
+    def none(cls, elements: ElementSet) -> FaceMemory:
+        n = elements.n * elements.per
+        return cls(elements, np.zeros(n), np.zeros(n, bool), 0.0, FaceStates.open(n), np.zeros(n), np.zeros(n))
+
+
+def all_smooth(laws: Sequence[JointLaw]) -> bool:
+    """Whether faces under these laws do no more than open and close. Raises ValueError for laws that faces cannot
+    follow."""
+    for one in laws:
+        if not one.straight:
+            raise ValueError(
+                f"joint {one.name!r}: crack faces know neither residual friction, softening, dilation, roughness nor "
+                "hyperbolic closure; give the crack a joint without them"
+            )
+    return not any(one.friction or one.cohesion or one.tensile_strength or one.normal_stiffness for one in laws)
+
+
+def check_laws(laws: Sequence[JointLaw], cracks: Cracks) -> None:
+    """Raise ValueError naming the crack that has a law which is not there, or an aperture and yet is cemented."""
+    law = cracks.law
+    if not len(law) or (len(laws) == 1 and not law.any() and not laws[0].tensile_strength):
+        return
+    for s in np.flatnonzero((law < 0) | (law >= len(laws))):
+        raise ValueError(f"{_called(cracks, s)}: its faces have law {int(law[s])}, but there are {len(laws)}")
+    cemented = np.array([one.tensile_strength > 0 for one in laws])[law]
+    for s in np.flatnonzero(cemented & (cracks.aperture > 0)):
+        raise ValueError(
+            f"{_called(cracks, s)}: faces with an aperture cannot have the tensile strength of {laws[law[s]].name!r}"
+        )
+
+
+def _called(cracks: Cracks, segment: int) -> str:
+    k = int(cracks.crack[segment])
+    return repr(cracks.names[k]) if k < len(cracks.names) else f"crack {k}"
+
+
+class FaceLaws:
+    """The laws at the nodes of crack ``elements``, arrays (n_nodes,) in the order element, node.
+
+    closes     whether faces can meet; ``aperture`` (times 2μ) how far they are apart
+    rough      whether they resist slip; ``friction`` tan φ, ``cohesion`` Pa
+    strength   Pa, of the cement
+    normal, shear   stiffness of the filling over 2μ, Pa/m; inf: rigid
+    """
+
+    def __init__(self, laws: Sequence[JointLaw], elements: ElementSet, cracks: Cracks, twice_mu: float):
+        self.elements, self.twice_mu = elements, twice_mu
+
+        def at_nodes(values: np.ndarray) -> np.ndarray:
+            return np.repeat(values[elements.source], elements.per)
+
+        def of_law(value, fresh: float) -> np.ndarray:
+            of_segment = np.array([value(one) for one in laws], dtype=float)[law]
+            return at_nodes(np.where(cracks.birth_cycle > 0, fresh, of_segment))
+
+        law, apart = cracks.law, at_nodes(cracks.aperture)
+        self.closes = np.isfinite(apart)
+        self.aperture = np.where(self.closes, twice_mu * np.where(self.closes, apart, 0.0), 0.0)
+        self.friction = at_nodes(np.array([one.friction for one in laws])[law])
+        self.cohesion = of_law(lambda one: one.cohesion, 0.0)
+        self.strength = of_law(lambda one: one.tensile_strength, 0.0)
+        rigid = np.inf
+        self.normal = of_law(lambda one: one.normal_stiffness or rigid, rigid) / twice_mu
+        self.shear = of_law(lambda one: one.shear_stiffness or rigid, rigid) / twice_mu
+        self.rough = self.closes & ((self.friction > 0) | (self.cohesion > 0))
+        node = np.arange(elements.n * elements.per)
+        along = node // elements.per * 2 * elements.per + node % elements.per
+        self.along, self.across = along, along + elements.per
+
+    def cemented(self, broken: np.ndarray) -> np.ndarray:
+        return (self.strength > 0) & ~broken
+
+    def limit(self, pressure: np.ndarray, broken: np.ndarray) -> np.ndarray:
+        """Shear that the nodes stand under ``pressure``, Pa."""
+        return self.friction * np.maximum(pressure, 0.0) + self.held_by_cohesion(broken)
+
+    def held_by_cohesion(self, broken: np.ndarray) -> np.ndarray:
+        return np.where(broken, 0.0, self.cohesion)
+
+
+def carried_over(memory: FaceMemory, now: ElementSet) -> FaceMemory:
+    """``memory`` on the elements ``now``: the same where an element is the same, slip interpolated and marks taken from
+    the nearest node where elements were divided or joined, nothing on fresh faces."""
+    was = memory.elements
+    if now is was:
+        return memory
+    nodes = shape_functions.nodes(was.family, was.order)
+    same = now.found_in(was)
+    source, marks = np.full((now.n, now.per), -1), np.zeros((now.n, now.per), int)
+    rest = np.zeros((now.n, now.per))
+    old = memory.rest.reshape(was.n, was.per)
+    kept = same >= 0
+    if kept.any():  # none is where the order has changed, and with it the number of nodes
+        rest[kept], source[kept], marks[kept] = old[same[kept]], same[kept, None], np.arange(now.per)
+    for e in np.flatnonzero(~kept):
+        rel = now.nodes[e][:, None] - was.start
+        along = np.einsum("jec,ec->je", rel, was.tangent) / was.length
+        off = np.abs(np.einsum("jec,ec->je", rel, was.normal)) / was.length
+        inside = (off < _ON) & (along > -_ON) & (along < 1 + _ON)
+        for j in np.flatnonzero(inside.any(axis=1)):
+            k = int(inside[j].argmax())
+            t = 2 * along[j, k] - 1
+            sign = np.sign(was.tangent[k] @ now.tangent[e])
+            shape = shape_functions.at(was.family, was.order, int(was.kind[k]), np.array([np.clip(t, -1, 1)]))[0]
+            rest[e, j], source[e, j], marks[e, j] = sign * (shape @ old[k]), k, np.abs(nodes - t).argmin()
+    known = source >= 0
+
+    def taken(values: np.ndarray) -> np.ndarray:
+        rows = values.reshape(was.n, was.per)
+        out = np.zeros((now.n, now.per), values.dtype)
+        out[known] = rows[source[known], marks[known]]
+        return out.ravel()
+
+    states = memory.states
+    moved = FaceStates(taken(states.closed), taken(states.way), taken(states.pulled))
+    pressure, shear = taken(memory.pressure), taken(memory.shear)
+    return FaceMemory(now, rest.ravel(), taken(memory.broken), memory.work, moved, pressure, shear, memory.released)

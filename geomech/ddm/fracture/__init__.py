@@ -1,0 +1,1 @@
+"""Stress intensity factors, their error estimates, and criteria of crack growth."""

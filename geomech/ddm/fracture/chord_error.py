@@ -1,0 +1,140 @@
+"""What K loses where a curved wall was handed over as chords.
+
+A polygon is taken for a curve where two sides of about one length meet others at like bends of no more than 31°. Between
+such bends the arc lies off the chord of length L by its sagitta, ½ L tan (β/4), β the angle by which it turns. The body
+whose chords are halved, with their middles and the mouths of cracks on the arcs, has a quarter of that error, so that K
+on both differ by three quarters of it: a polygon that was meant is told an error that it does not have.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model import Cracks
+from .tip_factors import factors
+
+if TYPE_CHECKING:
+    from ..interfaces import CrackedBody, SolvedBody
+    from ..loads.supports import Support
+
+_log = logging.getLogger(__name__)
+
+#: Bends between these (rad) may be a curve's: a circle of twelve sides turns by 30° at each.
+LEAST_BEND, MOST_BEND = np.radians(0.1), np.radians(31.0)
+#: Neighbouring chords of a curve, and its neighbouring bends, differ by less than this factor.
+LIKE = 2.0
+#: A mouth this near to a chord's middle (as part of the chord) is where the arc is halved.
+NEAR_MIDDLE = 0.2
+
+
+def chord_errors(solution: SolvedBody) -> np.ndarray:
+    """(n_tips, 2) Pa √m: by how much K_I and K_II change when curved walls are followed more closely; zeros where there
+    are none. Logs a warning where that cannot be told."""
+    k = factors(solution)
+    try:
+        body, load = solution.body.rounder, solution.load
+        if body is None or not len(k):
+            return np.zeros_like(k)
+        sides = [side for where, value in load.sides for side in _halved_load(solution.body, where, value)]
+        other = body.solve(replace(load, sides=sides), None, np.inf, solution.began, False)
+    except (ValueError, np.linalg.LinAlgError) as failure:
+        _log.warning("what stress intensity factors lose by the chords of curved walls is not known: %s", failure)
+        return np.zeros_like(k)
+    return np.abs(factors(other) - k)
+
+
+def with_halved_chords(body: CrackedBody) -> tuple[list[np.ndarray], Cracks, list[Support]] | None:
+    """Loops, cracks and supports of ``body`` with every chord of a curved wall halved, on the curve, and the mouths on
+    it moved there; None where all walls are straight. Raises ValueError where a crack is too short to be followed."""
+    if not any(sagittas(loop).any() for loop in body.loops):
+        return None
+    loops, cracks = followed(body.loops, body.cracks)
+    supports = [replace(one, on=tuple(map(tuple, at))) for one, at in zip(body.supports, _supported(body))]
+    return loops, cracks, supports
+
+
+def sagittas(loop: np.ndarray) -> np.ndarray:
+    """(n,) m, how far the curve that ``loop`` (n, 2) may stand for lies off each of its edges, positive to the right;
+    0 of straight ones."""
+    along = np.roll(loop, -1, axis=0) - loop
+    before = np.roll(along, 1, axis=0)
+    length = np.hypot(*along.T)
+    bend = np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.sum(before * along, axis=1))
+    ahead = np.roll(bend, -1)
+    small, large = np.minimum(abs(bend), abs(ahead)), np.maximum(abs(bend), abs(ahead))
+    curved = (bend * ahead > 0) & (small > LEAST_BEND) & (large < MOST_BEND) & (large < LIKE * small)
+    for other in (np.roll(length, 1), np.roll(length, -1)):
+        curved &= (length < LIKE * other) & (other < LIKE * length)
+    return np.where(curved, np.sign(bend) * 0.5 * length * np.tan((abs(bend) + abs(ahead)) / 8), 0.0)
+
+
+def followed(loops: list[np.ndarray], cracks: Cracks) -> tuple[list[np.ndarray], Cracks]:
+    """``loops`` with a vertex more on each arc, and on each mouth there, and ``cracks`` that end on the arcs. Raises
+    ValueError where a crack would end before it began."""
+    nodes, out = cracks.nodes.copy(), []
+    mouths = np.flatnonzero(cracks.surface & (cracks.valence > 0))
+    for loop in loops:
+        vertices = []
+        for a, b, sagitta in zip(loop, np.roll(loop, -1, axis=0), sagittas(loop)):
+            vertices.append(a)
+            if sagitta == 0.0:
+                continue
+            along = b - a
+            length = float(np.hypot(*along))
+            rel = cracks.nodes[mouths] - a
+            at = rel @ along / length**2
+            off = np.abs(rel[:, 0] * along[1] - rel[:, 1] * along[0]) / length
+            here = mouths[(off <= 1e-7 * length) & (at > 1e-6) & (at < 1 - 1e-6)]
+            arc = (
+                {}
+                if any(abs(f - 0.5) < NEAR_MIDDLE for f in at[np.isin(mouths, here)])
+                else {0.5: _middle(a, b, sagitta)}
+            )
+            for node, f in zip(here, at[np.isin(mouths, here)]):
+                nodes[node] = arc[float(f)] = _end_on_arc(cracks, int(node), a, b, sagitta)
+            vertices += [arc[f] for f in sorted(arc)]
+        out.append(np.array(vertices))
+    return out, replace(cracks, nodes=nodes)
+
+
+def _middle(a: np.ndarray, b: np.ndarray, sagitta: float) -> np.ndarray:
+    along = b - a
+    return 0.5 * (a + b) + sagitta * np.array([along[1], -along[0]]) / np.hypot(*along)
+
+
+def _end_on_arc(cracks: Cracks, node: int, a: np.ndarray, b: np.ndarray, sagitta: float) -> np.ndarray:
+    """(2,) where the crack that ends at ``node`` on the chord from ``a`` to ``b`` meets the arc."""
+    segment, end = np.argwhere(cracks.segments == node)[0]
+    mouth, inner = cracks.nodes[node], cracks.nodes[cracks.segments[segment, 1 - end]]
+    half = 0.5 * np.hypot(*(b - a))
+    radius = 0.5 * (half**2 / abs(sagitta) + abs(sagitta))
+    top = _middle(a, b, sagitta)
+    centre = top + radius * (0.5 * (a + b) - top) / abs(sagitta)
+    way, rel = (mouth - inner) / np.hypot(*(mouth - inner)), mouth - centre
+    ahead, root = -(rel @ way), (rel @ way) ** 2 - (rel @ rel - radius**2)
+    if not root >= 0:
+        raise ValueError(f"the crack that ends at ({mouth[0]:.6g}, {mouth[1]:.6g}) does not meet the curve")
+    step = min(ahead - np.sqrt(root), ahead + np.sqrt(root), key=abs)
+    if step < -0.9 * np.hypot(*(mouth - inner)):
+        raise ValueError(f"the crack that ends at ({mouth[0]:.6g}, {mouth[1]:.6g}) lies between chord and curve")
+    return mouth + step * way
+
+
+def _halved_load(body: CrackedBody, where, value) -> list[tuple]:
+    """The traction ``value`` of the side ``where`` of ``body`` on its `Body.rounder`, which counts its sides anew."""
+    if not isinstance(where, (int, np.integer)):
+        return [(where, value)]
+    parts = 1 + np.concatenate([sagittas(loop) != 0 for loop in body.loops])
+    first = int(parts[:where].sum())
+    if parts[where] == 1 or callable(value) or np.ndim(value) == 1:
+        return [(first + k, value) for k in range(parts[where])]
+    middle = np.mean(value, axis=0)
+    return [(first, np.array([value[0], middle])), (first + 1, np.array([middle, value[1]]))]
+
+
+def _supported(body: CrackedBody) -> np.ndarray:
+    return body.support_segments.tolist() if body.supports else []

@@ -1,0 +1,171 @@
+"""The F-criterion on kinks that are tried: a short fictitious extension at every tip, solved in many directions.
+
+For a kink of no length what presses on its faces vanishes beside its k_1 and k_2, so that under compression the energy
+criteria see wings that open where a real extension would be pressed shut. So, as Shen & Stephansson (1993) do, every
+tip is extended by a given length in one direction after the other, the body is solved with the kinks' faces in contact
+(with friction, where their crack has it), and the direction with the largest
+
+    F = (k_1/K_Ic)² + (k_2/K_IIc)²
+
+counts, K_eq = √F K_Ic; between directions a parabola. Growth borders the factors of the body, and bodies of the same
+geometry keep theirs, so that a load costs one solution a direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model import Cracks, GrowthSettings, Material
+from ..crack_contact.frictionless_contact import NotConverged
+from ..growth.tie_tolerance import best as best_direction
+from .criteria import CRITERIA
+
+if TYPE_CHECKING:
+    from ..body import Body
+    from ..loads.body_loads import BodyLoad
+    from ..solution import Solution
+
+#: Directions in which kinks are tried, rad from the tip's own.
+DIRECTIONS = np.radians(np.arange(-120.0, 121.0, 10.0))
+
+
+def judged(solution: Solution, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """(n_tips,) angle and K_eq of the tips of ``solution`` by the criterion that ``growth`` asks for. Raises
+    ValueError where it is none, or one that trial kinks know nothing of."""
+    if growth.trial_kink > 0:
+        check_criterion(growth)
+        return driven(solution, growth.trial_kink, material)
+    return judged_rows(solution.tips, growth, material)
+
+
+def judged_rows(tips: np.ndarray, growth: GrowthSettings, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """(n_tips,) the same of TIP rows, of one or many bodies, by a criterion that asks for no more than K. Raises
+    ValueError where there is none."""
+    check_criterion(growth)
+    return CRITERIA[growth.criterion](tips["k_i"], tips["k_ii"], material)
+
+
+def check_criterion(growth: GrowthSettings) -> None:
+    """Raise ValueError where `judged` would."""
+    if growth.criterion not in CRITERIA:
+        raise ValueError(f"no growth criterion {growth.criterion!r}; there are {', '.join(CRITERIA)}")
+    if not 0 <= growth.trial_kink < np.inf:
+        raise ValueError(f"trial_kink must be a length, got {growth.trial_kink!r}")
+    if growth.trial_kink and growth.criterion != "f":
+        raise ValueError(f'trial kinks are judged by the criterion "f", not by {growth.criterion!r}')
+
+
+def driven(solution: Solution, length: float, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """(n_tips,) angle of the kink with the largest F and its K_eq, Pa √m, from kinks of ``length`` m under the load,
+    and with the history, of ``solution``. Tips at which some kink does not fit into the rock, or its faces do not
+    settle, are judged by kinks of no length."""
+    tips, body = solution.tips, solution.body
+    n = len(tips)
+    value = np.full((len(DIRECTIONS), n), np.nan)
+    at = np.flatnonzero(_fitting(body, length)) if n else np.zeros(0, int)
+    for k in range(len(DIRECTIONS)) if len(at) else ():
+        trial = _body(body, k, length, at)
+        try:
+            load = _load(solution.load, body.cracks, at)
+            found = trial.solve(load, equilibrium_tolerance=np.inf, history=solution.began).tips
+        except (NotConverged, np.linalg.LinAlgError):
+            continue
+        ahead = {int(tip["node"]): tip for tip in found}
+        rows = [ahead[len(body.cracks.nodes) + j] for j in range(len(at))]
+        k_1, k_2 = (np.array([row[name] for row in rows]) for name in ("k_i", "k_ii"))
+        value[k, at] = (np.maximum(k_1, 0.0) / material.k_ic) ** 2 + (k_2 / material.k_iic) ** 2
+    angle, k_eq = CRITERIA["f"](tips["k_i"], tips["k_ii"], material)
+    known = np.isfinite(value).all(axis=0)
+    angle[known], k_eq[known] = _largest(value[:, known], material)
+    return angle, k_eq
+
+
+def _largest(value: np.ndarray, material: Material) -> tuple[np.ndarray, np.ndarray]:
+    """Angle and K_eq at the largest of ``value`` (n_directions, n_tips), by a parabola through its neighbours."""
+    every = np.arange(value.shape[1])
+    at = np.clip([best_direction(column, DIRECTIONS) for column in value.T], 1, len(DIRECTIONS) - 2)
+    low, best, high = (value[at + side, every] for side in (-1, 0, 1))
+    bend = np.minimum(low - 2 * best + high, -np.finfo(float).tiny)
+    shift = np.clip(0.5 * (low - high) / bend, -1.0, 1.0)
+    best = np.maximum.reduce([best - 0.25 * (low - high) * shift, low, high])
+    return DIRECTIONS[at] + shift * (DIRECTIONS[1] - DIRECTIONS[0]), np.sqrt(best) * material.k_ic
+
+
+def _fitting(body: Body, length: float) -> np.ndarray:
+    """(n_tips,) bool: tips that are farther than two kinks from all other cracks and from the boundary."""
+    network, tips = body.cracks, body.tip_elements[0]
+    sides = body.sides
+    pieces = np.concatenate([network.nodes[network.segments], sides])
+    out = np.ones(len(tips), bool)
+    for j, tip in enumerate(tips):
+        own = np.concatenate([(network.segments == tip["node"]).any(axis=1), np.zeros(len(sides), bool)])
+        a, d = pieces[~own, 0], pieces[~own, 1] - pieces[~own, 0]
+        rel = tip["point"] - a
+        s = np.clip(np.sum(rel * d, axis=1) / np.sum(d * d, axis=1), 0.0, 1.0)
+        to = s[:, None] * d - rel
+        distance = np.hypot(*to.T)
+        # What lies straight behind is the crack itself; no kink is turned so far.
+        behind = to @ tip["direction"] < -0.7 * distance
+        out[j] = not (~behind & (distance <= 2 * length)).any()
+    return out
+
+
+def _body(body: Body, k: int, length: float, at: np.ndarray) -> Body:
+    """``body`` with kinks in the ``k``-th direction from the tips ``at``; kept with it."""
+    kept = body.trials.setdefault(length, {})
+    if k not in kept:
+        from ..body import Body
+
+        n_outlines = int(body.outlined)
+        kept[k] = Body(
+            body.loops[:n_outlines],
+            _kinked(body.cracks, body.tip_elements[0][at], DIRECTIONS[k], length),
+            body.material,
+            body.settings,
+            previous=body,
+            holes=body.loops[n_outlines:],
+            supports=body.supports,
+            face_laws=body.face_laws,
+            work=body.work,
+            half_plane=body.half_plane,
+        )
+    return kept[k]
+
+
+def _kinked(cracks: Cracks, tips: np.ndarray, angle: float, length: float) -> Cracks:
+    """``cracks`` with a segment more at each of ``tips`` (TIP rows), the nodes in their order behind all others. A
+    trial has no aperture: it is torn."""
+    n, n_nodes = len(tips), len(cracks.nodes)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    owner = _owners(cracks, tips["node"])
+    inherited = {
+        name: np.concatenate([getattr(cracks, name), getattr(cracks, name)[owner]])
+        for name in ("crack", "block", "law")
+    }
+    return replace(
+        cracks,
+        nodes=np.concatenate([cracks.nodes, tips["point"] + length * tips["direction"] @ turn]),
+        segments=np.concatenate([cracks.segments, np.column_stack([tips["node"], n_nodes + np.arange(n)])]),
+        birth_cycle=np.concatenate([cracks.birth_cycle, np.full(n, cracks.birth_cycle.max() + 1)]),
+        aperture=np.concatenate([cracks.aperture, np.zeros(n)]),
+        surface=np.concatenate([cracks.surface, np.zeros(n, bool)]),
+        **inherited,
+    )
+
+
+def _owners(cracks: Cracks, nodes: np.ndarray) -> np.ndarray:
+    """(n,) the segment that ends at each of the tips ``nodes``."""
+    return np.array([int(np.argmax((cracks.segments == node).any(axis=1))) for node in nodes], dtype=int)
+
+
+def _load(load: BodyLoad, cracks: Cracks, at: np.ndarray) -> BodyLoad:
+    """``load`` on the kinked network: where every segment has its own fluid's pressure, a kink has that of its
+    crack."""
+    pressure = load.crack_pressure
+    if callable(pressure) or not np.ndim(pressure):
+        return load
+    owner = _owners(cracks, cracks.tips[at])
+    return replace(load, crack_pressure=np.concatenate([pressure, np.asarray(pressure)[owner]]))

@@ -1,0 +1,91 @@
+"""How far a stress intensity factor is to be trusted: a solution against a finer one.
+
+Estimates from one solution alone (decay of its coefficients, order p against p−1) follow the error of K only within
+factors of ten to a thousand: K is far more accurate than the densities it comes from, and odd and even orders differ.
+One order more, graded one step deeper, sees what is there; but for what the chords of curved walls do (`chord_error`).
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import adaptivity
+from ..mesh.elements import interior_angles, wedges
+from ..mesh.grading import Grading, ungraded
+from .chord_error import chord_errors
+from .tip_factors import factors, largest
+
+if TYPE_CHECKING:
+    from ..interfaces import CrackedBody, SolvedBody
+
+_log = logging.getLogger(__name__)
+
+#: The estimate is so many times the difference to the finer solution. Over the battery of
+#: `tests/validation/test_automatic.py` the difference alone is 0.35 to 1.3 times the error.
+SAFETY = 2.0
+#: An estimated error above this part of the largest K is told to the log.
+WORTH_A_WARNING = 0.01
+
+
+def tip_errors(solution: SolvedBody) -> np.ndarray:
+    """(n_tips, 2) estimated absolute error of K_I and K_II at every tip, Pa √m, for the price of another body, somewhat
+    larger than the solution's own. Logs a warning when it exceeds 1 % of the largest K."""
+    body = solution.body
+    k = factors(solution)
+    if not len(k):
+        return k
+    other = body.remeshed(adaptivity.finer(body.settings)).solve(
+        solution.load, equilibrium_tolerance=np.inf, history=solution.began
+    )
+    errors = SAFETY * (np.abs(factors(other) - k) + chord_errors(solution)) + floor(body) * largest(k)
+    warn(errors, k)
+    return errors
+
+
+def warn(errors: np.ndarray, k: np.ndarray) -> None:
+    """Log a warning when ``errors`` exceed 1 % of the largest of ``k``, both (n_tips, 2)."""
+    if errors.max(initial=0.0) > WORTH_A_WARNING * largest(k):
+        at = int(np.argmax(errors.max(axis=1)))
+        _log.warning(
+            "stress intensity factors are uncertain by %.1f %% at tip %d: ask for a smaller target_error",
+            100 * errors.max() / max(largest(k), np.finfo(float).tiny),
+            at,
+        )
+
+
+def floor(body: CrackedBody) -> float:
+    """Relative error of K that grading leaves where it ends for round-off's sake (`grading.Grading.finest`), which a
+    finer solution shares and cannot show. Only meshes made for a target error go that far."""
+    grading = Grading.of(body.settings)
+    if grading.target is None:
+        return 0.0
+    network, edges, left = body.cracks, body.mesh.edges, 0.0
+    faces, boundary = body.faces, body.boundary
+    segment_lengths = network.lengths
+    edge_lengths = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
+    for elements, spans in ((faces, segment_lengths), (boundary, edge_lengths)):
+        for e in np.flatnonzero(elements.length <= 1e-6 * body._extent):
+            span, length = spans[elements.source[e]], elements.length[e]
+            for point in (elements.start[e], elements.end[e]):
+                if length <= grading.finest(point, span, body._extent) / grading.ratio:
+                    left = max(left, _left_at(body, point, length / span))
+    return left
+
+
+def _left_at(body: CrackedBody, point: np.ndarray, part: float) -> float:
+    """What an element of ``part`` of its side or segment that ends at ``point`` leaves, if that is a node of the
+    geometry."""
+    network, left = body.cracks, 0.0
+    for node in np.flatnonzero((network.nodes == point).all(axis=1) & (network.valence > 0)):
+        where = "mouth" if network.surface[node] else "crack"
+        for angle in wedges(network, node, body.sides):
+            error, power = ungraded(float(angle), where)
+            left = max(left, error * part**power)
+    for loop in body.loops:
+        for corner in np.flatnonzero((loop == point).all(axis=1)):
+            error, power = ungraded(float(interior_angles(loop)[corner]), "outline")
+            left = max(left, error * part**power)
+    return left

@@ -1,0 +1,36 @@
+"""The elements at crack tips, and what of them a stress intensity factor is read from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...model import TIP, Cracks
+from ..kernels import shape_functions
+from ..system.influence_matrix import ElementSet
+
+
+def tip_elements(cracks: Cracks, faces: ElementSet) -> tuple[np.ndarray, ...]:
+    """What the tips' rows say of geometry (TIP, factors zero), and of each its element, the element's last node,
+    weights (n_tips, p+1) that make nodal values the coefficient of √r, and whether its faces touch unloaded."""
+    n = len(cracks.tips)
+    rows, element, last = np.zeros(n, TIP), np.zeros(n, int), np.zeros(n, int)
+    lead, touching = np.zeros((n, faces.per)), np.zeros(n, bool)
+    at_tip: dict[int, tuple[int, bool]] = {}
+    for e in np.flatnonzero(faces.kind != shape_functions.ORDINARY):
+        i, j = cracks.segments[faces.source[e]]
+        if faces.kind[e] in (shape_functions.TIP_START, shape_functions.TIP_BOTH):
+            at_tip[int(i)] = int(e), False
+        if faces.kind[e] in (shape_functions.TIP_END, shape_functions.TIP_BOTH):
+            at_tip[int(j)] = int(e), True
+    for k, (row, node) in enumerate(zip(rows, cracks.tips)):
+        e, at_end = at_tip[int(node)]
+        segment = faces.source[e]
+        row["node"], row["crack"], row["block"] = node, cracks.crack[segment], cracks.block[segment]
+        row["end"], row["point"] = at_end, cracks.nodes[node]
+        row["direction"] = faces.tangent[e] if at_end else -faces.tangent[e]
+        element[k], last[k] = e, -1 if at_end else 0
+        lead[k] = shape_functions.leading(faces.family, faces.order, int(faces.kind[e]), at_end) / np.sqrt(
+            faces.length[e]
+        )
+        touching[k] = cracks.aperture[segment] == 0
+    return rows, element, last, lead, touching

@@ -1,0 +1,1 @@
+"""Growth of crack networks: steps of tips, curved paths, initiation, junctions."""

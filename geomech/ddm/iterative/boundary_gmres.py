@@ -1,0 +1,141 @@
+"""The boundary's equations where they are too many to factor: multipoles, GMRES, neighbourhoods factored.
+
+Unknown are displacements that enter as jumps, so A_ΓΓ is of the kind that cracks have and the same neighbourhoods
+(`iterative.Patches`) make GMRES converge: 38 products at 10 000 unknowns, 53 at 20 000, on a square as on a rough
+ellipse. The lifted rigid motions are in the neighbourhoods too; one that holds a whole small hole would be singular
+without them. Where supports hold the boundary the unknowns are reactions, line forces; these are few beside the
+boundary and stay dense.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..loads.supports import Holds
+from ..system.contact_rows import Rows
+from ..system.influence_matrix import ElementSet, line_influence
+from .fast_multipole import Compressed
+from .gmres import Patches, gmres, scales
+
+#: Boundary unknowns from which "auto" and "compressed" iterate on them. Matrices and one load take 0.7 s at 4000
+#: (factored 2.5 s) and 1.5 s at 6100 (7.1 s), processor time, where elements are alike, and 2.8 s at 6000 (6.3 s) on an
+#: outline of eight corners with a hole of twelve, graded to elements of 1e-8 of the longest; another load 0.2, 0.4 and
+#: 1.6 s (0.01 s), so that factors are the better for some fifteen loads at this number, and for three on the graded one.
+CROSSOVER = 6000
+#: Elements join a neighbourhood that are no farther from it than so many times their length: on even outlines as many
+#: products as with all that are near (24 at 4000 unknowns, with 4 it is 30).
+NEAR = 12.0
+#: Entries of the reactions' dense columns up to which a held boundary is iterated on (a gigabyte).
+MOST_REACTIONS = 128_000_000
+
+
+def is_iterated(solver: str, n_unknowns: int, holds: Holds | None = None, holes_held: bool = False) -> bool:
+    """Whether ``solver`` iterates on so many boundary unknowns, of which supports have those of ``holds``; where they
+    hold a hole (`hole_supports`) the boundary is factored."""
+    if solver == "dense" or n_unknowns < CROSSOVER or holes_held:
+        return False
+    return holds is None or n_unknowns * holds.sources.n_unknowns <= MOST_REACTIONS
+
+
+class HeldMatrix:
+    """A_ΓΓ of a boundary that is held in part: ``jumps`` on all of it as an operator, and the columns of reactions."""
+
+    def __init__(self, jumps: Compressed, holds: Holds, nu: float, tol: float):
+        self._jumps, self._holds = jumps, holds
+        self._reactions = line_influence(holds.boundary, holds.sources, nu, tol, -1.0)
+        self._nothing = np.zeros(holds.sources.n_unknowns)
+
+    def __matmul__(self, x: np.ndarray) -> np.ndarray:
+        displacement, reactions = self._holds.split(x, self._nothing)
+        return self._jumps @ displacement + self._reactions @ reactions
+
+    def transposed_times(self, v: np.ndarray) -> np.ndarray:
+        """A_ΓΓᵀ ``v``."""
+        return self._holds.joined(self._jumps.transposed_times(v), v @ self._reactions)
+
+
+class HeldJumps:
+    """Traction on the boundary from displacement of what supports hold, as an operator on its values (h_unknowns,)."""
+
+    def __init__(self, jumps: Compressed, holds: Holds):
+        self._jumps, self._places, self._n = jumps, holds.boundary.unknowns(holds.elements), holds.boundary.n_unknowns
+
+    def __matmul__(self, imposed: np.ndarray) -> np.ndarray:
+        if not imposed.any():
+            return np.zeros(self._n)
+        whole = np.zeros(self._n)
+        whole[self._places] = imposed
+        return self._jumps @ whole
+
+
+class IteratedBoundary:
+    """What stands for a `Factor` of ``matrix``, A_ΓΓ of the ``elements``, with ``rigid`` (n, k) and ``weights`` (k, n)
+    lifted as `boundary` has it; ``between(elements)`` is the matrix between some of them. ``products`` counts those
+    with the matrix."""
+
+    def __init__(
+        self,
+        elements: ElementSet,
+        matrix: Compressed | HeldMatrix,
+        rigid: np.ndarray,
+        weights: np.ndarray,
+        extent: float,
+        nu: float,
+        tol: float,
+        between: Callable[[np.ndarray], np.ndarray],
+    ):
+        self._matrix, self._rigid, self._weights, self._extent = matrix, rigid, weights, extent
+        self.n, self.products = elements.n_unknowns, 0
+        # Elements at corners and at the ends of supports are shorter by far than others: by itself, round-off in their
+        # equations is more than what is left of all the rest (8.9e-9 where the shortest is 1e-8 of the longest).
+        self.scale = scales(elements)
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+
+        def lifted(numbers: np.ndarray) -> np.ndarray:
+            unknowns = elements.unknowns(numbers)
+            return between(numbers) + rigid[unknowns] @ weights[:, unknowns] / extent
+
+        self._patches = Patches(elements, np.zeros(elements.n, int), nu, tol, lifted, NEAR)
+        zero = np.zeros(self.n)
+        self._patches.change(Rows(np.zeros(self.n, bool), zero, zero, elements.per))
+
+    @property
+    def rcond(self) -> float:
+        """The worst neighbourhood's: of the whole, none is known."""
+        return self._patches.rcond
+
+    def times(self, u: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """The lifted A_ΓΓ times ``u`` (n,)."""
+        if transposed:
+            return self._matrix.transposed_times(u) + (u @ self._rigid) @ self._weights / self._extent
+        return self._matrix @ u + self._rigid @ (self._weights @ u) / self._extent
+
+    def roughly(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Neighbourhoods' answer to ``right`` (n,)."""
+        return self._patches.solve_transposed(right) if transposed else self._patches.solve(right)
+
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked. Raises NotSolved."""
+        if right.ndim == 2:
+            out = np.empty_like(right)
+            for k, column in enumerate(right.T):
+                out[:, k] = self.solve(column, transposed)
+            return out
+        first = None
+        if self._last is not None and not transposed:
+            # As much of the last solution as its right-hand side is in this one: a load that comes again costs nothing.
+            before, u = self._last
+            first = float(before @ right) / float(before @ before) * u
+        u, n = gmres(
+            lambda v: self.times(v, transposed),
+            right,
+            lambda v: self.roughly(v, transposed),
+            first,
+            scale=self.scale,
+        )
+        self.products += n
+        if not transposed and right.any():
+            self._last = right.copy(), u
+        return u

@@ -1,0 +1,204 @@
+"""GMRES with neighbourhoods factored, for equations of cracks or of a boundary that are too many to factor.
+
+Most of a crack network's stiffness lies within cracks and between neighbours. The elements are cut into patches; each,
+with the rest of the cracks that it cuts, is solved for exactly and its own unknowns are kept of that (restricted
+additive Schwarz, Cai & Sarkis 1999). What that leaves to the iteration is smooth: 15 to 40 products for networks of any
+size. Cracks that many patches cut have a few coarse elements besides (`coarse_space`), which carry their ends' news to one
+another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..system.contact_rows import Rows
+from ..system.dense_lu import Factor
+from ..system.influence_matrix import ElementSet, influence
+from .fast_multipole import Tree
+
+#: Elements of a patch. Larger ones cost more to factor than they save in products.
+PATCH = 60
+#: Of the cracks that a patch cuts, elements nearer to its middle than this many of its radii join it.
+REACH = 1.5
+#: Residual of a solution, relative to the right-hand side. Contact tells closed from open at 1e-10.
+TOLERANCE = 1e-11
+#: What is good enough when round-off stops the residual.
+ENOUGH = 1e-9
+
+
+class NotSolved(np.linalg.LinAlgError):
+    """An iterative solution did not reach its tolerance, as where cracks cut a part of the body off."""
+
+
+def gmres(
+    times: Callable[[np.ndarray], np.ndarray],
+    right: np.ndarray,
+    precondition: Callable[[np.ndarray], np.ndarray],
+    first: np.ndarray | None = None,
+    tolerance: float = TOLERANCE,
+    restart: int = 250,
+    limit: int = 1000,
+    scale: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
+    """x with |right − A x| ≤ ``tolerance`` |right| and the number of products ``times``, from the guess ``first``;
+    equations count by their ``scale`` (n,), if it is given.
+
+    Preconditioned from the right (Saad & Schultz 1986), so that it is the true residual that falls. Raises NotSolved.
+    """
+    if scale is not None:
+        return gmres(
+            lambda v: scale * times(v),
+            scale * right,
+            lambda v: precondition(v / scale),
+            first,
+            tolerance,
+            restart,
+            limit,
+        )
+    size = float(np.linalg.norm(right))
+    if size == 0.0:
+        return np.zeros_like(right), 0
+    x, rest, products = np.zeros_like(right), right, 0
+    if first is not None and first.any():
+        x, rest, products = first.copy(), right - times(first), 1
+    left = float(np.linalg.norm(rest))
+    while left > tolerance * size:
+        # The residual as it follows from the recurrence runs ahead of the true one.
+        change, n = _cycle(times, precondition, rest, left, 0.1 * tolerance * size, restart)
+        x = x + change
+        rest = right - times(x)
+        products += n + 1
+        before, left = left, float(np.linalg.norm(rest))
+        if left > 0.5 * before or products > limit:
+            if left <= ENOUGH * size:
+                break
+            raise NotSolved(
+                f"the cracks' equations are left with a residual of {left / size:.1e} after {products} products; do "
+                "cracks cut a part of the body off?"
+            )
+    return x, products
+
+
+def _cycle(times, precondition, rest: np.ndarray, left: float, goal: float, longest: int) -> tuple[np.ndarray, int]:
+    """The change of x within one Krylov space of ``rest``, whose norm is ``left``, and the number of products."""
+    basis = [rest / left]
+    triangle = np.zeros((longest, longest))
+    turns = np.zeros((longest, 2))
+    target = np.zeros(longest + 1)
+    target[0] = left
+    k = 0
+    while k < longest and abs(target[k]) > goal:
+        v = times(precondition(basis[k]))
+        column = np.zeros(k + 2)
+        # Twice, or the basis loses its orthogonality with the last digits of the residual.
+        for _ in range(2):
+            for i, u in enumerate(basis):
+                h = u @ v
+                v -= h * u
+                column[i] += h
+        column[k + 1] = np.linalg.norm(v)
+        if column[k + 1] > 0:
+            v /= column[k + 1]
+        basis.append(v)
+        for i in range(k):
+            (c, s), (a, b) = turns[i], column[i : i + 2]
+            column[i : i + 2] = c * a + s * b, c * b - s * a
+        length = float(np.hypot(*column[k:]))
+        if length == 0.0:
+            break
+        turns[k] = column[k:] / length
+        triangle[: k + 1, k] = column[: k + 1]
+        triangle[k, k] = length
+        target[k + 1], target[k] = -turns[k, 1] * target[k], turns[k, 0] * target[k]
+        k += 1
+    if k == 0:
+        return np.zeros_like(rest), 1
+    y = np.linalg.solve(triangle[:k, :k], target[:k])
+    return precondition(sum(a * u for a, u in zip(y, basis))), k
+
+
+def scales(elements: ElementSet) -> np.ndarray:
+    """(n_unknowns,) what equations have to be multiplied by where elements differ much in length: tractions go with one
+    over it, and those of the shortest alone would decide when a solution is good enough."""
+    return np.repeat(elements.length / elements.length.max(), 2 * elements.per) if elements.n else np.zeros(0)
+
+
+class Patches:
+    """An approximate inverse of the cracks' equations; ``crack`` (n,) is the crack of every element;
+    ``between(elements)`` the matrix between some of them where it is not their influence alone. No element joins a
+    patch that is farther from its own than ``lengths`` times its length: what is graded towards another corner is too
+    small to be felt here, and too much of it to be factored again."""
+
+    def __init__(
+        self,
+        elements: ElementSet,
+        crack: np.ndarray,
+        nu: float,
+        tol: float,
+        between: Callable[[np.ndarray], np.ndarray] | None = None,
+        lengths: float = np.inf,
+    ):
+        self._elements, self._nu, self._tol = elements, nu, tol
+        self._between = self._influence if between is None else between
+        tree = Tree.over(elements, PATCH)
+        middle = 0.5 * (elements.start + elements.end) @ np.array([1.0, 1j])
+        at = np.argsort(crack, kind="stable")
+        first = np.searchsorted(crack[at], np.arange(int(crack.max()) + 2))
+        self._patches: list[tuple[np.ndarray, np.ndarray]] = []
+        for leaf in tree.leaves:
+            own = tree.elements(leaf)
+            cut = np.concatenate([at[first[k] : first[k + 1]] for k in np.unique(crack[own])])
+            near = cut[np.abs(middle[cut] - tree.centre[leaf]) <= REACH * tree.radius[leaf]]
+            if np.isfinite(lengths):
+                away = np.abs(middle[near][:, None] - middle[own]).min(axis=1)
+                near = near[away <= lengths * elements.length[near]]
+            whole = np.union1d(own, near)
+            self._patches.append((whole, elements.unknowns(np.sort(own))))
+        self._factors: list[tuple[bytes, np.ndarray, np.ndarray, np.ndarray, Factor] | None]
+        self._factors = [None] * len(self._patches)
+
+    def change(self, rows: Rows) -> None:
+        """From now on the equations are those of ``rows``; only patches to which that is news are factored."""
+        for k, (elements, own) in enumerate(self._patches):
+            unknowns = self._elements.unknowns(elements)
+            held, mixed, spring = rows.held[unknowns], rows.mixed[unknowns], rows.spring[unknowns]
+            key = held.tobytes() + mixed.tobytes() + spring.tobytes()
+            known = self._factors[k]
+            if known is not None and known[0] == key:
+                continue
+            matrix = self._between(elements)
+            moving = np.flatnonzero(mixed)
+            matrix[moving] += mixed[moving, None] * matrix[moving + rows.per]
+            matrix -= np.diag(spring)
+            if held.any():
+                matrix = matrix[np.ix_(~held, ~held)]
+            free = unknowns[~held]
+            kept = np.flatnonzero(np.isin(free, own))
+            self._factors[k] = key, free, kept, free[kept], Factor(matrix, "cracks cut a part of the body off")
+
+    def _influence(self, elements: np.ndarray) -> np.ndarray:
+        part = self._elements.take(elements)
+        return influence(part, part, self._nu, self._tol)
+
+    @property
+    def rcond(self) -> float:
+        """The worst patch's."""
+        return min(factor.rcond for *_, factor in self._factors)
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Roughly S⁻¹ ``right`` (n,); zero where unknowns are held."""
+        out = np.zeros_like(right)
+        for _, free, kept, to, factor in self._factors:
+            out[to] = factor.solve(right[free])[kept]
+        return out
+
+    def solve_transposed(self, right: np.ndarray) -> np.ndarray:
+        """The transposed of `solve`."""
+        out = np.zeros_like(right)
+        for _, free, kept, to, factor in self._factors:
+            own = np.zeros(len(free))
+            own[kept] = right[to]
+            out[free] += factor.solve(own, transposed=True)
+        return out

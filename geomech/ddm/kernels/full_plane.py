@@ -1,0 +1,444 @@
+"""Influence of straight elements, in closed form near and by series far: everything that is compiled for statics.
+
+With t on the element, w(t) its weight (`shape_functions`) and ζ the field point in half lengths c about the middle, all fields
+of an element follow from the Cauchy moments and their derivatives
+
+    A_k(ζ) = ∫ w(t) t^k / (ζ − t) dt,   A_k = ζ A_{k−1} − m_{k−1},   m_j = ∫ w t^j dt,
+
+because G' = A, G'' = A'/c, G''' = A''/c² for G(z) = ∫ N log(z − t) dt (Crouch & Starfield 1983, ch. 5). The
+recurrence runs upwards near the element; far away it would lose |ζ|^(k+1) in digits, so there A_p comes from its series
+in 1/ζ and the same recurrence runs downwards, where it is stable.
+
+Densities are jumps u⁺ − u⁻ times 2μ (so a crack's slip and opening, a boundary's own displacement when the rock lies
+on the left) and line forces. A point on the element's line is seen from the side that the sign of y (±0.0 included)
+tells.
+
+Points are sorted by distance, element by element, and taken eight of a class at a time (`simd`): a pair's value is
+that of its lane, whatever stands beside it, so it does not depend on what else is asked for, nor on threads.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import kept, part
+from .shape_functions import MAX_ORDER
+from .simd import (
+    WIDTH,
+    angle,
+    both,
+    gather,
+    im,
+    less,
+    load,
+    load_complex,
+    log,
+    log1p,
+    norm,
+    pile,
+    re,
+    root,
+    scatter,
+    signed,
+    size,
+    splat,
+    store,
+    term,
+    times_i,
+    value,
+)
+
+#: |ζ| from which each class of distance reaches, and the terms its series needs. Below the first is the closed form of
+#: orders above 5, below the second that of orders up to 5: upward steps lose a factor |ζ| each, six at 2.2 two digits,
+#: and so do eleven at 1.5. The terms left out are below 1e-17 of the first.
+_REACH = np.array([1.5, 2.2, 2.6, 3.2, 4.2, 6.0, 9.0, 15.0, 30.0, 100.0, 1e3, 1e5])
+
+
+def _terms(reach: float) -> int:
+    n = 1
+    # The second derivative's coefficients grow as j²/2, the moments fall as 1/j.
+    while 0.5 * (n + 2) * reach**-n > 1e-17:
+        n += 1
+    return n + n % 2
+
+
+_TERMS = np.array([_terms(r) for r in _REACH])
+_REACH_SQUARED = _REACH**2
+_CLASSES = len(_REACH) + 1
+
+#: Points sorted at a time.
+_TILE = 256
+_ROW = _TILE + WIDTH
+#: Where A', A'' and the next order stand behind A.
+_B, _D, _STEP = 2 * WIDTH, 4 * WIDTH, 6 * WIDTH
+
+_jit = kept(fastmath=False, error_model="numpy", nogil=True)
+_part = part(fastmath=False, error_model="numpy", nogil=True)
+
+
+@_part
+def _square_root(z):
+    """The principal root, above or below its cut by the sign of Im z."""
+    r = root(norm(z))
+    large = root(0.5 * (r + size(re(z))))
+    small = 0.5 * size(im(z)) / large
+    return both(less(re(z), 0.0, small, large), signed(less(re(z), 0.0, large, small), im(z)))
+
+
+@_part
+def _first_moment(kind, zp, zm):
+    """A_0, A_0', A_0'' in closed form; ``zp``, ``zm`` are ζ + 1 and ζ − 1.
+
+    With s = (1+ζ)/2, v = √s a tip at the start has A_0 = v log((v+1)/(v−1)) − 2; one at the end is its mirror image,
+    A(ζ) = −A_start(−ζ).
+    """
+    if kind == 3:
+        turned = _square_root(zm) * _square_root(zp)
+        z, i = 0.5 * (zp + zm), 1.0 / turned
+        return np.pi * (z - turned), np.pi * (1.0 - z * i), np.pi * (i * i * i)
+    s, s1 = 0.5 * zp, 0.5 * zm
+    if kind == 2:
+        s, s1 = -s1, -s
+    v = s
+    y = im(s)
+    if kind == 0:
+        # Ratios of distances as one plus what is known to full relative accuracy, from the nearer end.
+        way, more = re(s + s1), size(re(s + s1)) / less(norm(s), norm(s1), norm(s), norm(s1))
+        up, below = -2.0 * y, 2.0 * (re(s) * re(s1) + y * y)
+    else:
+        v = _square_root(s)
+        # |v|² − 1 and |v − 1| written through s − 1, which is known to full relative accuracy near the far end.
+        way, more = re(v), 4.0 * re(v) * norm(v + 1.0) / norm(s1)
+        up, below = -2.0 * im(v), (re(s1) * (re(s) + 1.0) + y * y) / (root(norm(s)) + 1.0)
+    # log((ζ+1)/(ζ−1)), or log((v+1)/(v−1)).
+    a = both(signed(0.5 * log1p(more), way), angle(up, below))
+    i1 = 1.0 / s1
+    if kind == 0:
+        i = 1.0 / s
+        return a, -0.5 * (i * i1), 0.25 * (i1 * i1 - i * i)
+    g = a / v
+    a = v * a - 2.0
+    b = 0.25 * g - 0.5 * i1
+    d = 0.25 * (i1 * i1 - (0.25 * g + 0.5 * i1) / s)
+    if kind == 2:
+        a, d = -a, -d
+    return a, b, d
+
+
+@_part
+def _moments(kind, distance, zp, zm, order, table, w):
+    """A_k, A_k', A_k'' for k = 0 … order, eight points of one class, into ``w``, ``_STEP`` numbers an order."""
+    z = 0.5 * (zp + zm)
+    if distance == 0 or (distance == 1 and order <= 5):
+        a, b, d = _first_moment(kind, zp, zm)
+        for k in range(order + 1):
+            store(w, k * _STEP, a)
+            store(w, k * _STEP + _B, b)
+            store(w, k * _STEP + _D, d)
+            d = 2.0 * b + z * d
+            b = a + z * b
+            a = z * a - table[kind, k]
+        return
+    i = 1.0 / z
+    n = _TERMS[distance - 1]
+    # Odd moments vanish where the weight is even.
+    even = kind == 0 or kind == 3
+    first, step, q, lead = 0, 1, i, i
+    if even:
+        first, step, q = order % 2, 2, i * i
+        n = first + n
+        if first == 1:
+            lead = q
+    u, v = 2.0 * re(q), norm(q)
+    zero = both(splat(0.0), splat(0.0))
+    a, b, d = zero, zero, zero
+    for j in range(n, first - 1, -step):
+        m = table[kind, order + j]
+        a = term(a, u, v, m)
+        m *= j + 1.0
+        b = term(b, u, v, m)
+        d = term(d, u, v, m * (j + 2.0))
+    a = value(a, q) * lead
+    lead = lead * i
+    b = -(value(b, q) * lead)
+    d = value(d, q) * (lead * i)
+    for k in range(order, -1, -1):
+        store(w, k * _STEP, a)
+        store(w, k * _STEP + _B, b)
+        store(w, k * _STEP + _D, d)
+        if k > 0:
+            a = (a + table[kind, k - 1]) * i
+            b = (b - a) * i
+            d = (d - 2.0 * b) * i
+
+
+@_jit
+def moments(kind, xp, xm, y, order, table, a, b, d):
+    """A_k, A_k', A_k'' for k = 0 … order into ``a``, ``b``, ``d`` (n, order+1) at ζ + 1 = xp + iy, ζ − 1 = xm + iy,
+    (n,) each."""
+    w = np.empty((MAX_ORDER + 1) * _STEP)
+    for i in range(len(y)):
+        x = 0.5 * (xp[i] + xm[i])
+        distance = np.searchsorted(_REACH_SQUARED, x * x + y[i] * y[i], side="right")
+        zp, zm = both(splat(xp[i]), splat(y[i])), both(splat(xm[i]), splat(y[i]))
+        _moments(kind, distance, zp, zm, order, table, w)
+        for k in range(order + 1):
+            at = k * _STEP
+            a[i, k] = complex(w[at], w[at + WIDTH])
+            b[i, k] = complex(w[at + _B], w[at + _B + WIDTH])
+            d[i, k] = complex(w[at + _D], w[at + _D + WIDTH])
+
+
+@_part
+def _sort(points, first, n, start, end, e, tol, side, tile, chosen, count):
+    """Points ``first`` … + n in the frame of element ``e``, lengths in half lengths c, sorted by distance.
+
+    ``points`` x … y … flat, each padded to whole lanes; ``tile``: x + 1, x − 1, y (``_TILE`` each, a fourth is
+    scratch); ``chosen`` (_CLASSES rows of _ROW) the points of a class, ``count`` of them, the last repeated so that it
+    fills lanes. Returns (c, tx, ty).
+
+    A point within ``tol`` of the open element is put on it, on the given side; one that meets an end is moved off by
+    1e-14 along the normal, so that what is infinite there stays finite.
+    """
+    sx, sy, ex, ey = start[e, 0], start[e, 1], end[e, 0], end[e, 1]
+    lx, ly = ex - sx, ey - sy
+    length = np.sqrt(lx * lx + ly * ly)
+    tx, ty = lx / length, ly / length
+    c = 0.5 * length
+    below = len(points) // 2
+    for i in range(0, n, WIDTH):
+        px, py = load(points, first + i), load(points, first + i + below)
+        ax, ay, bx, by = px - sx, py - sy, px - ex, py - ey
+        xp, xm = ax * tx + ay * ty, bx * tx + by * ty
+        # From the nearer end, so that y keeps its digits close to either.
+        y = less(size(xp), size(xm), ay * tx - ax * ty, by * tx - bx * ty)
+        on = less(tol, size(y), y, signed(splat(0.0), splat(side)))
+        y = less(0.0, xp, less(xm, 0.0, on, y), y)
+        xp, xm, y = xp / c, xm / c, y / c
+        end = less(size(xp), size(xm), size(xp), size(xm))
+        off = less(size(y), 1e-14, signed(splat(1e-14), splat(side)), y)
+        y = less(end, 1e-14, off, y)
+        x = 0.5 * (xp + xm)
+        store(tile, i, xp)
+        store(tile, i + _TILE, xm)
+        store(tile, i + 2 * _TILE, y)
+        store(tile, i + 3 * _TILE, x * x + y * y)
+    for k in range(_CLASSES):
+        count[k] = 0
+    for i in range(n):
+        rr = tile[3 * _TILE + i]
+        k = 0
+        while k < _CLASSES - 1 and rr >= _REACH_SQUARED[k]:
+            k += 1
+        chosen[k * _ROW + count[k]] = i
+        count[k] += 1
+    for k in range(_CLASSES):
+        at = k * _ROW + count[k]
+        if count[k] > 0:
+            for i in range(WIDTH):
+                chosen[at + i] = chosen[at - 1]
+    return c, tx, ty
+
+
+@_jit
+def tractions(points, tangents, per, first, last, start, end, kind, order, nu, tol, side, force, table, nodal, out):
+    """Traction (along the tangent, along the normal left of it) at points from unit densities.
+
+    ``points``, ``tangents`` flat (`lanes_of`), ``per`` of the points an element; those from ``first`` to ``last`` are
+    done. Sources: ``start``, ``end`` (m, 2), ``kind`` (m,). ``nodal`` (4, p+1, p+1) turns the monomials of each kind
+    into unknowns. ``out`` flat, (2(p+1)m, 2n): rows run element, component (along, normal), unknown; columns element,
+    component, node. ``force``: line forces instead of jumps.
+    """
+    n1 = order + 1
+    w = np.empty((MAX_ORDER + 1) * _STEP)
+    parts = np.empty((MAX_ORDER + 1) * _STEP)
+    tile = np.empty(4 * _TILE)
+    chosen = np.empty(_CLASSES * _ROW, np.int64)
+    count = np.empty(_CLASSES, np.int64)
+    places = np.empty(_TILE, np.int64)
+    lane_places = np.empty(WIDTH, np.int64)
+    below = len(tangents) // 2
+    height = len(out) // (2 * n1 * len(start))
+    factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
+    for begin in range(first, last, _TILE):
+        n = min(_TILE, last - begin)
+        for i in range(n):
+            places[i] = (begin + i) // per * per + begin + i
+        for e in range(len(start)):
+            c, tx, ty = _sort(points, begin, n, start, end, e, tol, side, tile, chosen, count)
+            source = kind[e]
+            for distance in range(_CLASSES):
+                row = distance * _ROW
+                for batch in range(row, row + count[distance], WIDTH):
+                    y = gather(tile, 2 * _TILE, chosen, batch)
+                    zp, zm = both(gather(tile, 0, chosen, batch), y), both(gather(tile, _TILE, chosen, batch), y)
+                    _moments(source, distance, zp, zm, order, table, w)
+                    ux, uy = gather(tangents, begin, chosen, batch), gather(tangents, begin + below, chosen, batch)
+                    # Twice the angle from the element to the target.
+                    turn = both(ux * tx + uy * ty, uy * tx - ux * ty)
+                    turn = turn * turn
+                    # Traction along the normal + i times that along the tangent, from what acts along and across the
+                    # element: (half the deviator (σyy − σxx)/2 + i shear), turned, and half the trace.
+                    if force:
+                        for k in range(n1):
+                            at = k * _STEP
+                            a, b = -factor * load_complex(w, at), (-factor * y) * load_complex(w, at + _B)
+                            along = -(times_i(b) + 2.0 * (1.0 - nu) * a)
+                            store(parts, at, along * turn + re(a))
+                            store(parts, at + _B, (b + (1.0 - 2.0 * nu) * times_i(a)) * turn - im(a))
+                    else:
+                        f2 = factor / c
+                        f3 = f2 * y
+                        for k in range(n1):
+                            at = k * _STEP
+                            b, d = f2 * load_complex(w, at + _B), (f3 * load_complex(w, at + _D)) * turn
+                            store(parts, at, d - times_i(b) * turn - im(b))
+                            store(parts, at + _B, times_i(d) - re(b))
+                    for k in range(WIDTH):
+                        lane_places[k] = places[chosen[batch + k]]
+                    for j in range(n1):
+                        along, normal = both(splat(0.0), splat(0.0)), both(splat(0.0), splat(0.0))
+                        for k in range(n1):
+                            t = nodal[source, k, j]
+                            along = along + t * load_complex(parts, k * _STEP)
+                            normal = normal + t * load_complex(parts, k * _STEP + _B)
+                        # Lanes that repeat a point write the same number to the same place.
+                        at = (2 * e * n1 + j) * height
+                        scatter(out, at + per, lane_places, 0, re(along))
+                        scatter(out, at, lane_places, 0, im(along))
+                        at += n1 * height
+                        scatter(out, at + per, lane_places, 0, re(normal))
+                        scatter(out, at, lane_places, 0, im(normal))
+
+
+@_jit
+def fields(points, first, last, start, end, kind, order, density, nu, tol, side, force, table, out):
+    """Add stress (xx, yy, xy) and 2μ times displacement (x, y) of elements with monomial densities (m, 2, p+1), local
+    components, to ``out`` (5, n) at ``points`` (flat, `lanes_of`). Line forces (``force``) are on ordinary elements
+    only."""
+    n1 = order + 1
+    highest = order + 1 if force else order
+    factor = 1.0 / (4.0 * np.pi * (1.0 - nu))
+    if force:
+        factor = -factor
+    tile = np.empty(4 * _TILE)
+    total = np.empty(5 * _TILE)
+    chosen = np.empty(_CLASSES * _ROW, np.int64)
+    count = np.empty(_CLASSES, np.int64)
+    p, q = np.empty(n1), np.empty(n1)
+    folded_p, folded_q = np.empty(table.shape[1]), np.empty(table.shape[1])
+    nothing = splat(0.0)
+    zero = both(nothing, nothing)
+    for begin in range(first, last, _TILE):
+        n = min(_TILE, last - begin)
+        for i in range(5 * _TILE):
+            total[i] = 0.0
+        for e in range(len(start)):
+            c, tx, ty = _sort(points, begin, n, start, end, e, tol, side, tile, chosen, count)
+            source = kind[e]
+            for k in range(n1):
+                p[k] = factor * density[e, 0, k]
+                q[k] = factor * density[e, 1, k]
+            # The element's own multipoles, as many as its nearest points by series ask for.
+            nearest = 1
+            while nearest < _CLASSES - 1 and count[nearest] == 0:
+                nearest += 1
+            for j in range(_TERMS[nearest - 1] + n1):
+                folded_p[j] = 0.0
+                folded_q[j] = 0.0
+                for k in range(n1):
+                    folded_p[j] += p[k] * table[source, j + k]
+                    folded_q[j] += q[k] * table[source, j + k]
+            along = both(splat(tx), splat(ty))
+            turn = both(splat(tx), splat(-ty))
+            turn = turn * turn
+            for distance in range(_CLASSES):
+                row = distance * _ROW
+                for batch in range(row, row + count[distance], WIDTH):
+                    y = gather(tile, 2 * _TILE, chosen, batch)
+                    zp, zm = both(gather(tile, 0, chosen, batch), y), both(gather(tile, _TILE, chosen, batch), y)
+                    z = 0.5 * (zp + zm)
+                    near = distance == 0 or (distance == 1 and highest <= 5)
+                    # The moments, their derivatives and logarithms, summed with p and with q.
+                    ap, aq, bp, bq, dp, dq, lp, lq = zero, zero, zero, zero, zero, zero, zero, zero
+                    log_p, log_q, log_r = nothing, nothing, nothing
+                    if force:
+                        log_r = 0.5 * log(norm(zm) if near else norm(z))
+                    if near:
+                        a, b, d = _first_moment(source, zp, zm)
+                        # log|ζ + 1|.
+                        other = log_r + re(a)
+                        for k in range(n1):
+                            fp, fq = p[k], q[k]
+                            ap = ap + fp * a
+                            aq = aq + fq * a
+                            bp = bp + fp * b
+                            bq = bq + fq * b
+                            dp = dp + fp * d
+                            dq = dq + fq * d
+                            d = 2.0 * b + z * d
+                            b = a + z * b
+                            a = z * a - table[source, k]
+                            if force:
+                                # ∫ t^k log|ζ − t| dt by parts.
+                                part = (re(a) + log_r + other) / (k + 1.0)
+                                log_p = log_p + fp * part
+                                log_q = log_q + fq * part
+                                other = -other
+                    else:
+                        i = 1.0 / z
+                        u, v = 2.0 * re(i), norm(i)
+                        for j in range(_TERMS[distance - 1] + order, -1, -1):
+                            fp, fq = folded_p[j], folded_q[j]
+                            if force and j > 0:
+                                lp, lq = term(lp, u, v, fp / j), term(lq, u, v, fq / j)
+                            ap, aq = term(ap, u, v, fp), term(aq, u, v, fq)
+                            fp *= j + 1.0
+                            fq *= j + 1.0
+                            bp, bq = term(bp, u, v, fp), term(bq, u, v, fq)
+                            dp, dq = term(dp, u, v, fp * (j + 2.0)), term(dq, u, v, fq * (j + 2.0))
+                        if force:
+                            log_p = folded_p[0] * log_r - re(value(lp, i) * i)
+                            log_q = folded_q[0] * log_r - re(value(lq, i) * i)
+                        lead = i
+                        ap, aq = value(ap, i) * lead, value(aq, i) * lead
+                        lead = -(lead * i)
+                        bp, bq = value(bp, i) * lead, value(bq, i) * lead
+                        lead = -(lead * i)
+                        dp, dq = value(dp, i) * lead, value(dq, i) * lead
+                    # Half the trace, half the deviator (σyy − σxx)/2 with i times the shear, and the displacement.
+                    if force:
+                        half = re(ap) - im(aq)
+                        deviator = y * (bq - times_i(bp)) - 2.0 * (1.0 - nu) * ap + (1.0 - 2.0 * nu) * times_i(aq)
+                        sum_p, sum_q = 0.0, 0.0
+                        for k in range(n1):
+                            sum_p += p[k] * table[0, k]
+                            sum_q += q[k] * table[0, k]
+                        log_p = (3.0 - 4.0 * nu) * (log_p + np.log(c) * sum_p) - y * (im(ap) + re(aq))
+                        log_q = (3.0 - 4.0 * nu) * (log_q + np.log(c) * sum_q) + y * (im(aq) - re(ap))
+                        moved = c * both(log_p, log_q)
+                    else:
+                        half = -(im(bp) + re(bq)) / c
+                        deviator = (y * (dp + times_i(dq)) - times_i(bp)) / c
+                        moved = both(
+                            y * (im(bq) - re(bp)) - 2.0 * (1.0 - nu) * im(ap) - (1.0 - 2.0 * nu) * re(aq),
+                            y * (im(bp) + re(bq)) - 2.0 * (1.0 - nu) * im(aq) + (1.0 - 2.0 * nu) * re(ap),
+                        )
+                    deviator = deviator * turn
+                    moved = moved * along
+                    # Lanes that repeat a point write the same sum to the same place.
+                    pile(total, 0, chosen, batch, half - re(deviator))
+                    pile(total, _TILE, chosen, batch, half + re(deviator))
+                    pile(total, 2 * _TILE, chosen, batch, im(deviator))
+                    pile(total, 3 * _TILE, chosen, batch, re(moved))
+                    pile(total, 4 * _TILE, chosen, batch, im(moved))
+        for k in range(5):
+            for i in range(n):
+                out[k, begin + i] += total[k * _TILE + i]
+
+
+def lanes_of(points: np.ndarray) -> np.ndarray:
+    """``points`` (n, 2) as the kernels read them: all x, all y, each with room for whole lanes."""
+    flat = np.zeros((2, len(points) + WIDTH))
+    flat[:, : len(points)] = points.T
+    return flat.ravel()

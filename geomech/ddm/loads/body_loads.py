@@ -1,0 +1,328 @@
+"""Loads on a body: tractions on pieces of its boundary, body forces, remote stress, pressure in the cracks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...model import History
+
+
+class OutOfEquilibrium(ValueError):
+    """Loads whose resultants do not vanish: no static solution exists.
+
+    ``force`` (2,) N/m, ``moment`` N about the centroid, ``relative`` to the sum of the loads' magnitudes.
+    """
+
+    def __init__(self, force: np.ndarray, moment: float, relative: float):
+        self.force, self.moment, self.relative = force, moment, relative
+        super().__init__(
+            f"the loads are out of equilibrium: force ({force[0]:.6g}, {force[1]:.6g}) N/m, moment {moment:.6g} N "
+            f"about the centroid, {relative:.3g} of the loads' size"
+        )
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """Of a fluid: ``value`` Pa at ``about`` (x, y), growing by ``gradient`` Pa/m. Water with its level at y0 is
+    ``Pressure(0, (0, -9.81e3), (0, y0))``. Raises ValueError when something is not finite."""
+
+    value: float = 0.0
+    gradient: tuple[float, float] = (0.0, 0.0)
+    about: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([self.value, *self.gradient, *self.about]).all():
+            raise ValueError(f"a pressure is not finite: {self}")
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """(...,) Pa at ``points`` (..., 2)."""
+        return self.value + (points - np.asarray(self.about)) @ np.asarray(self.gradient, dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyLoad:
+    """All parts are optional and add up.
+
+    segments             (m, 2, 2)  straight pieces of the boundary, anywhere on it, directed along it
+    tractions            (m, 2, 2)  traction (Pa, x and y) at the start and end of each, linear between
+    body_force           (2,)       N/m³ at ``about``; in a half-plane, where it makes stress grow with depth,
+                         everywhere
+    body_force_gradient  (2, 2)     N/m⁴: b(x) = body_force + gradient (x − about)
+    about                (2,)       m; the centroid when left out
+    k0                   in a half-plane, the stress along its surface that goes with the body force, per stress out of
+                         it; left out, ν/(1−ν), that of rock that could not widen
+    remote_stress        (3,)       Pa: a uniform stress that is there besides; on a finite body the tractions
+                                    that carry it act on the outline in addition to ``tractions``. Holes are free of it.
+                                    In a half-plane it must be parallel to the surface
+    crack_pressure       scalar or (n_segments,)  Pa, of a fluid in the cracks, positive when it presses; or a
+                         `Pressure`, or a function of points (n, 2) to (n,)
+    hole_pressure        the same in all holes, or of each: a number, Pa, or a `Pressure`
+    displacements        for every support of the body what it imposes, m: None (zero), constant (2,), linear (2, 2)
+                         from its values at the support's ends, or a function of points (n, 2); components that the
+                         support does not hold are ignored
+    sides                {where: traction}: an edge's number or a straight piece ((x, y), (x, y)) to a traction (Pa, x
+                         and y) that is constant (2,), linear (2, 2) from its values at the ends, or a function of
+                         points (n, 2) to (n, 2)
+    points, forces       (k, 2) m and N/m: point loads, inside the rock or on its boundary. They are singular, except
+                         on holes and where the plane beyond the boundary holds rock: there a hundredth of the extent
+                         carries them
+    kelvin               True: those on the boundary, too, are Kelvin's in the infinite plane. The rock beyond the
+                         boundary then keeps its share of them, about half on a side, three quarters at a right-angled
+                         corner: no element's displacement is singular enough to bring it back
+
+    Raises ValueError naming the part that is not finite or of the wrong shape.
+    """
+
+    segments: np.ndarray | None = None
+    tractions: np.ndarray | None = None
+    body_force: np.ndarray | None = None
+    body_force_gradient: np.ndarray | None = None
+    about: np.ndarray | None = None
+    k0: float | None = None
+    remote_stress: np.ndarray | None = None
+    crack_pressure: np.ndarray | float = 0.0
+    hole_pressure: Pressure | Sequence[Pressure | float] | float = 0.0
+    displacements: Sequence | None = None
+    sides: Mapping | Sequence[tuple] = ()
+    points: np.ndarray | None = None
+    forces: np.ndarray | None = None
+    kelvin: bool = False
+
+    def scaled(self, factor: float) -> BodyLoad:
+        """``factor`` times everything."""
+        changed = {
+            name: _times(getattr(self, name), factor)
+            for name in ("tractions", "body_force", "body_force_gradient", "remote_stress", "crack_pressure", "forces")
+        }
+        displacements, holes = self.displacements, self.hole_pressure
+        if displacements is not None:
+            displacements = [_times(value, factor) for value in displacements]
+        if isinstance(holes, (Sequence, np.ndarray)):
+            holes = [_times(p, factor) for p in holes]
+        else:
+            holes = _times(holes, factor)
+        sides = [(where, _times(value, factor)) for where, value in self.sides]
+        return replace(self, **changed, displacements=displacements, hole_pressure=holes, sides=sides)
+
+    def with_added(self, other: BodyLoad) -> BodyLoad:
+        """Both loads together. Raises ValueError when body forces are given about different points, or point loads in
+        different ways."""
+        if self.kelvin != other.kelvin and self.points is not None and other.points is not None:
+            raise ValueError("point loads on the boundary cannot be Kelvin's in one load and not in the other")
+        joined = {
+            name: _joined(getattr(self, name), getattr(other, name))
+            for name in ("segments", "tractions", "points", "forces")
+        }
+        summed = {
+            name: _plus(getattr(self, name), getattr(other, name))
+            for name in ("body_force", "body_force_gradient", "remote_stress", "crack_pressure")
+        }
+        graded = [load for load in (self, other) if load.body_force_gradient is not None]
+        if len(graded) == 2 and not np.array_equal(self.about, other.about):
+            raise ValueError("body forces given about different points cannot be added")
+        about = graded[0].about if graded else None
+        heavy = [load for load in (self, other) if load.body_force is not None]
+        if len(heavy) == 2 and self.k0 != other.k0:
+            raise ValueError("body forces with different k0 cannot be added")
+        k0 = heavy[0].k0 if heavy else None
+        holes = self.hole_pressure, other.hole_pressure
+        lists = [isinstance(p, (Sequence, np.ndarray)) for p in holes]
+        if any(lists):
+            n = len(holes[lists.index(True)])
+            pair = [list(p) if many else [p] * n for p, many in zip(holes, lists)]
+            pressure = [_plus(p, q) for p, q in zip(*pair, strict=True)]
+        else:
+            pressure = _plus(*holes)
+        moved = self.displacements, other.displacements
+        if moved[0] is None or moved[1] is None:
+            displacements = moved[0] if moved[1] is None else moved[1]
+        else:
+            displacements = [_plus(a, b) for a, b in zip(*moved, strict=True)]
+        return BodyLoad(
+            **joined,
+            **summed,
+            about=about,
+            k0=k0,
+            hole_pressure=pressure,
+            displacements=displacements,
+            sides=self.sides + other.sides,
+            kelvin=self.kelvin or other.kelvin,
+        )
+
+    def hole_pressures(self, n_holes: int) -> list[Pressure]:
+        """That of every hole, [] when there is none. Raises ValueError when there are not as many."""
+        given = self.hole_pressure
+        if np.ndim(given) == 0 and not isinstance(given, Pressure) and given == 0:
+            return []
+        if isinstance(given, Pressure) or np.ndim(given) == 0:
+            given = [given] * n_holes
+            if not n_holes:
+                raise ValueError("a pressure in holes, but the body has none")
+        if len(given) != n_holes:
+            raise ValueError(f"{n_holes} holes but {len(given)} pressures")
+        return [p if isinstance(p, Pressure) else Pressure(float(p)) for p in given]
+
+    def face_pressure(self, points: np.ndarray, segment: np.ndarray, n_segments: int) -> np.ndarray | float:
+        """(n, m) Pa at ``points`` (n, m, 2) on crack elements of ``segment`` (n,), or what broadcasts to it. Raises
+        ValueError."""
+        p = self.crack_pressure
+        if isinstance(p, Pressure):
+            return p.at(points)
+        if callable(p):
+            out = np.asarray(p(points.reshape(-1, 2)), dtype=float)
+            if out.size != points[..., 0].size or not np.isfinite(out).all():
+                raise ValueError("crack_pressure: the function must give a finite number for every point")
+            return out.reshape(points.shape[:-1])
+        if np.ndim(p) == 0:
+            return float(p)
+        if np.shape(p) != (n_segments,):
+            raise ValueError(f"crack_pressure: {n_segments} crack segments but shape {np.shape(p)}")
+        return np.asarray(p, dtype=float)[segment][:, None]
+
+    def __post_init__(self) -> None:
+        shapes = {
+            "segments": (-1, 2, 2),
+            "tractions": (-1, 2, 2),
+            "body_force": (2,),
+            "body_force_gradient": (2, 2),
+            "about": (2,),
+            "remote_stress": (3,),
+            "points": (-1, 2),
+            "forces": (-1, 2),
+        }
+        for name, shape in shapes.items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            value = np.ascontiguousarray(value, dtype=float)
+            if value.ndim != len(shape) or value.shape != (
+                *(value.shape[:1] if shape[0] < 0 else shape[:1]),
+                *shape[1:],
+            ):
+                raise ValueError(f"{name}: expected shape {str(shape).replace('-1', 'm')}, got {value.shape}")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name}: not finite")
+            object.__setattr__(self, name, value)
+        for p in self.hole_pressure if isinstance(self.hole_pressure, Sequence) else [self.hole_pressure]:
+            if not isinstance(p, Pressure) and not np.isfinite(p).all():
+                raise ValueError("hole_pressure: not finite")
+        p = self.crack_pressure
+        if not callable(p) and not isinstance(p, Pressure) and not np.isfinite(p).all():
+            raise ValueError("crack_pressure: not finite")
+        n = [0 if x is None else len(x) for x in (self.segments, self.tractions)]
+        if n[0] != n[1]:
+            raise ValueError(f"{n[0]} load segments but {n[1]} tractions")
+        n = [0 if x is None else len(x) for x in (self.points, self.forces)]
+        if n[0] != n[1]:
+            raise ValueError(f"{n[0]} loaded points but {n[1]} forces")
+        pairs = self.sides.items() if isinstance(self.sides, Mapping) else self.sides
+        object.__setattr__(self, "sides", tuple(_side(where, value) for where, value in pairs))
+
+
+def _times(value, factor: float):
+    """``factor`` times an array, a pressure or a function; None stays."""
+    if value is None:
+        return None
+    if callable(value):
+        return lambda points: factor * np.asarray(value(points), dtype=float)
+    if isinstance(value, Pressure):
+        return Pressure(factor * value.value, tuple(factor * np.asarray(value.gradient, dtype=float)), value.about)
+    return factor * np.asarray(value, dtype=float)
+
+
+def _plus(a, b):
+    """The sum of two arrays, pressures, functions or None (nothing)."""
+    if a is None or b is None:
+        return b if a is None else a
+    if not callable(a) and not callable(b):
+        if isinstance(a, Pressure) or isinstance(b, Pressure):
+            a, b = (p if isinstance(p, Pressure) else Pressure(_number(p)) for p in (a, b))
+            slope = np.asarray(a.gradient, dtype=float) + b.gradient
+            return Pressure(float(a.value + b.at(np.asarray(a.about, dtype=float))), tuple(slope), a.about)
+        return np.asarray(a, dtype=float) + np.asarray(b, dtype=float)
+
+    def part(value, points: np.ndarray):
+        if callable(value):
+            return np.asarray(value(points), dtype=float)
+        return value.at(points) if isinstance(value, Pressure) else value
+
+    for value in (a, b):
+        if not callable(value) and not isinstance(value, Pressure) and np.shape(value) not in ((), (2,)):
+            raise ValueError("what differs from place to place by a list of values cannot be added to a function")
+    return lambda points: part(a, points) + part(b, points)
+
+
+def _number(p) -> float:
+    if np.ndim(p):
+        raise ValueError("a pressure that is linear in position cannot be added to one of each crack")
+    return float(p)
+
+
+def _joined(a: np.ndarray | None, b: np.ndarray | None) -> np.ndarray | None:
+    if a is None or b is None:
+        return b if a is None else a
+    return np.concatenate([a, b])
+
+
+def _side(where, value) -> tuple:
+    """A pair of `BodyLoad.sides`, checked: an int or (2, 2) as tuples, a function or an array."""
+    name = f"side {where}"
+    if not isinstance(where, (int, np.integer)):
+        piece = np.asarray(where, dtype=float)
+        if piece.shape != (2, 2) or not np.isfinite(piece).all():
+            raise ValueError(f"{name}: expected an edge's number or the two ends of a piece of the boundary")
+        where = tuple(map(tuple, piece.tolist()))
+    else:
+        where = int(where)
+    if not callable(value):
+        value = np.array(value, dtype=float)
+        if value.shape not in ((2,), (2, 2)):
+            raise ValueError(f"{name}: expected a traction (2,), (2, 2) or a function, got shape {value.shape}")
+        if not np.isfinite(value).all():
+            raise ValueError(f"{name}: its traction is not finite")
+    return where, value
+
+
+def resultants(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """(force (2,), moment about ``about``, sum of the sizes of all forces) of linear tractions on ``segments``."""
+    if not len(segments):
+        return np.zeros(2), 0.0, 0.0
+    arms, forces = _arms_and_forces(segments, tractions, about)
+    moment = float((arms[..., 0] * forces[..., 1] - arms[..., 1] * forces[..., 0]).sum())
+    return 3 * forces.sum(axis=(0, 1)), moment, 3 * float(np.hypot(forces[..., 0], forces[..., 1]).sum())
+
+
+def first_moments(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> np.ndarray:
+    """(2, 2) ∫ r ⊗ t ds of linear ``tractions`` on ``segments``, with the arms r from ``about``, N m."""
+    arms, forces = _arms_and_forces(segments, tractions, about)
+    return arms.reshape(-1, 2).T @ forces.reshape(-1, 2)
+
+
+def _arms_and_forces(segments: np.ndarray, tractions: np.ndarray, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 2, 2) twice, of which the products at all ends add up to those of arms and tractions along the segments: ∫ x
+    t of two functions linear along a length L is L/6 Σ x_i t_j, those of the same end counted twice."""
+    ends = segments - about
+    along = ends[:, 1] - ends[:, 0]
+    forces = (np.hypot(along[:, 0], along[:, 1]) / 6)[:, None, None] * tractions
+    return ends + ends.sum(axis=1, keepdims=True), forces
+
+
+@dataclass(frozen=True, eq=False)
+class LoadHistory:
+    """Loads whose sizes are functions of time: ``parts`` are pairs of a `BodyLoad` and a factor, a number, a function
+    of time (s), or a `model.History` of one component."""
+
+    parts: Sequence[tuple[BodyLoad, float | Callable[[float], float] | History]]
+
+    def at(self, time: float) -> BodyLoad:
+        """What acts at ``time``."""
+        out: BodyLoad | None = None
+        for load, factor in self.parts:
+            if isinstance(factor, History):
+                factor = factor.at(time)[0]
+            part = load.scaled(float(factor(time) if callable(factor) else factor))
+            out = part if out is None else out.with_added(part)
+        return BodyLoad() if out is None else out

@@ -1,0 +1,330 @@
+"""What unit loads do on a body's boundary and cracks, remembered: loads mostly come again and only change in size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model import Material
+from ..kernels.body_force_fields import GrowingWithDepth, Particular, edge_densities
+from ..mesh.edge_location import OFF, onto_boundary, sides_for
+from ..mesh.elements import Mesh
+from ..system.boundary_system import BoundarySystem
+from ..system.influence_matrix import ElementSet, line_forces, project_jumps
+from ..system.row_store import KeptRows
+
+if TYPE_CHECKING:
+    from ..interfaces import LoadParts
+    from .hole_supports import Anchors
+
+#: Loads on so many different segments are remembered.
+_REMEMBERED = 400
+#: Edges or segments whose forces are worked out at once: all of a large boundary's on itself would fill the memory.
+_AT_ONCE = 256
+
+
+class UnitLoad:
+    """What unit loads do, one a column of ``applied``: tractions g on the boundary above r on the cracks.
+
+    Loads that come again are ``answered`` once and then only scaled: (g, r, y, r' = r − A_CΓ y, S⁻¹ r') with y = A_ΓΓ⁻¹
+    g, of which ``eliminated`` is y, the part that outlasts growth. ``segment`` is where tractions act, ``against``
+    whether they were given against the boundary's direction; or ``densities`` (m, 2, 3, columns) are what acts on the m
+    edges of the body.
+    """
+
+    def __init__(
+        self,
+        applied: np.ndarray,
+        segment: np.ndarray | None = None,
+        against: bool = False,
+        densities: np.ndarray | None = None,
+    ):
+        self.applied, self.segment, self.against, self.densities = applied, segment, against, densities
+        self.eliminated: np.ndarray | None = None
+        self.answered: np.ndarray | None = None
+        self.used = False
+
+
+class Eliminated:
+    """A ``load`` (n,) on the boundary, ``y`` = A_ΓΓ⁻¹ load and A_CΓ y ``on_faces`` (n_elements, width), both of which
+    outlast growth; ``new`` are the elements where the latter is not worked out yet."""
+
+    def __init__(self, load: np.ndarray, y: np.ndarray, on_faces: np.ndarray, new: np.ndarray | None = None):
+        self.load, self.y, self.on_faces = load, y, on_faces
+        self.new = np.empty(0, int) if new is None else new
+
+    def grown(self, was: np.ndarray) -> Eliminated:
+        """The same between elements whose numbers were ``was`` (n_elements,), −1 where new."""
+        missing = np.zeros(len(self.on_faces) + 1, bool)
+        missing[-1] = missing[self.new] = True  # its end stands for −1
+        at = np.where(missing[was], 0, was)
+        on_faces = self.on_faces[at] if len(self.on_faces) else np.empty((len(was), self.on_faces.shape[1]))
+        return Eliminated(self.load, self.y, on_faces, np.flatnonzero(missing[was]))
+
+    def complete(self, cg: np.ndarray | KeptRows, faces: ElementSet) -> None:
+        """Work out what is missing, with A_CΓ, ``cg``."""
+        if not len(self.new):
+            return
+        rows = cg.of(self.new) if isinstance(cg, KeptRows) else cg[faces.unknowns(self.new)]
+        self.on_faces[self.new] = (rows @ self.y).reshape(len(self.new), 2 * faces.per)
+        self.new = self.new[:0]
+
+
+class UnitLoads:
+    """The unit loads of a body with elements ``mesh``; see `onto_boundary` for ``extent``, `full_plane` for ``tol``.
+
+    ``outlined``: whether the first loop is an outline; if not, all are holes in the infinite plane. ``anchors``: of the
+    boundary's held holes.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        centroid: np.ndarray,
+        material: Material,
+        tol: float,
+        extent: float,
+        outlined: bool,
+        anchors: Anchors | None = None,
+    ):
+        self.mesh, self.boundary, self.faces = mesh, mesh.boundary, mesh.cracks
+        self.centroid, self.material, self.nu = centroid, material, material.effective_poissons_ratio
+        self.tol, self.extent, self.anchors = tol, extent, anchors
+        n_loops = int(mesh.edge_loop.max()) + 1 if len(mesh.edges) else 0
+        self.in_plane, self.n_holes = not outlined, n_loops - outlined
+        self._segments: dict[bytes, UnitLoad] = {}
+        self._on_edges: dict[str | int, UnitLoad] = {}
+        self._recent: list[bytes] = []
+        self._last: Eliminated | None = None
+
+    def inherit(self, old: UnitLoads, c_old: np.ndarray) -> None:
+        """Take over the loads of ``old``, a body with the same boundary; ``c_old`` are the crack elements' old
+        numbers."""
+        n_g = self.boundary.n_unknowns
+        if old._last is not None:
+            self._last = old._last.grown(c_old)
+        new, kept = np.flatnonzero(c_old < 0), np.flatnonzero(c_old >= 0)
+        to, fro, at = (
+            n_g + x for x in (self.faces.unknowns(kept), old.faces.unknowns(c_old[kept]), self.faces.unknowns(new))
+        )
+        added = self.faces.take(new)
+
+        def grown(before: UnitLoad, on_new: np.ndarray) -> UnitLoad:
+            applied = np.empty((n_g + self.faces.n_unknowns, before.applied.shape[1]))
+            applied[:n_g], applied[to], applied[at] = before.applied[:n_g], before.applied[fro], on_new
+            unit = UnitLoad(applied, before.segment, before.against, before.densities)
+            unit.eliminated = before.eliminated
+            return unit
+
+        for name, before in old._on_edges.items():
+            self._on_edges[name] = grown(before, self._on_faces(name, added, before.densities))
+        keys = [key for key in old._recent if key in old._segments]
+        if not keys:
+            return
+        straight = np.array([old._segments[key].segment for key in keys])
+        for key, on_new in zip(keys, self._linear_forces(added, straight)):
+            self._segments[key] = grown(old._segments[key], on_new)
+        self._recent = keys
+
+    def of(self, applied: LoadParts) -> list[tuple[UnitLoad, np.ndarray]]:
+        """The unit loads of which what is ``applied`` is made, all but functions and point loads, and their sizes."""
+        load, particular = applied.load, applied.particular
+        units = self._unit_segments(applied.segments, applied.tractions)
+        sizes: dict[str | int, np.ndarray] = {}
+        if particular.force.any() or particular.gradient.any():
+            sizes["force"] = particular.sizes
+        if self.n_holes and particular.uniform.any():
+            sizes["remote"] = particular.uniform
+        for hole, pressure in enumerate(load.hole_pressures(self.n_holes)):
+            size = np.array([pressure.at(self._centre(hole)), *pressure.gradient])
+            if size.any():
+                sizes[hole] = size
+        for name, size in sizes.items():
+            if name not in self._on_edges:
+                self._on_edges[name] = self._edge_load(name)
+            units.append((self._on_edges[name], size))
+        return units
+
+    def add(
+        self,
+        units: list[tuple[UnitLoad, np.ndarray]],
+        rest: np.ndarray,
+        boundary: BoundarySystem,
+        cg: np.ndarray,
+        opened: Callable[[np.ndarray], np.ndarray],
+    ) -> tuple[np.ndarray, ...]:
+        """g, r, y, r' and S⁻¹ r' (see `UnitLoad`) of the ``units`` and of ``rest`` (n,), tractions on boundary and
+        cracks.
+
+        ``cg`` is A_CΓ, ``opened`` applies S⁻¹.
+        """
+        n_g, n_c = self.boundary.n_unknowns, self.faces.n_unknowns
+        n = n_g + n_c
+        # Every part of a unit load is a load of its own; where each takes an iteration, their sum takes one.
+        worth = not boundary.iterated
+        again = [unit for unit, _ in units if unit.used and unit.answered is None and worth]
+        if again:
+            self._answer(again, boundary, cg, opened)
+        total = np.zeros(2 * n + n_c)
+        for unit, size in units:
+            unit.used = True
+            if unit.answered is None:
+                rest = rest + unit.applied @ size
+            else:
+                total += unit.answered @ size
+        if rest.any():
+            if self._last is None or not np.array_equal(self._last.load, rest[:n_g]):
+                y = boundary.solve(rest[:n_g])
+                self._last = Eliminated(rest[:n_g].copy(), y, (cg @ y).reshape(self.faces.n, 2 * self.faces.per))
+            self._last.complete(cg, self.faces)
+            y, reduced = self._last.y, rest[n_g:] - self._last.on_faces.ravel()
+            total += np.concatenate([rest, y, reduced, opened(reduced)])
+        return total[:n_g], total[n_g:n], total[n : n + n_g], total[n + n_g : 2 * n], total[2 * n :]
+
+    def _answer(self, units: list[UnitLoad], boundary: BoundarySystem, cg: np.ndarray, opened) -> None:
+        """Work out what the ``units`` come to."""
+        n_g = self.boundary.n_unknowns
+        self._eliminate(units, boundary)
+        for unit in units:
+            reduced = unit.applied[n_g:] - cg @ unit.eliminated
+            unit.answered = np.concatenate([unit.applied, unit.eliminated, reduced, opened(reduced)])
+
+    def _eliminate(self, units: list[UnitLoad], boundary: BoundarySystem) -> None:
+        """Work out y of those of the ``units`` that have none."""
+        n_g, fresh = self.boundary.n_unknowns, [unit for unit in units if unit.eliminated is None]
+        if fresh:
+            y = boundary.solve(np.hstack([unit.applied[:n_g] for unit in fresh]))
+            for unit, part in zip(fresh, np.split(y, np.cumsum([u.applied.shape[1] for u in fresh])[:-1], axis=1)):
+                unit.eliminated = part
+
+    def answers(
+        self, segments: np.ndarray, boundary: BoundarySystem, cg: np.ndarray | KeptRows
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """y (n_boundary_unknowns, 4 m) and r' (n_crack_unknowns, 4 m), see `UnitLoad`, of ``segments`` (m, 2, 2)."""
+        units = [unit for unit, _ in self._unit_segments(segments, np.zeros((len(segments), 2, 2)))]
+        self._eliminate(units, boundary)
+        # A segment that was given against the boundary's direction has its ends changed about.
+        order = [[2, 3, 0, 1] if unit.against else [0, 1, 2, 3] for unit in units]
+        y = np.hstack([unit.eliminated[:, columns] for unit, columns in zip(units, order)])
+        direct = [unit.applied[self.boundary.n_unknowns :, columns] for unit, columns in zip(units, order)]
+        return y, np.hstack(direct) - cg @ y
+
+    def _unit_segments(self, segments: np.ndarray, tractions: np.ndarray) -> list[tuple[UnitLoad, np.ndarray]]:
+        """The ``segments`` (m, 2, 2) and their (4,) tractions."""
+        if not len(segments):
+            return []
+        edges = sides_for(self.mesh, segments)
+        if not len(edges):
+            raise ValueError("load segments need a body with an outline, a hole or a free surface")
+        keys = [segment.tobytes() for segment in segments]
+        missing = [k for k, key in enumerate(keys) if key not in self._segments]
+        if missing:
+            if len(self._segments) > _REMEMBERED:
+                self._segments.clear()
+                return self._unit_segments(segments, tractions)
+            placed = [onto_boundary(edges, segments[k], f"load segment {k}", self.extent)[:2] for k in missing]
+            for first in range(0, len(missing), _AT_ONCE):
+                here = placed[first : first + _AT_ONCE]
+                straight = np.array([segment for segment, _ in here])
+                parts = (self._linear_forces(targets, straight) for targets in (self.boundary, self.faces))
+                for k, (segment, against), *rows in zip(missing[first:], here, *parts):
+                    self._segments[keys[k]] = UnitLoad(np.concatenate(rows), segment, against)
+        self._recent = keys
+        units = [self._segments[key] for key in keys]
+        return [(u, (ends[::-1] if u.against else ends).ravel()) for u, ends in zip(units, tractions)]
+
+    def _linear_forces(self, targets: ElementSet, segments: np.ndarray) -> np.ndarray:
+        """(m, n_unknowns, 4) traction from unit (x, y) forces at the start, then at the end of straight segments,
+        linear along them; seen from outside the boundary."""
+        tol = 2 * OFF * self.extent
+        unit = line_forces(targets, segments[:, 0], segments[:, 1], 1, self.nu, tol, -1.0)
+        if targets is self.boundary:
+            project_jumps(unit, targets, segments[:, 0], segments[:, 1], self.nu, tol, -1.0)
+        d = segments[:, 1] - segments[:, 0]
+        t = d / np.hypot(*d.T)[:, None]
+        turn = np.stack([t, np.column_stack([-t[:, 1], t[:, 0]])], axis=1)
+        by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
+        out = np.einsum("nmce,mcx->mnex", by_end, turn).reshape(len(segments), targets.n_unknowns, 4)
+        if targets is self.boundary and self.anchors is not None:
+            unit = self.anchors.of_forces(segments[:, 0], segments[:, 1], 1)
+            by_end = np.stack([unit[..., 0] - unit[..., 1], unit[..., 0] + unit[..., 1]], axis=-1) / 2
+            moved = np.einsum("rmce,mcx->mrex", by_end, turn).reshape(len(segments), -1, 4)
+            out = out + self.anchors.rows @ moved
+        return np.ascontiguousarray(out)
+
+    def _hole(self, number: int) -> np.ndarray:
+        """Edges of a hole."""
+        return np.flatnonzero(self.mesh.edge_loop == number + (0 if self.in_plane else 1))
+
+    def _centre(self, number: int) -> np.ndarray:
+        return self.mesh.edges[self._hole(number), 0].mean(axis=0)
+
+    def _edge_load(self, name: str | int) -> UnitLoad:
+        """What acts on whole edges.
+
+        "force": the six body forces b_x, b_y, B_xx, B_xy, B_yx, B_yy, in a half-plane the three slopes; "remote": the
+        three uniform stresses of the plane or the body, which holes leave without traction; a number: pressure in that
+        hole, constant and growing with x and with y from its centre.
+        """
+        densities = self._edge_densities(name)
+        applied = [self._from_edges(self.boundary, densities), self._on_faces(name, self.faces, densities)]
+        if self.anchors is not None:
+            unit = self.anchors.of_forces(self.mesh.edges[:, 0], self.mesh.edges[:, 1], 2)
+            applied[0] += self.anchors.rows @ np.tensordot(unit, densities, 3)
+        return UnitLoad(np.concatenate(applied), densities=densities)
+
+    def _edge_densities(self, name: str | int) -> np.ndarray:
+        if not isinstance(name, int):
+            out = np.stack([edge_densities(self.mesh.edges, unit) for unit in self._particular(name)], axis=-1)
+            if name == "remote" and not self.in_plane:
+                out[self.mesh.edge_loop == 0] = 0.0  # the outline bears it
+            return out
+        a, b = self.mesh.edges[:, 0], self.mesh.edges[:, 1]
+        densities = np.zeros((len(a), 2, 3, 3))
+        here, centre = self._hole(name), self._centre(name)
+        # The normal of an edge points into the rock, as pressure does.
+        densities[here, 1, 0, 0] = 1.0
+        for k in (0, 1):
+            densities[here, 1, 0, k + 1] = 0.5 * (a + b)[here, k] - centre[k]
+            densities[here, 1, 1, k + 1] = 0.5 * (b - a)[here, k]
+        return densities
+
+    def _particular(self, name: str) -> list[Particular | GrowingWithDepth]:
+        """The particular fields of unit body forces or of unit remote stresses."""
+        none, rock = np.zeros(2), self.faces.half_plane
+        if name == "force" and rock is not None:
+            return [GrowingWithDepth(rock, none, unit, np.zeros(3), self.material) for unit in np.eye(3)]
+        if name == "remote":
+            return [Particular(self.centroid, none, np.zeros((2, 2)), unit, self.material) for unit in np.eye(3)]
+        return [
+            Particular(self.centroid, unit[:2], unit[2:].reshape(2, 2), np.zeros(3), self.material)
+            for unit in np.eye(6)
+        ]
+
+    def _from_edges(self, targets: ElementSet, densities: np.ndarray) -> np.ndarray:
+        out = np.zeros((targets.n_unknowns, densities.shape[-1]))
+        for first in range(0, len(densities), _AT_ONCE):
+            a, b = self.mesh.edges[first : first + _AT_ONCE].swapaxes(0, 1)
+            forces = line_forces(targets, a, b, 2, self.nu, self.tol, -1.0)
+            own = densities[first : first + _AT_ONCE].reshape(6 * len(a), -1)
+            out += forces.reshape(targets.n_unknowns, 6 * len(a)) @ own
+        return out
+
+    def _on_faces(self, name: str | int, faces: ElementSet, densities: np.ndarray) -> np.ndarray:
+        """What a load on whole edges does to the crack elements ``faces``."""
+        out = self._from_edges(faces, densities)
+        if not isinstance(name, int):
+            points = faces.nodes.reshape(-1, 2)
+            out += np.column_stack([on_elements(faces, unit.stress(points)) for unit in self._particular(name)])
+        return out
+
+
+def on_elements(c: ElementSet, stress: np.ndarray) -> np.ndarray:
+    """(n_unknowns,) traction (along, normal) at the collocation nodes of ``stress`` (3,) or (n_nodes, 3)."""
+    s = np.broadcast_to(stress, (c.n, c.per, 3)) if np.ndim(stress) == 1 else stress.reshape(c.n, c.per, 3)
+    t, n = c.tangent[:, None], c.normal[:, None]
+    tx = s[..., 0] * n[..., 0] + s[..., 2] * n[..., 1]
+    ty = s[..., 2] * n[..., 0] + s[..., 1] * n[..., 1]
+    return np.stack([tx * t[..., 0] + ty * t[..., 1], tx * n[..., 0] + ty * n[..., 1]], axis=1).ravel()

@@ -1,0 +1,1 @@
+"""Influence matrices, the boundary's system, and the Schur complement on the crack unknowns."""

@@ -1,0 +1,327 @@
+"""The crack unknowns' matrix while cracks grow: factored once, then bordered with what is new.
+
+Unknowns are kept in the order in which they came (`growing_lu`), so that a body that grows shares the matrix and
+all factors with the one before, which stays what it was, and pays for rows and columns of new elements alone. Elements
+at tips are replaced in the next increment: they are a last, loose border of the body's own. Their rows outlast them, as
+a tip's element that becomes an ordinary one has other shape functions and the same collocation points. An element that
+goes from elsewhere stays, with its equation given up for w = 0 by one more unknown in it (Woodbury's formula).
+
+Elimination in the order of arrival pivots inside what came together only and loses ‖L‖ ‖U‖ / ‖S‖ in accuracy over one
+that pivots freely (Higham 2002, §13.2). S is factored anew where that would be felt, and when much of it is gone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from ..kernels import shape_functions
+from .dense_lu import Factor
+from .growing_lu import Border, GrowingFactor, Known, loss
+from .influence_matrix import ElementSet, unknowns_of
+
+#: All is factored anew when more than this part of the elements is gone: they take their share of time.
+GONE = 0.25
+#: Bodies that grow from one in several ways keep what they have of their own loose, up to this part of the unknowns;
+#: from there they get a copy of what they share.
+LOOSE = 0.15
+#: Fewer unknowns are factored in less time than borders take.
+SMALLEST = 200
+#: Loss of accuracy, ‖L‖ ‖U‖ / ‖S‖ over the reciprocal condition, from which all is factored anew: K then still
+#: agrees with that of factors made anew to 1e-10.
+LOSS = 5e6
+#: What it means when there are no factors.
+SINGULAR = "cracks cut a part of the body off"
+
+
+class Bordered:
+    """S between crack ``elements``: of the ``firm`` matrix the first ``n_firm`` unknowns, and behind them a ``loose``
+    border. ``at`` (n_places,) are the numbers of the elements in this order, −1 for one that is gone and for the giving
+    up of its equation. Of a whole matrix the border is empty and ``firm`` is made when it grows."""
+
+    def __init__(
+        self,
+        elements: ElementSet,
+        firm: GrowingFactor,
+        n_firm: int,
+        at: np.ndarray,
+        loose: Border,
+        together: tuple[Border, int] | None = None,
+    ):
+        self.elements, self.firm, self.n_firm, self.at, self.loose = elements, firm, n_firm, at, loose
+        #: The loose border and before it, of so many unknowns, what became firm with it.
+        self.together = together
+        self.n = elements.n_unknowns
+        #: L (transposed) and U of the loose border, once it is eliminated.
+        self.eliminated: tuple[np.ndarray, np.ndarray] | None = None
+
+    @staticmethod
+    def whole(elements: ElementSet, matrix: np.ndarray) -> WholeMatrix:
+        """The ``matrix`` (n, n) of the ``elements`` before it grows."""
+        return WholeMatrix(elements, matrix)
+
+    is_whole = False
+
+    @property
+    def unfactored(self) -> bool:
+        """Whether asking for factors will make those of a whole matrix."""
+        return self.firm.unfactored
+
+    def grown(
+        self,
+        elements: ElementSet,
+        was: np.ndarray,
+        seen: np.ndarray,
+        compute: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    ) -> Bordered | WholeMatrix:
+        """S between ``elements``, of which ``was`` (n,) are the numbers here, −1 where new, and ``seen`` (n,) those of
+        elements in their place, whose rows are theirs; ``compute(rows, columns)`` makes blocks of it between
+        elements."""
+        if np.array_equal(was, np.arange(self.elements.n)):
+            return self
+        out = self._changed(elements, was, seen, compute)
+        if np.count_nonzero(out.at < 0) > 2 * GONE * elements.n:
+            return Bordered.whole(elements, out.dense)
+        return out
+
+    def _changed(self, elements: ElementSet, was: np.ndarray, seen: np.ndarray, compute) -> Bordered:
+        width = 2 * elements.per
+        n_places = self.n_firm // width
+        now = np.full(self.elements.n + 1, -1)  # its end stands for what had gone before
+        now[was[was >= 0]] = np.flatnonzero(was >= 0)
+        firm, loose = now[self.at[:n_places]], self.at[n_places:]
+        given_up = np.flatnonzero((self.at[:n_places] >= 0) & (firm < 0))
+        settled = np.zeros(elements.n, bool)
+        settled[firm[firm >= 0]] = True
+        came, at_tip = np.flatnonzero(~settled), _at_tips(elements, settled)
+        came = np.concatenate([came[~at_tip[came]], came[at_tip[came]]])
+        n_inner = len(came) - int(at_tip[came].sum())
+        # Where they stood in the loose border: as they are, or in another kind, with rows that are the same.
+        place = np.full(self.elements.n + 1, -1)
+        place[loose] = np.arange(len(loose))
+        column, row = place[was[came]], place[seen[came]]
+        border = self._border(elements, came, firm, row, column, compute)
+        names = [elements.keys[k] for k in came[:n_inner].tolist()]
+        m = width * n_inner
+        base, n = self.firm, self.n_firm
+        inner, outer = _parted(border, m, self._known(row, column, width, 0, m), self._known(row, column, width, m))
+        if given_up.size:
+            names += [(place, "given up") for place in given_up.tolist()]
+            extra = self._giving_up(given_up, n, m)
+            inner, outer = _followed(inner, extra), _pushed(outer, len(extra.corner))
+        n_new, together = len(inner.corner), None
+        if n_new:
+            if base.n > n and not base.went_on(n, n_new, names):
+                # Others have grown from here another way.
+                if width * len(came) < LOOSE * n and not given_up.size:
+                    inner, outer = _parted(border, 0, None, self._known(row, column, width))
+                    names, n_inner, n_new = [], 0, 0
+                else:
+                    base = base.part(n)
+            if base.n == n and n_new:
+                base.append(inner, names)
+                if not given_up.size:
+                    together = border._replace(known=self._known(row, column, width)), n_new
+        at = np.concatenate([firm, came[:n_inner], np.full(len(given_up), -1), came[n_inner:]])
+        return Bordered(elements, base, n + n_new, at, outer, together)
+
+    def _border(self, elements, came, firm, row, column, compute) -> Border:
+        """Rows and columns of the elements that ``came`` (k,), against those at the places ``firm``; ``row`` and
+        ``column`` (k,) say where they are in the loose border, −1 where they are computed."""
+        width = 2 * elements.per
+        every, (old, fresh) = np.arange(elements.n), (np.flatnonzero(row >= 0), np.flatnonzero(row < 0))
+        old_c, new_c = np.flatnonzero(column >= 0), np.flatnonzero(column < 0)
+        gone, numbers, here = (
+            np.flatnonzero(firm < 0),
+            unknowns_of(np.maximum(firm, 0), width),
+            unknowns_of(came, width),
+        )
+        k, n = width * len(came), width * len(firm)
+        down, right, corner = np.empty((n, k), order="F").T, np.empty((k, n)).T, np.empty((k, k), order="F")
+        r_old, r_fresh, c_old, c_new = (unknowns_of(x, width) for x in (old, fresh, old_c, new_c))
+        if len(old):
+            from_r, from_c = unknowns_of(row[old], width), unknowns_of(column[old_c], width)
+            down[r_old], right.T[c_old] = self.loose.down[from_r], self.loose.right.T[from_c]
+            corner[np.ix_(r_old, c_old)] = self.loose.corner[np.ix_(from_r, from_c)]
+        if len(new_c):
+            values = compute(every, came[new_c])
+            # Column-major: transposed, copying goes along memory.
+            right.T[c_new] = values.T[:, numbers]
+            corner[:, c_new] = values[here]
+        if len(fresh):
+            values = compute(came[fresh], every)
+            down[r_fresh] = values[:, numbers]
+            corner[np.ix_(r_fresh, c_old)] = values[:, here[c_old]]
+        if len(gone):
+            away = unknowns_of(gone, width)
+            down[:, away], right[away] = 0.0, 0.0
+        scale = np.repeat(np.ldexp(1.0, np.frexp(elements.length[came])[1]), width)
+        return Border(down, right, corner, scale, None)
+
+    def _known(self, row: np.ndarray, column: np.ndarray, width: int, first: int = 0, end: int | None = None):
+        """What is known of the factors of the elements that were ``row`` and ``column`` in the loose border, where it
+        was eliminated; of the unknowns from ``first`` to ``end``."""
+        if self.eliminated is None:
+            return None
+        row, column = (x[first // width : None if end is None else end // width] for x in (row, column))
+        r, c = np.flatnonzero(row >= 0), np.flatnonzero(column >= 0)
+        at = [unknowns_of(x, width) for x in (r, row[r], c, column[c])]
+        lower, upper = self.eliminated
+        return Known(at[0], at[1], lower, at[2], at[3], upper)
+
+    def _giving_up(self, places: np.ndarray, n: int, n_between: int) -> Border:
+        """The unknowns that stand for the equations of the elements at ``places``, and w = 0 there, behind ``n`` others
+        and ``n_between`` more; with tractions of the size of the equations, so that these unknowns are of the size of
+        jumps."""
+        width = 2 * self.elements.per
+        at = unknowns_of(places, width)
+        k = len(at)
+        down, right = np.zeros((k, n + n_between)), np.zeros((n + n_between, k))
+        length = np.repeat(self.elements.length[self.at[places]], width)
+        down[np.arange(k), at], right[at, np.arange(k)] = 1.0, np.ldexp(1.0, -np.frexp(length)[1])
+        return Border(down, right, np.zeros((k, k)), np.ones(k), None)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """(n_unknowns,) where the unknowns are in the order of arrival."""
+        out, there = np.empty(self.elements.n, int), np.flatnonzero(self.at >= 0)
+        out[self.at[there]] = there
+        return unknowns_of(out, 2 * self.elements.per)
+
+    @cached_property
+    def dense(self) -> np.ndarray:
+        """(n, n) S."""
+        n, k = self.n_firm, len(self.loose.corner)
+        out = np.empty((n + k, n + k), order="F")
+        out[:n, :n], out[n:, :n], out[:n, n:], out[n:, n:] = self.firm.matrix(n), *self.loose[:3]
+        return out.T[np.ix_(self.places, self.places)].T
+
+    def __matmul__(self, w: np.ndarray) -> np.ndarray:
+        """S ``w`` (n,) or (n, k)."""
+        if "dense" in vars(self):
+            return self.dense @ w
+        n, x = self.n_firm, np.zeros((self.n_firm + len(self.loose.corner), *w.shape[1:]))
+        x[self.places] = w
+        first, last = x[:n], x[n:]
+        above = self.firm.matrix(n) @ first + self.loose.right @ last
+        return np.concatenate([above, self.loose.down @ first + self.loose.corner @ last])[self.places]
+
+    def factored(self) -> BorderedFactor:
+        """Factors of S. Raises LinAlgError when it is singular."""
+        return BorderedFactor(self)
+
+
+class WholeMatrix:
+    """The ``matrix`` (n, n) between crack ``elements`` that none has grown from yet; as `Bordered`."""
+
+    is_whole = True
+
+    def __init__(self, elements: ElementSet, matrix: np.ndarray):
+        self.elements, self.dense, self.n = elements, matrix, elements.n_unknowns
+        self._factor: Factor | None = None
+        self._grown: Bordered | None = None
+
+    @property
+    def unfactored(self) -> bool:
+        return self._factor is None
+
+    def grown(self, elements: ElementSet, was: np.ndarray, seen: np.ndarray, compute) -> Bordered | WholeMatrix:
+        """See `Bordered.grown`."""
+        if np.array_equal(was, np.arange(self.elements.n)):
+            return self
+        if self._grown is None:
+            known = self._factor if self._factor is not None and self._factor.columns else None
+            firm, n = GrowingFactor(self.dense, list(self.elements.keys), known), self.n
+            none = Border(np.empty((0, n)), np.empty((n, 0)), np.empty((0, 0)), np.empty(0), None)
+            self._grown = Bordered(self.elements, firm, n, np.arange(self.elements.n), none)
+        return self._grown.grown(elements, was, seen, compute)
+
+    def __matmul__(self, w: np.ndarray) -> np.ndarray:
+        return self.dense @ w
+
+    def factored(self) -> Factor:
+        """See `Bordered.factored`."""
+        if self._factor is None:
+            self._factor = Factor(self.dense, SINGULAR)
+        return self._factor
+
+
+class BorderedFactor:
+    """Factors of the `Bordered` matrix ``of``; see `Factor`. ``rcond`` is the worst one of the diagonal blocks,
+    ``growth`` the loss of accuracy, as the module has it."""
+
+    def __init__(self, of: Bordered):
+        self.n, self._places, self._firm, self._n_firm = of.n, of.places, of.firm, of.n_firm
+        firm, n = of.firm, of.n_firm
+        border, m = of.together or (None, 0)
+        if m and firm.is_next(n - m, m):
+            # In one go: triangles are solved with for forty columns in hardly more time than for twenty.
+            self._lower, self._upper, t = firm.eliminate_with(n - m, border, m, SINGULAR)
+            self.rcond, self.growth = firm.eliminate(n, SINGULAR)
+        else:
+            self.rcond, self.growth = firm.eliminate(n, SINGULAR)
+            self._lower, self._upper, t = firm.beside(n, of.loose)
+        self._scale, self._t = of.loose.scale, Factor(t, SINGULAR)
+        self.rcond = min(self.rcond, self._t.rcond)
+        self.growth = max(self.growth, loss(self._lower, self._upper, t))
+        of.eliminated, of.together, of.loose = (self._lower, self._upper), None, of.loose._replace(known=None)
+
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Solution for ``right`` (n,) or (n, k), of the ``transposed`` system if asked."""
+        n = self._n_firm
+        # Transposed, gathering goes along memory.
+        x = np.zeros((*right.shape[1:], n + len(self._scale))).T
+        x.T[..., self._places] = right.T
+        beside, below = (self._lower, self._upper) if transposed else (self._upper, self._lower)
+        scale = self._scale if right.ndim == 1 else self._scale[:, None]
+        y = self._firm.forth(n, x[:n], transposed)
+        last = self._t.solve((x[n:] if transposed else x[n:] * scale) - below.T @ y, transposed)
+        x[:n] = self._firm.back(n, y - beside @ last, transposed)
+        x[n:] = last * scale if transposed else last
+        return x.T[..., self._places].T
+
+
+def _at_tips(elements: ElementSet, settled: np.ndarray) -> np.ndarray:
+    """(n,) which elements lie on a segment that ends at a tip, none of whose elements are ``settled``: they are tried,
+    bent, and graded as they turn."""
+    source = elements.source
+    ends, stands = np.zeros((2, int(source.max(initial=0)) + 1), bool)
+    ends[source[elements.kind != shape_functions.ORDINARY]], stands[source[settled]] = True, True
+    return (ends & ~stands)[source]
+
+
+def _parted(border: Border, m: int, known: Known | None, known_after: Known | None) -> tuple[Border, Border]:
+    """The first ``m`` unknowns of a border, and what follows them, with what is ``known`` of them."""
+    down, right, corner, scale, _ = border
+    return (
+        Border(down[:m], right[:, :m], corner[:m, :m], scale[:m], known),
+        Border(
+            np.concatenate([down[m:], corner[m:, :m]], axis=1),
+            np.concatenate([right[:, m:].T, corner[:m, m:].T], axis=1).T,
+            corner[m:, m:],
+            scale[m:],
+            known_after,
+        ),
+    )
+
+
+def _followed(border: Border, other: Border) -> Border:
+    """The ``border`` and the ``other``, which follows, as one."""
+    n = border.down.shape[1]
+    return Border(
+        np.concatenate([border.down, other.down[:, :n]]),
+        np.concatenate([border.right, other.right[:n]], axis=1),
+        np.block([[border.corner, other.right[n:]], [other.down[:, n:], other.corner]]),
+        np.concatenate([border.scale, other.scale]),
+        border.known,
+    )
+
+
+def _pushed(border: Border, k: int) -> Border:
+    """The ``border`` behind ``k`` unknowns more that it has nothing to do with."""
+    nothing = np.zeros((len(border.corner), k))
+    return border._replace(
+        down=np.concatenate([border.down, nothing], axis=1), right=np.concatenate([border.right, nothing.T])
+    )

@@ -1,0 +1,211 @@
+"""The boundary's side of a body's equations: A_ΓΓ with its rigid motions lifted, and its factors.
+
+Unknown is the boundary's displacement, or, where a support holds it, the reaction (see `supports`). What the supports
+of a loop leave free of its rigid motions is without stress and spans the null space of A_ΓΓ. With R these motions and Q
+their mean over the loop, A_ΓΓ + R Qᵀ/extent is regular and Qᵀu = 0 follows for loads in equilibrium.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..counters import Work
+from ..iterative.boundary_gmres import HeldJumps, HeldMatrix, IteratedBoundary
+from ..iterative.fast_multipole import Compressed
+from ..loads.hole_supports import Anchors
+from ..loads.supports import Holds
+from ..mesh.elements import Mesh
+from .dense_lu import Factor
+from .influence_matrix import ElementSet, influence, reuse
+
+#: From so many bodies in a row on, the inverse of up to so many unknowns pays for itself.
+OFTEN, INVERTED = 8, 800
+
+
+class BoundarySystem:
+    """A_ΓΓ of ``mesh.boundary``, what is unchanged since ``previous`` (with the same supports) taken over from it.
+
+    elements      the boundary's elements
+    holds         which of them supports hold, or None
+    matrix        (n, n) traction seen from outside from the displacement (times 2μ) or reaction of the boundary; an
+                  operator where it is ``iterated`` upon
+    known         (n, h) the same from the displacement of held elements
+    rigid         (n, k) rigid motions of every loop that no support resists, nodal values
+    weights       (k, n) their mean over the loop
+    free_motions  those of the whole body, None when nothing is held
+    anchors       of the holes that are held, or None: they add to the boundary's rows, of ``matrix`` and of all loads
+    factor        of ``matrix`` with the rigid motions lifted
+    unchanged     whether all is ``previous``'s; ``at_old`` (n_elements,) the elements' numbers there, −1 where new
+
+    ``iterated``: not to be factored (`boundary_iteration.is_iterated`). Raises numpy.linalg.LinAlgError when the
+    equations are singular.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        nu: float,
+        tol: float,
+        extent: float,
+        holds: Holds | None = None,
+        previous: BoundarySystem | None = None,
+        *,
+        work: Work,
+        iterated: bool = False,
+    ):
+        g = mesh.boundary
+        self.iterated = iterated
+        self._nu, self._tol, self.work = nu, tol, work
+        self.at_old = at_old = g.found_in(previous.elements if previous else None)
+        self.unchanged = (
+            previous is not None
+            and previous.iterated == self.iterated
+            and g.n == previous.elements.n
+            and np.array_equal(at_old, np.arange(g.n))
+        )
+        #: How many bodies in a row have grown on this boundary.
+        self.generation = previous.generation + 1 if self.unchanged else 0
+        if self.unchanged:
+            self.elements, self.holds, self.extent = previous.elements, previous.holds, previous.extent
+            self.matrix, self.known, self.factor = previous.matrix, previous.known, previous.factor
+            self.rigid, self.weights, self.free_motions = previous.rigid, previous.weights, previous.free_motions
+            self.anchors = previous.anchors
+            return
+        self.elements, self.holds, self.extent = g, holds, extent
+        if self.iterated:
+            self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
+            self.known, self.free_motions, self.anchors = np.empty((g.n_unknowns, 0)), None, None
+            self.matrix = jumps = Compressed(g, g, nu, tol)
+            if holds is not None:
+                self._hold_motions(mesh)
+                self.matrix, self.known = HeldMatrix(jumps, holds, nu, tol), HeldJumps(jumps, holds)
+
+            def between(elements):
+                return self.influence_on(g.take(elements), elements)
+
+            self.factor = IteratedBoundary(g, self.matrix, self.rigid, self.weights, extent, nu, tol, between)
+            return
+        # With holes anchored, the old matrix is not one of tractions alone.
+        dense = previous is not None and previous.anchors is None and not previous.iterated
+        known = previous.matrix if dense else None
+        self.matrix = reuse(known, at_old, at_old, g, g, lambda r, k: self.influence_on(g.take(r), k))
+        self.known = np.empty((g.n_unknowns, 0)) if holds is None else holds.known(g, nu, tol)
+        self.rigid, self.weights = rigid_motions(g, mesh.edge_loop)
+        self.free_motions: FreeMotions | None = None
+        self.anchors: Anchors | None = None
+        if holds is not None:
+            self._hold_motions(mesh)
+        if self.anchors is not None:
+            anchors = self.anchors
+            self.anchored(self.matrix, holds.mixed(anchors.of_jumps(g), anchors.of_shapes(holds.sources)))
+            self.anchored(self.known, anchors.of_jumps(holds.sources))
+        # Column-major like the matrix: a sum of both orders takes several times as long.
+        lifted = (self.weights.T @ self.rigid.T).T / extent
+        self.factor = Factor(self.matrix + lifted, "the boundary equations are singular")
+
+    def _hold_motions(self, mesh: Mesh) -> None:
+        """Keep of the rigid motions those that are free, and anchor holes by the others."""
+        holds, g = self.holds, self.elements
+        loop_of = mesh.edge_loop[g.source]
+        _, centre, radius = middle_of(g.take(np.flatnonzero(loop_of == 0)))
+        whole, _ = rigid_motions(g, np.zeros_like(mesh.edge_loop), (centre, radius))
+        self.free_motions = FreeMotions(centre, radius, holds.free_motions(whole))
+        keep = ~holds.unknowns
+        modes, means, anchors = [], [], Anchors(self._nu, self.extent)
+        for k in range(int(mesh.edge_loop.max()) + 1):
+            motions, weights = self.rigid[:, 3 * k : 3 * k + 3], self.weights[3 * k : 3 * k + 3]
+            # The outline goes where the whole body goes; a hole's own boundary is free as far as nothing holds that
+            # hole.
+            free = self.free_motions.combinations if k == 0 else holds.free_motions(motions)
+            modes.append(motions @ free)
+            means.append(holds.turned((free.T @ weights).T).T * keep)
+            if k and free.shape[1] < 3:
+                held = np.linalg.svd(free.T)[2][free.shape[1] :].T
+                _, middle, size = middle_of(g.take(np.flatnonzero(loop_of == k)))
+                hole = mesh.edges[mesh.edge_loop == k, 0]
+                anchors.add(motions @ held / self.extent, held, middle, size, hole)
+        self.rigid, self.weights = np.hstack(modes), np.concatenate(means)
+        self.anchors = anchors if anchors.number else None
+
+    def anchored(self, rows: np.ndarray, motions: np.ndarray) -> np.ndarray:
+        """``rows`` (n_elements' rows, k) of the boundary with what sources that give held holes ``motions`` (r, k) add,
+        in place."""
+        rows += self.anchors.rows @ motions
+        return rows
+
+    def influence_on(self, targets: ElementSet, elements: np.ndarray) -> np.ndarray:
+        """(targets.n_unknowns, …) traction on ``targets`` from the unknowns of the boundary's ``elements``."""
+        matrix = influence(targets, self.elements.take(elements), self._nu, self._tol)
+        return matrix if self.holds is None else self.holds.swapped(targets, elements, matrix, self._nu, self._tol)
+
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """A_ΓΓ⁻¹ ``right`` (n,) or (n, k), without rigid motions; ``transposed``: A_ΓΓ⁻ᵀ."""
+        self.work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
+        return self.factor.solve(np.asfortranarray(right), transposed)
+
+    def solve_few(self, right: np.ndarray) -> np.ndarray:
+        """The same for the few columns (n, k) of new elements."""
+        if self.iterated or self.generation <= OFTEN or self.elements.n_unknowns > INVERTED:
+            return self.solve(right)
+        self.work.back_substitutions += right.shape[1]
+        return np.matmul(self.factor.inverse, np.asfortranarray(right), out=np.empty(right.shape, order="F"))
+
+    def times(self, u: np.ndarray, lifted: np.ndarray) -> np.ndarray:
+        """A_ΓΓ ``u``, and what the lifted rigid motions of ``lifted`` add."""
+        return self.matrix @ u + self.rigid @ (self.weights @ lifted) / self.extent
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotions:
+    """Rigid motions that no support resists: columns of ``combinations`` (3, k), x, y and the turn that moves points at
+    ``radius`` from ``centre`` (2,) by one."""
+
+    centre: np.ndarray
+    radius: float
+    combinations: np.ndarray
+
+    def part(self, force: np.ndarray, moment: float, about: np.ndarray) -> tuple[np.ndarray, float]:
+        """The part of a ``force`` (2,) and a ``moment`` about a point that does work on these motions."""
+        arm = self.centre - about
+        own = moment - (arm[0] * force[1] - arm[1] * force[0])
+        ways = self.combinations
+        x, y, turn = ways @ (ways.T @ np.array([force[0], force[1], own / self.radius]))
+        return np.array([x, y]), turn * self.radius + arm[0] * y - arm[1] * x
+
+
+def middle_of(g: ElementSet) -> tuple[float, np.ndarray, float]:
+    """Length of ``g``, mean (2,) of its points and their root mean square distance from it."""
+    x, ds = g.nodes, g.quadrature
+    perimeter = ds.sum()
+    middle = np.einsum("ej,ejc->c", ds, x) / perimeter
+    rel = x - middle
+    return perimeter, middle, float(np.sqrt(np.einsum("ej,ejc,ejc->", ds, rel, rel) / perimeter))
+
+
+def rigid_motions(
+    g: ElementSet, edge_loop: np.ndarray, about: tuple[np.ndarray, float] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3L) rigid motions of every loop in nodal unknowns and (3L, n) their mean over the loop; ``edge_loop`` (m,)
+    the loop of every edge. The turn is ``about`` a centre and moves points at a radius by one; those of the loop if
+    left out."""
+    n_loops = int(edge_loop.max()) + 1 if len(edge_loop) else 0
+    modes = np.zeros((g.n, 2, g.per, 3 * n_loops))
+    weights = np.zeros_like(modes)
+    loop_of = edge_loop[g.source] if g.n else np.empty(0, int)
+    for k in range(n_loops):
+        here = np.flatnonzero(loop_of == k)
+        perimeter, middle, radius = middle_of(g.take(here))
+        if about is not None:
+            middle, radius = about
+        rel, ds = g.nodes[here] - middle, g.quadrature[here]
+        one, zero = np.ones(ds.shape), np.zeros(ds.shape)
+        for m, motion in enumerate(((one, zero), (zero, one), (-rel[..., 1] / radius, rel[..., 0] / radius))):
+            vector = np.stack(motion, axis=-1)
+            for component, axis in enumerate((g.tangent, g.normal)):
+                local = np.einsum("ejc,ec->ej", vector, axis[here])
+                modes[here, component, :, 3 * k + m] = local
+                weights[here, component, :, 3 * k + m] = local * ds / perimeter
+    shape = (g.n_unknowns, 3 * n_loops)
+    return modes.reshape(shape), np.ascontiguousarray(weights.reshape(shape).T)

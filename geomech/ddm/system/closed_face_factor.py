@@ -1,0 +1,96 @@
+"""The equations of crack faces in contact by those of open ones: no factors of their own.
+
+With S x = z, unknowns that are held have x_h = 0 and an equation that is given up, z_h = ρ_h, and where a node slides
+the equation across, times its friction m, is added to that along it: z_t + m z_a = b_t. So z = b̂ + B ρ and
+
+    x = S⁻¹ b̂ + (S⁻¹ B) ρ,        (S⁻¹ B)_h ρ = −(S⁻¹ b̂)_h,
+
+of the size of what is held (Woodbury's formula). Columns of S⁻¹ outlast states and loads, so that a change of state costs
+a factor of that size, not one of all unknowns.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from .dense_lu import Factor
+
+if TYPE_CHECKING:
+    from .bordered_factor import BorderedFactor
+    from .contact_rows import Rows
+
+
+class InverseColumns(Protocol):
+    """Who keeps columns of S⁻¹."""
+
+    def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n, len(unknowns)) columns of S⁻¹."""
+
+
+class HeldFactor:
+    """Solves the equations of the free unknowns that ``rows`` leave of S, without springs; ``open_factor`` are factors
+    of S, ``inverse`` knows columns of its inverse. Raises LinAlgError, with ``what``, where they are
+    singular."""
+
+    def __init__(
+        self,
+        rows: Rows,
+        open_factor: Factor | BorderedFactor,
+        inverse: InverseColumns,
+        what: str,
+    ):
+        self.open, self._inverse = open_factor, inverse
+        self._free, self._held = np.flatnonzero(~rows.held), np.flatnonzero(rows.held)
+        along = np.flatnonzero(rows.mixed)
+        across, mixed = along + rows.per, rows.mixed[along]
+        # Of sliding nodes whose equation across is none of those given up it is added to the right side.
+        loose = ~rows.held[across]
+        self._loose = along[loose], across[loose], mixed[loose]
+        at = np.full(len(rows.held), -1)
+        at[self._held] = np.arange(len(self._held))
+        self._slides = along[~loose], at[across[~loose]], mixed[~loose]
+        of, into, factor = self._slides
+        needed = np.concatenate([self._held, of])
+        columns = inverse.inverse_columns(needed)
+        self._response = columns[:, : len(self._held)].copy(order="F")
+        self._response[:, into] -= columns[:, len(self._held) :] * factor
+        self._small = Factor(self._response[self._held], what)
+        self.rcond = min(open_factor.rcond, self._small.rcond)
+
+    def respond(self, opened: np.ndarray, shear: np.ndarray, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jumps w (n,) and what is missing in the held equations, (n,), with w = ``fixed`` where they are held, and a
+        further ``shear`` (n,) Pa on the faces, at few nodes; ``opened`` = S⁻¹ right are the jumps of open faces.
+
+        As above for w, with ρ beside what ``right`` is there: nothing of the size of S is solved or multiplied."""
+        w = opened.copy()
+        pushed = np.flatnonzero(shear)
+        if len(pushed):
+            w += self._inverse.inverse_columns(pushed) @ shear[pushed]
+        missing = np.zeros_like(w)
+        missing[self._held] = self._small.solve(w[self._held] - fixed[self._held])
+        w -= self._response @ missing[self._held]
+        w[self._held] = fixed[self._held]
+        return w, missing
+
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Solution (n_free,) or (n_free, k) for ``right``, of the ``transposed`` system if asked."""
+        whole = np.zeros((len(self._free) + len(self._held), *right.shape[1:]), order="F")
+        whole[self._free] = right
+        along, across, mixed = self._loose
+        mixed = mixed if right.ndim == 1 else mixed[:, None]
+        if not transposed:
+            whole[along] -= mixed * whole[across]
+            x = self.open.solve(whole)
+            x -= self._response @ self._small.solve(x[self._held])
+            return x[self._free]
+        x = self.open.solve(whole, transposed=True)
+        of, into, factor = self._slides
+        pull = x[self._held]
+        pull[into] -= (factor if right.ndim == 1 else factor[:, None]) * x[of]
+        whole[:] = 0.0
+        whole[self._held] = self._small.solve(pull, transposed=True)
+        x -= self.open.solve(whole, transposed=True)
+        x[across] -= mixed * x[along]
+        return x[self._free]

@@ -1,0 +1,30 @@
+"""Slip and opening at the nodes of cracks: where they can close, and the strain that they add up to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...model import Cracks
+from .influence_matrix import ElementSet
+
+
+def closing(faces: ElementSet, cracks: Cracks, twice_modulus: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(n_unknowns,) aperture (times ``twice_modulus``, 2μ; zero for slip), which unknowns can close (bool) and what
+    they are then."""
+    aperture = np.zeros((faces.n, 2, faces.per))
+    aperture[:, 1] = twice_modulus * cracks.aperture[faces.source, None]
+    can_close = np.zeros(aperture.shape, bool)
+    can_close[:, 1] = np.isfinite(aperture[:, 1])
+    aperture[~can_close] = 0.0
+    return aperture.ravel(), can_close.ravel(), -aperture.ravel()
+
+
+def strain_weights(faces: ElementSet) -> np.ndarray:
+    """(3, n_unknowns) strain of the cracks, integrated over their body (xx, yy, xy; engineering shear), from nodal slip
+    and opening."""
+    t, n = faces.tangent, faces.normal
+    out = np.empty((3, faces.n, 2, faces.per))
+    for component, axis in enumerate((t, n)):
+        jump = np.stack([n[:, 0] * axis[:, 0], n[:, 1] * axis[:, 1], n[:, 0] * axis[:, 1] + n[:, 1] * axis[:, 0]])
+        out[:, :, component] = jump[:, :, None] * faces.quadrature
+    return out.reshape(3, -1)

@@ -1,0 +1,433 @@
+"""Matrices between sets of elements, in nodal unknowns, and their reuse when only some elements are new."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from ..kernels import full_plane, shape_functions
+from ..mesh.half_plane import HalfPlane
+
+#: Element–point pairs (some 30 ns each) below which another thread does not pay for itself.
+PAIRS_PER_THREAD = 8000
+#: The processors this process may use, where the system tells.
+THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+_pool: ThreadPoolExecutor | None = None
+
+
+def _spread(n: int, pairs: int, work: Callable[[int, int], None]) -> None:
+    """Run ``work(first, last)`` over range(n), in chunks on threads when there is enough of it."""
+    global _pool
+    chunks = min(THREADS, pairs // PAIRS_PER_THREAD)
+    if chunks < 2:
+        work(0, n)
+        return
+    if _pool is None:
+        _pool = ThreadPoolExecutor(THREADS, thread_name_prefix="geomech-ddm")
+    bounds = np.linspace(0, n, chunks + 1).astype(int)
+    # list() hands on what a thread raised.
+    list(_pool.map(work, bounds[:-1].tolist(), bounds[1:].tolist()))
+
+
+@dataclass(frozen=True, eq=False)
+class ElementSet:
+    """Straight elements of one order and node family.
+
+        start, end   (n, 2)   m
+        kind         (n,)     see `shape_functions`
+        source       (n,)     the outline edge or crack segment each lies on
+        half_plane            the half-plane they stand in, None in the infinite plane
+
+    Unknowns run element, component (along the tangent, along the normal left of it), node: 2(p+1) an element; so do
+    the rows of tractions collocated on them.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    kind: np.ndarray
+    source: np.ndarray
+    order: int
+    family: str
+    half_plane: HalfPlane | None = None
+
+    @property
+    def n(self) -> int:
+        return len(self.start)
+
+    @property
+    def per(self) -> int:
+        """Nodes of an element."""
+        return self.order + 1
+
+    @property
+    def n_unknowns(self) -> int:
+        return 2 * self.per * self.n
+
+    @cached_property
+    def length(self) -> np.ndarray:
+        return np.hypot(*(self.end - self.start).T)
+
+    @cached_property
+    def tangent(self) -> np.ndarray:
+        return (self.end - self.start) / self.length[:, None]
+
+    @cached_property
+    def normal(self) -> np.ndarray:
+        return np.column_stack([-self.tangent[:, 1], self.tangent[:, 0]])
+
+    @cached_property
+    def nodes(self) -> np.ndarray:
+        """(n, p+1, 2) collocation points."""
+        return self.at(shape_functions.nodes(self.family, self.order))
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """(n, len(t), 2) points at t ∈ [−1, 1] of every element, the ends exactly."""
+        s = 0.5 * (1 + np.asarray(t))[None, :, None]
+        return (1 - s) * self.start[:, None] + s * self.end[:, None]
+
+    @cached_property
+    def keys(self) -> list[bytes]:
+        """What an element is, to the bit."""
+        rows = np.column_stack([self.start, self.end, self.kind])
+        return rows.view(np.dtype((np.void, 8 * rows.shape[1]))).ravel().tolist()
+
+    @cached_property
+    def index_of(self) -> dict[bytes, int]:
+        return {key: k for k, key in enumerate(self.keys)}
+
+    @cached_property
+    def _at_place(self) -> dict[bytes, int]:
+        return {key[:-8]: k for k, key in enumerate(self.keys)}
+
+    def found_in(self, other: ElementSet | None) -> np.ndarray:
+        """(n,) the same element's number in ``other``, −1 where it is new."""
+        if other is None or (other.order, other.family) != (self.order, self.family):
+            return np.full(self.n, -1)
+        if other is self:
+            return np.arange(self.n)
+        return np.array([other.index_of.get(key, -1) for key in self.keys], dtype=int).reshape(self.n)
+
+    def seen_in(self, other: ElementSet | None, found: np.ndarray) -> np.ndarray:
+        """``found`` (n,), what `found_in` says, with the numbers of elements besides that stand in the same place in
+        ``other`` and are only of another kind: tractions on them are collocated at the same points."""
+        out = found.copy()
+        if other is not None and (other.order, other.family) == (self.order, self.family):
+            for k in np.flatnonzero(found < 0).tolist():
+                out[k] = other._at_place.get(self.keys[k][:-8], -1)
+        return out
+
+    @cached_property
+    def samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n, p+3, 2) the ends and between them the collocation points of every element, and (n, p+1, p+3) what nodal
+        values have to be multiplied by (from the left) for the values there."""
+        t = np.concatenate([[-1.0], shape_functions.nodes(self.family, self.order), [1.0]])
+        table = np.array([shape_functions.at(self.family, self.order, kind, t).T for kind in range(4)])
+        return self.at(t), table[self.kind]
+
+    def take(self, which: np.ndarray) -> ElementSet:
+        if len(which) == self.n and (which == np.arange(self.n)).all():
+            return self
+        out = ElementSet(
+            self.start[which],
+            self.end[which],
+            self.kind[which],
+            self.source[which],
+            self.order,
+            self.family,
+            self.half_plane,
+        )
+        # What is known of them is not worked out again.
+        known = vars(self)
+        vars(out).update({name: known[name][which] for name in ("length", "tangent", "nodes") if name in known})
+        return out
+
+    def unknowns(self, elements: np.ndarray) -> np.ndarray:
+        """Indices of the unknowns (and rows) of ``elements``."""
+        return unknowns_of(np.asarray(elements), 2 * self.per)
+
+    @cached_property
+    def _inverse_weight(self) -> np.ndarray:
+        """(n, p+1) one over the tip weight at the nodes."""
+        t = shape_functions.nodes(self.family, self.order)
+        table = 1.0 / np.array([shape_functions.weight(kind, t) for kind in range(4)])
+        return table[self.kind]
+
+    def densities(self, values: np.ndarray) -> np.ndarray:
+        """(n, 2, p+1) monomial coefficients of nodal ``values`` (n_unknowns,)."""
+        scaled = values.reshape(self.n, 2, self.per) * self._inverse_weight[:, None, :]
+        return np.ascontiguousarray(
+            scaled @ shape_functions.to_monomials(self.family, self.order, shape_functions.ORDINARY).T
+        )
+
+    @cached_property
+    def quadrature(self) -> np.ndarray:
+        """(n, p+1) integrals of the nodal shape functions, m."""
+        table = np.array([shape_functions.integrals(self.family, self.order, kind) for kind in range(4)])
+        return 0.5 * self.length[:, None] * table[self.kind]
+
+
+def unknowns_of(elements: np.ndarray, width: int) -> np.ndarray:
+    """Indices of the unknowns of ``elements`` (k,) that have ``width`` each."""
+    return (elements[:, None] * width + np.arange(width)).ravel()
+
+
+@lru_cache
+def _to_nodal(family: str, order: int) -> np.ndarray:
+    """(4, p+1, p+1) from nodal values to monomials, for every kind of element."""
+    return np.stack([shape_functions.to_monomials(family, order, kind) for kind in range(4)])
+
+
+def influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
+    """(targets.n_unknowns, sources.n_unknowns), column-major: traction (along, normal, left of the target) at the
+    collocation points from unit nodal jumps times 2μ. An entry depends on its two elements alone, to the bit."""
+    return _between(targets, sources, nu, tol, 1.0, False)
+
+
+def image_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float) -> np.ndarray:
+    """What the free surface of their half-plane adds to `influence`."""
+    nodal, out = _to_nodal(sources.family, sources.order), np.zeros((sources.n_unknowns, targets.n_unknowns))
+    if out.size:
+        tangents = np.repeat(targets.tangent, targets.per, axis=0)
+        kind = np.ascontiguousarray(sources.kind, dtype=np.int64)
+        at = targets.nodes.reshape(-1, 2), tangents, targets.per
+        work = _images(
+            targets.half_plane, *at, sources.start, sources.end, kind, sources.order, nu, tol, False, nodal, out
+        )
+        _spread(len(tangents), len(tangents) * sources.n, work)
+    return out.T
+
+
+def line_influence(targets: ElementSet, sources: ElementSet, nu: float, tol: float, side: float) -> np.ndarray:
+    """As `influence`, from unit nodal line forces (per length) on ordinary ``sources``; points on one are seen from
+    ``side`` of it."""
+    return _between(targets, sources, nu, tol, side, True)
+
+
+def _between(targets, sources, nu, tol, side, force):
+    if not targets.n or not sources.n:
+        return np.empty((targets.n_unknowns, sources.n_unknowns), order="F")
+    nodal = _to_nodal(sources.family, sources.order)
+    start, end, kind, order = sources.start, sources.end, sources.kind, sources.order
+    rock = targets.half_plane
+    return _tractions(targets.nodes, targets.tangent, start, end, kind, order, nu, tol, side, force, nodal, rock)
+
+
+def line_forces(
+    targets: ElementSet, start: np.ndarray, end: np.ndarray, degree: int, nu: float, tol: float, side: float
+) -> np.ndarray:
+    """(targets.n_unknowns, m, 2, degree+1) traction from line forces t^k along (component 0) and across (1) straight
+    segments, Kelvin's solution integrated in closed form; points on a segment are seen from ``side`` of it."""
+    return _line_forces(targets.nodes, targets.tangent, start, end, degree, nu, tol, side, targets.half_plane)
+
+
+def _line_forces(points, tangents, start, end, degree, nu, tol, side, half_plane):
+    n, per = points.shape[:2]
+    kind, unit = np.zeros(len(start), np.int64), np.broadcast_to(np.eye(degree + 1), (4, degree + 1, degree + 1))
+    unit = np.ascontiguousarray(unit)
+    out = _tractions(points, tangents, start, end, kind, degree, nu, tol, side, True, unit, half_plane)
+    return out.reshape(2 * n * per, len(start), 2, degree + 1)
+
+
+#: A traction that ends within this part of half an element from the element's end is left to the nodes: there the
+#: singularities of tractions and of displacement jumps cancel point by point.
+_AT_END = 0.01
+
+
+@lru_cache(maxsize=1)
+def _clustered() -> tuple[np.ndarray, np.ndarray]:
+    """Points in (0, 1) and weights (of a piece of length 2) of a quadrature for logarithms at both ends."""
+    x, q = np.polynomial.legendre.leggauss(14)
+    # s²(3 − 2s) takes the edge off them.
+    s = 0.5 * (1 + x)
+    return s * s * (3 - 2 * s), 3 * s * (1 - s) * q
+
+
+def project_jumps(unit: np.ndarray, targets: ElementSet, start, end, nu: float, tol: float, side: float) -> None:
+    """Where line forces end on an element their traction jumps and is logarithmic: replace the nodal values in ``unit``
+    (`line_forces`) by those of the polynomial with the same moments, in place.
+
+    Sampled at nodes, a jump would be rounded to a node and the load's resultant with it (4 % in K_I in one case, 0.03 %
+    so); with the moments kept, what is lost acts on no more than the element's own surroundings.
+    """
+    t, n, c, rock = targets.tangent, targets.normal, 0.5 * targets.length, targets.half_plane
+    middle = 0.5 * (targets.start + targets.end)
+    rows = unit.reshape(targets.n, 2, targets.per, *unit.shape[1:])
+    clustered, q = _clustered()
+    degrees = np.arange(targets.per)
+    at_nodes = np.polynomial.legendre.legvander(shape_functions.nodes(targets.family, targets.order), targets.order)
+    for m, (a, b) in enumerate(zip(start, end)):
+        local = [np.stack([np.sum((p - middle) * t, axis=1), np.sum((p - middle) * n, axis=1)]) / c for p in (a, b)]
+        line = (np.abs(local[0][1]) * c <= 2 * tol) & (np.abs(local[1][1]) * c <= 2 * tol)
+        ends = np.stack([local[0][0], local[1][0]])
+        near = np.abs(ends) < 1 - _AT_END
+        for e in np.flatnonzero(line & near.any(axis=0)):
+            cuts = np.unique(np.concatenate([[-1.0, 1.0], ends[near[:, e], e]]))
+            u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
+            w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
+            points = (middle[e] + c[e] * u[:, None] * t[e])[None]
+            values = _line_forces(points, t[e : e + 1], a[None], b[None], unit.shape[3] - 1, nu, tol, side, rock)
+            values = values.reshape(2, len(u), 2, -1)
+            legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (degrees + 0.5)
+            rows[e, :, :, m] = np.einsum("jk,uk,cuxd->cjxd", at_nodes, legendre, values)
+
+
+def project_total(
+    rows: np.ndarray, targets: ElementSet, start, end, density: np.ndarray, nu: float, tol: float, side: float
+) -> None:
+    """The same for the traction ``rows`` (n_unknowns,) that line forces of monomial ``density`` (m, 2, p+1) add up to,
+    in place: where any of them ends inside an element, that element gets moments of the sum, in which singularities of
+    pieces that meet cancel."""
+    values = rows.reshape(targets.n, 2, targets.per)
+    clustered, q = _clustered()
+    ends = np.unique(np.concatenate([start, end]), axis=0)
+    at_nodes = np.polynomial.legendre.legvander(shape_functions.nodes(targets.family, targets.order), targets.order)
+    for e in range(targets.n):
+        c = 0.5 * targets.length[e]
+        rel = (ends - 0.5 * (targets.start[e] + targets.end[e])) / c
+        along, across = rel @ targets.tangent[e], rel @ targets.normal[e]
+        inside = along[(np.abs(across) * c <= 2 * tol) & (np.abs(along) < 1 - _AT_END)]
+        if not len(inside):
+            continue
+        cuts = np.unique(np.concatenate([[-1.0, 1.0], inside]))
+        u = np.concatenate([lo + (hi - lo) * clustered for lo, hi in pairwise(cuts)])
+        w = np.concatenate([(hi - lo) * q for lo, hi in pairwise(cuts)])
+        points = (0.5 * (targets.start[e] + targets.end[e]) + c * u[:, None] * targets.tangent[e])[None]
+        tangent, degree, rock = targets.tangent[e : e + 1], density.shape[2] - 1, targets.half_plane
+        unit = _line_forces(points, tangent, start, end, degree, nu, tol, side, rock)
+        total = (unit.reshape(2 * len(u), -1) @ density.ravel()).reshape(2, len(u))
+        legendre = np.polynomial.legendre.legvander(u, targets.order) * w[:, None] * (np.arange(targets.per) + 0.5)
+        values[e] = total @ legendre @ at_nodes.T
+
+
+def _tractions(points, tangents, start, end, kind, order, nu, tol, side, force, nodal, half_plane=None):
+    """(2 n per, 2 (p+1) m), column-major, at ``points`` (n, per, 2) on elements of ``tangents`` (n, 2)."""
+    n, per = points.shape[:2]
+    out = np.empty((2 * (order + 1) * len(start), 2 * n * per))
+    if not out.size:
+        return out.T
+    tangents = np.repeat(tangents, per, axis=0)
+    points = points.reshape(-1, 2)
+    at, along = full_plane.lanes_of(points), full_plane.lanes_of(tangents)
+    start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
+    kind = np.ascontiguousarray(kind, dtype=np.int64)
+    table, flat = shape_functions.moments(), out.reshape(-1)
+
+    def work(first, last):
+        full_plane.tractions(
+            at, along, per, first, last, start, end, kind, order, nu, tol, side, force, table, nodal, flat
+        )
+
+    if half_plane is not None:
+        plane = work
+        images = _images(half_plane, points, tangents, per, start, end, kind, order, nu, tol, force, nodal, out)
+
+        def work(first, last):
+            plane(first, last)
+            images(first, last)
+
+    _spread(n * per, n * per * len(start), work)
+    return out.T
+
+
+def _images(half_plane, points, tangents, per, start, end, kind, order, nu, tol, force, nodal, out):
+    """What adds to ``out`` the tractions at points ``first`` … ``last`` that the free surface makes."""
+    from ..kernels import half_plane_images
+
+    at = full_plane.lanes_of(_mirrored(half_plane.frame(points)))
+    along = full_plane.lanes_of(half_plane.turned(tangents))
+    start, end = (np.ascontiguousarray(half_plane.frame(x)) for x in (start, end))
+    table, flat = shape_functions.moments(), out.reshape(-1)
+
+    def work(first, last):
+        half_plane_images.tractions(
+            at, along, per, first, last, start, end, kind, order, nu, tol, force, table, nodal, flat
+        )
+
+    return work
+
+
+def _mirrored(in_frame: np.ndarray) -> np.ndarray:
+    """(n, 2) mirror images of points in the frame of a free surface; on it the image is seen from outside."""
+    return np.column_stack([in_frame[:, 0], np.abs(in_frame[:, 1])])
+
+
+def add_fields(
+    points, start, end, kind, density, nu, tol, side, force, stress, shift, half_plane: HalfPlane | None = None
+) -> None:
+    """Add the stress (n, 3) and 2μ times the displacement (n, 2) of elements with monomial ``density`` (m, 2, p+1)."""
+    if not len(points) or not len(start):
+        return
+    flat = full_plane.lanes_of(points)
+    start, end = np.ascontiguousarray(start), np.ascontiguousarray(end)
+    kind = np.ascontiguousarray(kind, dtype=np.int64)
+    density = np.ascontiguousarray(density)
+    order, table, out = density.shape[2] - 1, shape_functions.moments(), np.zeros((5, len(points)))
+
+    def work(first, last):
+        full_plane.fields(flat, first, last, start, end, kind, order, density, nu, tol, side, force, table, out)
+
+    _spread(len(points), len(points) * len(start), work)
+    stress += out[:3].T
+    shift += out[3:].T
+    if half_plane is None:
+        return
+    from ..kernels import half_plane_images
+
+    images = full_plane.lanes_of(_mirrored(half_plane.frame(points)))
+    own, ends, out = half_plane.frame(start), half_plane.frame(end), np.zeros((5, len(points)))
+
+    def work(first, last):
+        half_plane_images.fields(images, first, last, own, ends, kind, order, density, nu, tol, force, table, out)
+
+    _spread(len(points), len(points) * len(start), work)
+    stress += half_plane.stress_of(out[:3].T)
+    shift += out[3:].T @ half_plane.turn
+
+
+def reuse(
+    old: np.ndarray | None, rows: np.ndarray, columns: np.ndarray, row_set, column_set, compute, order: str = "F"
+) -> np.ndarray:
+    """A matrix of which some is known: ``rows`` and ``columns`` (per element of ``row_set`` and ``column_set``) are the
+    old element numbers or −1, ``compute(row_elements, column_elements)`` makes blocks of it. ``order``: row- ("C") or
+    column-major, the way in which most of it is copied."""
+    if old is None or (rows < 0).all() or (columns < 0).all():
+        return compute(np.arange(row_set.n), np.arange(column_set.n))
+    unchanged = np.array_equal(rows, np.arange(row_set.n)) and np.array_equal(columns, np.arange(column_set.n))
+    if unchanged and old.shape == (row_set.n_unknowns, column_set.n_unknowns):
+        return old
+    kept_r, new_r = np.flatnonzero(rows >= 0), np.flatnonzero(rows < 0)
+    new_c = np.flatnonzero(columns < 0)
+    out = np.empty((row_set.n_unknowns, column_set.n_unknowns), order=order)
+    copy_blocks(old, out, rows, columns, 2 * row_set.per, 2 * column_set.per)
+    if len(new_r):
+        out[row_set.unknowns(new_r)] = compute(new_r, np.arange(column_set.n))
+    if len(new_c):
+        out[np.ix_(row_set.unknowns(kept_r), column_set.unknowns(new_c))] = compute(kept_r, new_c)
+    return out
+
+
+def copy_blocks(old: np.ndarray, out: np.ndarray, rows: np.ndarray, columns: np.ndarray, high: int, wide: int) -> None:
+    """Copy to ``out`` what it has of ``old``: blocks ``high`` × ``wide`` whose old numbers are ``rows`` and
+    ``columns``, or −1."""
+    # Elements mostly keep their order: copying a few slices is several times faster than gathering.
+    column_runs = list(_runs(columns))
+    for r, was_r, m in _runs(rows):
+        for k, was_k, n in column_runs:
+            out[r * high : (r + m) * high, k * wide : (k + n) * wide] = old[
+                was_r * high : (was_r + m) * high, was_k * wide : (was_k + n) * wide
+            ]
+
+
+def _runs(old_numbers: np.ndarray):
+    """(first, first old number, length) of stretches that stood together before."""
+    kept = np.flatnonzero(old_numbers >= 0)
+    breaks = np.flatnonzero((np.diff(kept) != 1) | (np.diff(old_numbers[kept]) != 1)) + 1
+    for run in np.split(kept, breaks):
+        if len(run):
+            yield int(run[0]), int(old_numbers[run[0]]), len(run)

@@ -1,0 +1,149 @@
+"""The crack unknowns' own equations S w = right, some of them held: all that contact, compliance and adjoints need.
+
+S is the Schur complement of slip and opening (`body`). One factorisation of it serves all contact states: holding k
+unknowns is a k × k system in columns of S⁻¹. Where cracks cut a part off that only closed faces hold, S is singular,
+and the equations of the free unknowns are factored instead.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ..counters import Work
+from .bordered_factor import LOSS, SINGULAR, Bordered, BorderedFactor
+from .closed_face_factor import HeldFactor
+from .contact_rows import Rows
+from .dense_lu import Factor
+
+#: Reciprocal condition of S below which contact is not built on its inverse.
+_SAFE = 1e-11
+#: From so many unknowns on, of which less than this part is held, contact goes by the factors of S.
+WORTHWHILE, MOST_HELD = 400, 0.4
+#: Factors for so many sets of free unknowns are kept.
+_KEPT = 8
+
+
+class CrackSystem:
+    """``matrix`` is S; factors and columns of its inverse are made when first asked for, and kept."""
+
+    def __init__(self, matrix: Bordered, work: Work | None = None):
+        self.matrix, self._work = matrix, Work() if work is None else work
+        self.n = matrix.n
+        self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
+        self._column_at = np.full(self.n, -1)
+        self._columns = np.empty((self.n, 0))
+        self._held_now: tuple[bytes, np.ndarray, Factor] | None = None
+
+    def opened(self, right: np.ndarray) -> np.ndarray:
+        """S⁻¹ ``right``; zeros where it is not to be used (no `open_factor`)."""
+        if self.open_factor is None:
+            return np.zeros_like(right)
+        self._work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
+        return self.open_factor.solve(np.asfortranarray(right))
+
+    def constrained(
+        self, right: np.ndarray, closed: np.ndarray, fixed: np.ndarray, opened: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Jumps w (n,) or (n, k) with w = ``fixed`` where ``closed``, S w = ``right`` elsewhere, and what is missing in
+        the closed rows, right − S w. ``opened``: S⁻¹ right, if it is known.
+
+        Raises LinAlgError when cracks cut a part off and closed faces do not hold it.
+        """
+        at = np.flatnonzero(closed)
+        reaction = np.zeros_like(right)
+        if self.open_factor is not None:
+            w = self.opened(right) if opened is None else opened.copy()
+            if len(at):
+                columns, factor = self._held_columns(at)
+                reaction[at] = factor.solve(w[at] - fixed[at])
+                w -= columns @ reaction[at]
+                w[at] = fixed[at]
+            return w, reaction
+        free, factor = self._free_factor(closed)
+        w = np.zeros_like(right)
+        w[at] = fixed[at]
+        w[free] = factor.solve((right - self.matrix @ w)[free])
+        self._work.back_substitutions += 1 if right.ndim == 1 else right.shape[1]
+        reaction[at] = (right - self.matrix @ w)[at]
+        return w, reaction
+
+    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | HeldFactor]:
+        """The unknowns that are not held (indices) and factors of their equations."""
+        free, moving = np.flatnonzero(~rows.held), np.flatnonzero(rows.mixed)
+        if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
+            return free, self.open_factor
+        few = self.n >= WORTHWHILE and self.n - len(free) < MOST_HELD * self.n and not rows.spring.any()
+        if few and self.open_factor is not None:
+            return free, HeldFactor(rows, self.open_factor, self, SINGULAR)
+        whole = self.matrix.dense
+        matrix = whole[np.ix_(free, free)]
+        if len(moving):
+            at = np.full(self.n, -1)
+            at[free] = np.arange(len(free))
+            matrix[at[moving]] += rows.mixed[moving, None] * whole[np.ix_(moving + rows.per, free)]
+        diagonal = np.arange(len(free))
+        matrix[diagonal, diagonal] -= rows.spring[free]
+        return free, Factor(matrix, SINGULAR)
+
+    def rcond(self, closed: np.ndarray) -> float:
+        """Reciprocal condition of the matrix solved with when ``closed`` (n,) bool are held."""
+        return (self.open_factor or self._free_factor(closed)[1]).rcond
+
+    @cached_property
+    def open_factor(self) -> Factor | BorderedFactor | None:
+        """Factors of S with all faces open; None when only closed faces hold a part of the body."""
+        if not self.matrix.is_whole:
+            try:
+                self._work.crack_borderings += 1
+                self._work.crack_factorisations += self.matrix.unfactored
+                factor = self.matrix.factored()
+                if factor.growth < LOSS * factor.rcond:
+                    return factor
+            except np.linalg.LinAlgError:
+                pass
+            # Only pivoting in the whole matrix tells.
+            self.matrix = Bordered.whole(self.matrix.elements, self.matrix.dense)
+        try:
+            self._work.crack_factorisations += 1
+            factor = self.matrix.factored()
+        except np.linalg.LinAlgError:
+            return None
+        return factor if factor.rcond > _SAFE else None
+
+    def _free_factor(self, closed: np.ndarray) -> tuple[np.ndarray, Factor]:
+        """Free unknowns (indices) and factors of S restricted to them."""
+        key = np.packbits(closed).tobytes()
+        if key not in self._factors:
+            if len(self._factors) >= _KEPT:
+                self._factors.pop(next(iter(self._factors)))
+            free = np.flatnonzero(~closed)
+            whole = self.matrix.dense
+            matrix = whole if len(free) == len(closed) else whole[np.ix_(free, free)]
+            self._factors[key] = free, Factor(matrix, SINGULAR)
+            self._work.crack_factorisations += 1
+        return self._factors[key]
+
+    def inverse_columns(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n, len(unknowns)) columns of S⁻¹; they outlast the load."""
+        missing = unknowns[self._column_at[unknowns] < 0]
+        if len(missing):
+            # Of whole elements: many columns take little more time than one, and neighbours will be asked for.
+            width = 2 * self.matrix.elements.per
+            missing = (np.unique(missing // width)[:, None] * width + np.arange(width)).ravel()
+            missing = missing[self._column_at[missing] < 0]
+            right = np.zeros((self.n, len(missing)), order="F")
+            right[missing, np.arange(len(missing))] = 1.0
+            self._column_at[missing] = self._columns.shape[1] + np.arange(len(missing))
+            self._columns = np.hstack([self._columns, self.opened(right)])
+        return self._columns[:, self._column_at[unknowns]]
+
+    def _held_columns(self, at: np.ndarray) -> tuple[np.ndarray, Factor]:
+        """Columns ``at`` of S⁻¹ and the factors of their rows ``at``; mostly the same faces stay closed for long."""
+        key = at.tobytes()
+        if self._held_now is None or self._held_now[0] != key:
+            columns = self.inverse_columns(at)
+            factor = Factor(columns[at], "closed faces leave a part of the body without hold")
+            self._held_now = key, columns, factor
+        return self._held_now[1:]

@@ -1,0 +1,1 @@
+"""Blocks as arrays: polygons, corners, motion, key blocks."""

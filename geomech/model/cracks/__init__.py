@@ -1,0 +1,1 @@
+"""The crack network."""

@@ -1,0 +1,174 @@
+"""Bolts and anchors between two points of the blocks, and what they remember."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..blocks.block_arrays import Blocks
+from ..blocks.polygon import winding_number
+from ..numbers import POSITIVE, Number, refuse_numbers, refuse_point, told
+
+#: The far end of an anchor that is held by the ground itself.
+GROUND = -1
+
+#: What a bolt remembers, one row a bolt.
+BOLT = np.dtype(
+    [
+        ("installed", np.bool_),
+        ("broken", np.bool_),
+        ("length", np.float64),  # at installation, m
+        ("plastic", np.float64),  # elongation by yielding, m
+        ("slid", np.float64),  # dowel displacement beyond the dowel's elastic one, m
+        ("force", np.float64),  # N/m, positive in tension
+        ("shear_force", np.float64),  # N/m of the dowel, on the second block along the bolt's axis turned by +90°
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Bolt:
+    """A bolt between the material points ``start`` of ``block`` and ``end`` of ``other`` (GROUND, −1: a point at rest).
+
+    stiffness        EA/L, N/m per metre of thickness (a row of bolts at spacing s: EA/(L s))
+    pretension       N/m, force at ``installation`` (s); the bolt is not there before
+    yield_force      N/m: from there on it yields, perfectly plastic, and keeps what it yielded
+    breaking_strain  elongation over length at which it breaks for good
+    shear_stiffness  N/m, dowel action: resistance across its axis, up to ``shear_strength`` N/m (perfectly plastic)
+    compression      True: it also takes compression, down to −yield_force (a grouted bar); else it goes slack
+
+    Raises ValueError naming the bolt for a stiffness or strength that is not positive, a pretension beyond the yield
+    force, ends that are one point.
+    """
+
+    block: int
+    start: tuple[float, float]
+    other: int
+    end: tuple[float, float]
+    stiffness: float
+    pretension: float = 0.0
+    yield_force: float = math.inf
+    breaking_strain: float = math.inf
+    shear_stiffness: float = 0.0
+    shear_strength: float = math.inf
+    installation: float = 0.0
+    compression: bool = False
+    name: str = "bolt"
+
+    def __post_init__(self) -> None:
+        who = f"bolt {self.name!r}"
+        refuse_numbers(self, _NUMBERS, who)
+        refuse_point(f"{who}: its start", self.start)
+        refuse_point(f"{who}: its end", self.end)
+        if self.pretension > self.yield_force:
+            raise ValueError(
+                f"bolt {self.name!r}: its pretension, {self.pretension:g} N/m, is beyond its yield force, "
+                f"{self.yield_force:g} N/m"
+            )
+        if not math.dist(self.start, self.end) > 0:
+            raise ValueError(f"bolt {self.name!r}: its ends are one point, ({self.start[0]:g}, {self.start[1]:g})")
+        if self.block == self.other:
+            raise ValueError(f"bolt {self.name!r}: both ends are in one block, which it cannot hold")
+
+
+#: What the numbers of `Bolt` may be.
+_NUMBERS = {
+    "stiffness": Number(closed=False, unit="N/m"),
+    "yield_force": Number(closed=False, unit="N/m", infinite=True),
+    "breaking_strain": Number(closed=False, infinite=True),
+    "shear_strength": Number(closed=False, unit="N/m", infinite=True),
+    "pretension": Number(unit="N/m"),
+    "shear_stiffness": Number(unit="N/m"),
+    "installation": Number(unit="s"),
+}
+
+
+class CrossesNoJoint(ValueError):
+    """A grouted bar in one block alone, where it can do nothing."""
+
+
+def grouted_bolt(
+    blocks: Blocks,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    *,
+    axial_stiffness: float,
+    active_length: float,
+    name: str = "bolt",
+    **properties: float | bool,
+) -> tuple[Bolt, ...]:
+    """A fully grouted bar from ``start`` to ``end`` as short bolts, one where it crosses from a block into the next.
+
+    Grouted all along, a bar in blocky rock works where joints open or slide, over a short *active length* about the
+    joint (m, of the order of a few diameters to half a metre; local reinforcement, Lorig 1985): each crossing becomes a
+    `Bolt` of stiffness ``axial_stiffness`` (EA, N per metre of thickness) over ``active_length``, its ends half that
+    length into the two blocks (less where a block is thinner). ``properties`` as for `Bolt`; it takes compression too
+    unless told otherwise. Raises CrossesNoJoint when the bar does not, and
+    ValueError naming it for a stiffness or length that is not positive.
+    """
+    for what, value, unit in (("axial_stiffness", axial_stiffness, "N"), ("active_length", active_length, "m")):
+        if not POSITIVE.holds(value):
+            raise ValueError(f"bolt {name!r}: {what} must be positive and finite, got {told(value)} {unit}")
+    refuse_point(f"bolt {name!r}: its start", start)
+    refuse_point(f"bolt {name!r}: its end", end)
+    a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    length = float(np.hypot(*(b - a)))
+    pieces = _pieces(blocks, a, b)
+    along = (b - a) / length
+    bolts = []
+    for (one, s0, s1), (two, s2, s3) in itertools.pairwise(pieces):
+        before, after = min(active_length / 2, s1 - s0), min(active_length / 2, s3 - s2)
+        points = (a + (s1 - before) * along).tolist(), (a + (s2 + after) * along).tolist()
+        bolts.append(
+            Bolt(
+                one,
+                tuple(points[0]),
+                two,
+                tuple(points[1]),
+                stiffness=axial_stiffness / (before + after),
+                name=f"{name}/{len(bolts) + 1}",
+                **{"compression": True, **properties},
+            )
+        )
+    if not bolts:
+        raise CrossesNoJoint(f"bolt {name!r} crosses no joint on its way from {tuple(start)} to {tuple(end)}")
+    return tuple(bolts)
+
+
+def _pieces(blocks: Blocks, a: np.ndarray, b: np.ndarray) -> list[tuple[int, float, float]]:
+    """The blocks that the line from ``a`` to ``b`` passes, in order, each with the distances from ``a`` where it enters
+    and leaves."""
+    along = b - a
+    length = float(np.hypot(*along))
+    p, q = blocks.vertices, blocks.vertices[blocks.next_vertex]
+    edge = q - p
+    turn = along[0] * edge[:, 1] - along[1] * edge[:, 0]
+    crossing = np.abs(turn) > 1e-12 * length * np.hypot(edge[:, 0], edge[:, 1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = ((p - a)[:, 0] * edge[:, 1] - (p - a)[:, 1] * edge[:, 0]) / turn
+        r = ((p - a)[:, 0] * along[1] - (p - a)[:, 1] * along[0]) / turn
+    hit = crossing & (s > 0) & (s < 1) & (r >= 0) & (r <= 1)
+    marks = np.unique(np.concatenate([[0.0, 1.0], s[hit]]))
+    marks = marks[np.append(True, np.diff(marks) > 1e-9)]
+    pieces: list[tuple[int, float, float]] = []
+    for s0, s1 in zip(marks[:-1].tolist(), marks[1:].tolist()):
+        middle = a + 0.5 * (s0 + s1) * along
+        for block in _near(blocks, middle):
+            if abs(winding_number(blocks.loops(block), middle)) > 0.5:
+                if pieces and pieces[-1][0] == block:
+                    pieces[-1] = (block, pieces[-1][1], s1 * length)
+                else:
+                    pieces.append((block, s0 * length, s1 * length))
+                break
+    return pieces
+
+
+def _near(blocks: Blocks, point: np.ndarray) -> Sequence[int]:
+    """Blocks whose box holds ``point``."""
+    first = blocks.vertex_start[:-1]
+    low, high = np.minimum.reduceat(blocks.vertices, first), np.maximum.reduceat(blocks.vertices, first)
+    return np.flatnonzero(((low <= point) & (point <= high)).all(axis=1)).tolist()

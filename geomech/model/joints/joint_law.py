@@ -1,0 +1,186 @@
+"""Joints: what holds two block faces together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..numbers import Number, refuse_numbers
+
+#: Barton & Choubey (1977) do not let the angle of their strength grow beyond this where the normal stress vanishes.
+STEEPEST = math.radians(70.0)
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """Rough, unfilled joint of Barton and Bandis: τ = σ tan(JRC log₁₀(JCS/σ) + φr).
+
+    jrc               joint roughness coefficient, 0 to 20, of a sample of ``sample_length`` m
+    jcs               compressive strength of the joint's wall, Pa, of the same sample
+    length            length of the joint's blocks in place, m, to which both are corrected; None: no correction
+    from_peak_slip    the shear stiffness is the peak strength over the slip of the peak, at the present normal stress
+                      (Barton & Choubey 1977); otherwise the law's stiffness or the solver's springs hold up to the peak
+    reduction         the strength, whole and residual, is divided by this (a trial factor of safety); dilation is not
+
+    Sources: Barton & Choubey (1977), Rock Mechanics 10, 1-54 (strength, 70° limit, stiffness); Barton & Bandis (1982),
+    23rd US Symp. Rock Mech. (size, slip of the peak); Barton, Bandis & Bakhtar (1985), Int. J. Rock Mech. 22, 121-140
+    (mobilised roughness beyond the peak).
+    """
+
+    jrc: float
+    jcs: float
+    length: float | None = None
+    sample_length: float = 0.1
+    from_peak_slip: bool = False
+    reduction: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.jrc <= 20:
+            raise ValueError(f"joint roughness coefficient must lie in (0, 20], got {self.jrc!r}")
+        if not (self.jcs > 0 and math.isfinite(self.jcs)):
+            raise ValueError(f"compressive strength of a joint's wall must be positive, got {self.jcs!r} Pa")
+        if not 0 < self.reduction < math.inf:
+            raise ValueError(f"the strength of a rough joint is divided by a positive number, got {self.reduction!r}")
+        for what, value in (("length", self.length), ("sample_length", self.sample_length)):
+            if value is not None and not (value > 0 and math.isfinite(value)):
+                raise ValueError(f"{what} of a rough joint must be positive, got {value!r} m")
+        if self.length is not None and self.length < self.sample_length:
+            raise ValueError(
+                f"length of a rough joint must not be below its sample's {self.sample_length:g} m, got {self.length!r} "
+                "m"
+            )
+
+    @property
+    def _scale(self) -> float:
+        return 1.0 if self.length is None else self.length / self.sample_length
+
+    @property
+    def jrc_in_place(self) -> float:
+        """JRCₙ = JRC₀ (Lₙ/L₀)^(−0.02 JRC₀)."""
+        return self.jrc * self._scale ** (-0.02 * self.jrc)
+
+    @property
+    def jcs_in_place(self) -> float:
+        """JCSₙ = JCS₀ (Lₙ/L₀)^(−0.03 JRC₀), Pa."""
+        return self.jcs * self._scale ** (-0.03 * self.jrc)
+
+    @property
+    def peak_slip(self) -> float:
+        """δ = (Lₙ/500) (JRCₙ/Lₙ)^0.33, m: the slip at which the strength is reached."""
+        length = self.sample_length if self.length is None else self.length
+        return length / 500.0 * (self.jrc_in_place / length) ** 0.33
+
+
+@dataclass(frozen=True)
+class JointLaw:
+    """Strength and stiffness of a joint; strengths are Pa (times a contact's tributary length), angles rad. A bonded
+    face fails as one, in tension at its extreme fibre, in shear by c ℓ + N tan φ of all of it.
+
+    friction_angle, cohesion    of the joint before it has slipped (its peak); with ``roughness`` the angle is φr
+    tensile_strength            lost with the cohesion's peak when either fails
+    residual_friction_angle     after slip (None: as before), residual_cohesion likewise
+    softening_slip              m of slip over which tan φ and cohesion fall in a straight line to the residual; 0: at
+                                once
+    dilation_angle              sliding lifts the faces by tan ψ times the slip, up to ``dilation_slip`` m from the
+                                start
+    roughness                   curved strength of Barton and Bandis, with its own dilation and its own decay
+    normal_stiffness, shear_stiffness   Pa/m, or None for the solver's penalty springs; a face with a normal stiffness
+                                        resists
+                                rotation as a bed of springs that cannot pull
+    max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J.
+                                Rock Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
+
+    Raises ValueError that names the joint.
+    """
+
+    name: str
+    friction_angle: float = 0.0
+    cohesion: float = 0.0
+    tensile_strength: float = 0.0
+    normal_stiffness: float | None = None
+    shear_stiffness: float | None = None
+    residual_friction_angle: float | None = None
+    residual_cohesion: float = 0.0
+    softening_slip: float = 0.0
+    dilation_angle: float = 0.0
+    dilation_slip: float = math.inf
+    roughness: Roughness | None = None
+    max_closure: float | None = None
+
+    def __post_init__(self) -> None:
+        angles = ("friction_angle", "residual_friction_angle", "dilation_angle")
+        for what in angles:
+            value = getattr(self, what)
+            if value is not None and not 0 <= value < math.pi / 2:
+                radians = " (angles are in radians here)" if value > 1.6 else ""
+                self._refuse(f"{what.replace('_', ' ')} must lie in [0°, 90°), got {math.degrees(value):g}°{radians}")
+        refuse_numbers(self, _NUMBERS, f"joint {self.name!r}")
+        if math.isinf(self.cohesion) and self.softening_slip:
+            self._refuse("an infinite cohesion does not fall over a softening_slip")
+        if self.residual_friction_angle is not None and self.residual_friction_angle > self.friction_angle:
+            self._refuse(
+                f"the residual friction angle ({math.degrees(self.residual_friction_angle):g}°) is above the peak "
+                f"({math.degrees(self.friction_angle):g}°)"
+            )
+        if self.residual_cohesion > self.cohesion:
+            self._refuse(
+                f"the residual cohesion ({self.residual_cohesion:g} Pa) is above the peak ({self.cohesion:g} Pa)"
+            )
+        if self.dilation_angle > self.friction_angle:
+            self._refuse(
+                f"the dilation angle ({math.degrees(self.dilation_angle):g}°) is above the friction angle "
+                f"({math.degrees(self.friction_angle):g}°): sliding would yield work"
+            )
+        if self.max_closure is not None and self.normal_stiffness is None:
+            self._refuse("max_closure needs a normal_stiffness, the initial one")
+        if self.roughness is not None:
+            plain = JointLaw.__dataclass_fields__
+            for what in (
+                "cohesion", "tensile_strength", "residual_friction_angle", "residual_cohesion", "softening_slip",
+                "dilation_angle", "dilation_slip",
+            ):  # fmt: skip
+                if getattr(self, what) != plain[what].default:
+                    self._refuse(f"{what} does not go with roughness, which has its own")
+            if self.roughness.from_peak_slip and self.shear_stiffness is not None:
+                self._refuse("shear_stiffness is given, and is to follow from the slip of the peak as well")
+            if self.friction_angle >= STEEPEST:
+                self._refuse("the residual friction angle of a rough joint must be below 70°")
+
+    def _refuse(self, why: str) -> None:
+        raise ValueError(f"joint {self.name!r}: {why}")
+
+    @property
+    def friction(self) -> float:
+        """tan φ, of the peak."""
+        return math.tan(self.friction_angle) / (1.0 if self.roughness is None else self.roughness.reduction)
+
+    @property
+    def residual_friction(self) -> float:
+        """tan φ after slip."""
+        return self.friction if self.residual_friction_angle is None else math.tan(self.residual_friction_angle)
+
+    @property
+    def straight(self) -> bool:
+        """Whether friction is one angle, and the faces neither lift nor stiffen: all that is asked of the law is a
+        line."""
+        return (
+            self.residual_friction == self.friction
+            and not self.residual_cohesion
+            and not (self.softening_slip and self.cohesion)
+            and not self.dilation_angle
+            and self.roughness is None
+            and self.max_closure is None
+        )
+
+
+#: What the numbers of `JointLaw` may be, but for its angles.
+_NUMBERS = {
+    "cohesion": Number(unit="Pa", infinite=True),
+    "tensile_strength": Number(unit="Pa", infinite=True),
+    "residual_cohesion": Number(unit="Pa", infinite=True),
+    "normal_stiffness": Number(closed=False, unit="Pa/m", optional=True),
+    "shear_stiffness": Number(closed=False, unit="Pa/m", optional=True),
+    "softening_slip": Number(unit="m"),
+    "dilation_slip": Number(closed=False, unit="m", infinite=True),
+    "max_closure": Number(closed=False, unit="m", optional=True),
+}

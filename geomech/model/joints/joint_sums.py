@@ -1,0 +1,100 @@
+"""What every joint carries and how far it has opened and slipped: contacts added up by joint; reactions of supports."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..blocks.block_arrays import Blocks
+from ..state import OPEN, SLIP, STICK
+from .joint_law import JointLaw
+
+#: One row a joint.
+JOINT_SUM = np.dtype(
+    [
+        ("contacts", np.int64),
+        ("length", np.float64),  # m, of the faces that touch or are near: tributary lengths
+        ("open_length", np.float64),  # m of it
+        ("sliding_length", np.float64),
+        ("mean_opening", np.float64),  # m, over the length; closed parts count as 0
+        ("max_opening", np.float64),
+        ("max_penetration", np.float64),
+        ("mean_slip", np.float64),  # m, of its size, over the length
+        ("max_slip", np.float64),
+        ("normal_force", np.float64),  # N/m, sum, positive in compression
+        ("shear_force", np.float64),  # N/m, sum of sizes
+        ("mobilised", np.float64),  # |S| over what friction and cohesion hold, whole joint; 0 where it carries nothing
+        ("bonded_length", np.float64),  # m whose cohesion and tensile strength hold
+    ]
+)
+
+
+def joint_names(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw]) -> np.ndarray:
+    """(n_contacts,) str: the joint of every contact. It goes by the name of the edge that is touched, else by that of
+    an edge at the vertex, else by its law (without any, all contacts are frictionless)."""
+    joints = joints or (JointLaw("frictionless"),)
+    edge = np.asarray(blocks.edge_name)
+    name = edge[contacts["edge"]]
+    for beside in (edge[contacts["vertex"]], edge[blocks.previous_vertex[contacts["vertex"]]]):
+        name = np.where(name > 0, name, beside)
+    by_law = np.array([law.name for law in joints], dtype=object)
+    return np.where(name > 0, np.array(blocks.edge_names, dtype=object)[name], by_law[contacts["law"]])
+
+
+def joint_sums(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw]) -> dict[str, np.ndarray]:
+    """Name of the joint (`joint_names`) → its JOINT_SUM row; ``contacts`` CONTACT rows of a state."""
+    if len(contacts) == 0:
+        return {}
+    joints = joints or (JointLaw("frictionless"),)
+    names, joint = np.unique(joint_names(blocks, contacts, joints).astype(str), return_inverse=True)
+    out = np.zeros(len(names), JOINT_SUM)
+
+    def total(values) -> np.ndarray:
+        return np.bincount(joint, values, len(names))
+
+    def largest(values) -> np.ndarray:
+        most = np.zeros(len(names))
+        np.maximum.at(most, joint, values)
+        return most
+
+    length, state, gap, slip = contacts["length"], contacts["state"], contacts["gap"], np.abs(contacts["slip"])
+    is_open = state == OPEN
+    apart = np.where(is_open, np.maximum(gap, 0.0), 0.0)
+    whole = total(length)
+    over = np.where(whole > 0, whole, 1.0)
+    out["contacts"] = np.bincount(joint, minlength=len(names))
+    out["length"], out["open_length"] = whole, total(length * is_open)
+    out["sliding_length"] = total(length * (state == SLIP))
+    out["mean_opening"], out["max_opening"] = total(length * apart) / over, largest(apart * (length > 0))
+    out["max_penetration"] = largest(np.where(is_open, 0.0, -gap))
+    out["mean_slip"], out["max_slip"] = total(length * slip) / over, largest(slip)
+    out["normal_force"] = total(contacts["normal_force"])
+    out["shear_force"] = total(np.abs(contacts["shear_force"]))
+    friction = np.array([law.friction for law in joints])[contacts["law"]]
+    cohesion = np.array([law.cohesion for law in joints])[contacts["law"]]
+    held = total(
+        (friction * np.maximum(contacts["normal_force"], 0.0) + cohesion * length * (contacts["bonded"] > 0)) * ~is_open
+    )
+    out["mobilised"] = np.where(held > 0, out["shear_force"] / np.where(held > 0, held, 1.0), 0.0)
+    out["bonded_length"] = total(length * (contacts["bonded"] > 0) * (state >= STICK))
+    return dict(zip(names.tolist(), out, strict=True))
+
+
+def reactions(blocks: Blocks, contacts: np.ndarray) -> dict[int, np.ndarray]:
+    """Block → (force x, force y, moment about the mean of its reference vertices) that all contacts put on it, N and N
+    m per metre, for every block that is fixed or guided: what it must be held with is the opposite."""
+    supports = np.asarray(blocks.fixed, dtype=bool).copy()
+    if blocks.held is not None:
+        supports |= blocks.held.any(axis=1)
+    out = {int(b): np.zeros(3) for b in np.flatnonzero(supports)}
+    about = blocks.mean_vertices(blocks.vertices)
+    normal = contacts["normal"]
+    along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    force = contacts["normal_force"][:, None] * normal + contacts["shear_force"][:, None] * along
+    for side, sign in (("block", 1.0), ("other", -1.0)):
+        for k in np.flatnonzero(supports[contacts[side]] & (contacts["state"] != OPEN)):
+            block = int(contacts[side][k])
+            (x, y), (fx, fy) = contacts["point"][k] - about[block], sign * force[k]
+            out[block] += [fx, fy, x * fy - y * fx]
+    return out

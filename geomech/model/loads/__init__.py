@@ -1,0 +1,1 @@
+"""Loads and given motion as functions of time."""

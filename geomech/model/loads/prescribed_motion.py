@@ -1,0 +1,135 @@
+"""Motion that is given: of blocks, of points on them, of the base that they stand on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..numbers import refuse_point
+from .history import History, refuse_no_history
+
+#: The six unknowns of a block, in order.
+UNKNOWNS = ("u0", "v0", "r0", "ex", "ey", "gxy")
+
+#: What a history gives: the displacement itself, or the rate at which it grows.
+Kind = Literal["displacement", "velocity"]
+
+
+def _known_kind(kind: str, what: str) -> None:
+    if kind not in ("displacement", "velocity"):
+        raise ValueError(f'{what} is given as "displacement" or "velocity", not {kind!r}')
+
+
+@dataclass(frozen=True, eq=False)
+class BlockMotion:
+    """The motion of ``block`` in some of its unknowns, exact: u0, v0 (m) of its centroid, r0 (rad), the strains ex, ey,
+    gxy.
+
+    ``history`` has a column for each of ``unknowns``: their values since time 0, or their rates. The rest of the
+    unknowns follow their equations of motion. A fixed block moves as u0, v0 and r0 say and rests in what is not named.
+    """
+
+    block: int
+    history: History
+    unknowns: tuple[str, ...] = ("u0", "v0", "r0")
+    kind: Kind = "displacement"
+
+    def __post_init__(self) -> None:
+        _known_kind(self.kind, "the motion of a block")
+        refuse_no_history(f"the motion of block {self.block}", self.history)
+        if not self.unknowns or len(set(self.unknowns)) < len(self.unknowns) or set(self.unknowns) - set(UNKNOWNS):
+            raise ValueError(f"the imposed unknowns are some of {', '.join(UNKNOWNS)}, once each, not {self.unknowns}")
+        if np.shape(self.history.values)[1] != len(self.unknowns):
+            raise ValueError(
+                f"{len(self.unknowns)} unknowns of block {self.block} are imposed, but its history has "
+                f"{np.shape(self.history.values)[1]} columns"
+            )
+
+    def total(self, time: float) -> np.ndarray:
+        """(k,) what is imposed until ``time``."""
+        return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
+
+    def rate(self, start: float, end: float) -> np.ndarray:
+        """(k,) their rates at ``end``, where the history is a displacement the mean ones since ``start``."""
+        return _rate(self.history, self.kind, start, end)
+
+
+def _rate(history: History, kind: str, start: float, end: float) -> np.ndarray:
+    if kind == "velocity":
+        return history.at(end)
+    return (history.at(end) - history.at(start)) / (end - start) if end > start else np.zeros_like(history.values[0])
+
+
+@dataclass(frozen=True, eq=False)
+class PointMotion:
+    """The motion of the material point ``at`` (reference coordinates) of ``block``.
+
+    ``history``: its displacement since time 0 (m), or its velocity; two columns, x and y, or one along ``direction``,
+    the point then being free across it. Exact, or by a spring of ``stiffness`` (N/m per metre of thickness).
+    """
+
+    block: int
+    at: tuple[float, float]
+    history: History
+    direction: tuple[float, float] | None = None
+    kind: Kind = "displacement"
+    stiffness: float | None = None
+
+    def __post_init__(self) -> None:
+        _known_kind(self.kind, "the motion of a point")
+        refuse_point(f"the motion of a point of block {self.block}", self.at)
+        refuse_no_history(f"the motion of a point of block {self.block}", self.history)
+        columns = np.shape(self.history.values)[1]
+        if columns != (2 if self.direction is None else 1):
+            wanted = "two columns, x and y" if self.direction is None else "one column, along its direction"
+            raise ValueError(f"the motion of a point of block {self.block} needs {wanted}, its history has {columns}")
+        if self.direction is not None and not 0 < math.hypot(*self.direction) < math.inf:
+            raise ValueError(f"the motion of a point of block {self.block} has no direction: {self.direction}")
+        if self.stiffness is not None and not (math.isfinite(self.stiffness) and self.stiffness > 0):
+            raise ValueError(f"the stiffness that moves a point must be positive, got {self.stiffness!r} N/m")
+
+    def total(self, time: float) -> np.ndarray:
+        """(k,) m, what is imposed until ``time``."""
+        return self.history.at(time) if self.kind == "displacement" else self.history.integral(time)
+
+    def rate(self, start: float, end: float) -> np.ndarray:
+        """(k,) m/s at ``end``, where the history is a displacement the mean since ``start``."""
+        return _rate(self.history, self.kind, start, end)
+
+    @property
+    def axes(self) -> np.ndarray:
+        """(k, 2) unit vectors along which the motion is given."""
+        if self.direction is None:
+            return np.eye(2)
+        return np.array([self.direction], dtype=float) / math.hypot(*self.direction)
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMotion:
+    """Shaking: ``acceleration`` (x and y, m/s²) of the ground.
+
+    ``frame`` "ground": the fixed blocks (all, or those in ``blocks``) move as the record says, from rest at time 0, and
+    everything is seen from the ground at rest. "base": seen by one who rides on the base, the fixed blocks stand and
+    every block feels the body force −ρ a; in a step it is the record's mean, so that velocities are exact. Both are the
+    same motion when all fixed blocks shake together.
+    """
+
+    acceleration: History
+    frame: Literal["ground", "base"] = "ground"
+    blocks: tuple[int, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.frame not in ("ground", "base"):
+            raise ValueError(f'base motion is seen from the "ground" or from the "base", not {self.frame!r}')
+        refuse_no_history("the acceleration of the base", self.acceleration)
+        if np.shape(self.acceleration.values)[1] != 2:
+            raise ValueError("the acceleration of the base needs two columns, x and y")
+        if self.frame == "base" and self.blocks is not None:
+            raise ValueError('seen from the "base" all fixed blocks move together: name no blocks')
+
+    def total(self, time: float) -> np.ndarray:
+        """(2,) m, how far the base has gone until ``time``."""
+        return self.acceleration.double_integral(time)

@@ -1,0 +1,1 @@
+"""The block system before anything runs, as files."""

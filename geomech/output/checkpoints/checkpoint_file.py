@@ -1,0 +1,199 @@
+"""Checkpoints: all that a run goes on from, in one file; how it is written, and read back.
+
+A checkpoint holds whatever the run's solvers and writers keep, not only blocks, cracks and loads: factors that were
+renewed in part, face states that the next solution is tried with, meshes. They decide about round-off, so that a run
+goes on bit for bit only with them, and keeping them lets a run be stored at any moment without changing a bit of what
+it does afterwards. What they are is the solvers' own business: their objects stand there by the names of their classes
+and attributes, as plain data (`geomech.plain_data`), so that a file from anyone can be read without running anything.
+It is of use to the sources that wrote it alone: its first lines, the format and a header in JSON with a sum of its own,
+say which, and are read before anything else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import io
+import json
+import os
+import platform
+import re
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from geomech import plain_data
+
+#: Counts the ways in which this file has been written; the first was a pickle behind a line of JSON.
+FORMAT = 3
+#: Below the run folder.
+FOLDER = "checkpoint"
+#: So many checkpoints are kept: the last, and one more should that be damaged.
+KEPT = 2
+
+#: The first line: what the file is, the CRC-32 and the length of the header in the second.
+_FIRST = "geomech checkpoint {format} {crc:08x} {length}\n"
+_FIRST_READ = re.compile(rb"geomech checkpoint (\d{1,9}) ([0-9a-f]{8}) (\d{1,12})\n")
+#: Behind the content: its CRC-32 and its length.
+_TRAILER = struct.Struct("<IQ")
+#: What a checkpoint may hold besides arrays, numbers, texts and Python's own containers.
+_ALLOWED = plain_data.Allowed(
+    parts=("geomech.model", "geomech.dda", "geomech.ddm", "geomech.coupling"),
+    classes=(
+        "geomech.output.tables.deepest_penetration:Deepest", "geomech.output.vtk.grids:CrackLines", "geomech.output.vtk.grids:KeyBlocks",
+        "geomech.output.tables.histories:TableEnd", "geomech.output.vtk.interior_fields:InteriorMeshes", "geomech.output.vtk.interior_fields:_Kept",
+        "geomech.output.vtk.series:SeriesTime", "geomech.output.vtk.triangulate:Triangles",
+        "geomech.shapes.meshing:InteriorMesh",
+    ),
+    methods=("geomech.model.problem:Problem.joint_index",),
+)  # fmt: skip
+#: Sources that decide what a run does and what a checkpoint holds.
+_DECISIVE = ("conventions.py", "model", "dda", "ddm", "coupling", "output")
+#: Bytes: no header is as long.
+_LONGEST_HEADER = 1 << 24
+
+
+class NotResumable(RuntimeError):
+    """A run cannot be gone on with: the message says why, and what to do instead."""
+
+
+class FilesChanged(ValueError):
+    """A file of a run is not what it was at the checkpoint."""
+
+
+@cache
+def identity() -> Mapping[str, Any]:
+    """What must be the same for a checkpoint to be of use, and for the run to go on bit for bit. Sources are those of
+    the time when it was asked for first: they may be edited while a run lasts."""
+    packages = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
+    return {"format": FORMAT, "python": platform.python_version(), **packages, "sources": _sources()}
+
+
+def surroundings() -> dict[str, Any]:
+    """What rounding may depend on besides."""
+    threads = {name: os.environ.get(name, "") for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+    return {"machine": f"{platform.machine()}, {_processor()}", **threads}
+
+
+def write(folder: Path, header: dict[str, Any], content: Any) -> Path:
+    """``content`` as the checkpoint of cycle ``header["cycle"]`` in ``folder``, whole or not at all; older ones than
+    the one before are removed. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"cycle_{header['cycle']:07d}.checkpoint"
+    beside = path.with_name(path.name + ".part")
+    try:
+        with open(beside, "wb") as file:
+            head = json.dumps(header).encode()
+            file.write(_FIRST.format(format=FORMAT, crc=zlib.crc32(head), length=len(head)).encode() + head + b"\n")
+            summed = _Summed(file)
+            plain_data.write(summed, content, _ALLOWED)
+            file.write(_TRAILER.pack(summed.crc, summed.length))
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(beside, path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+    for old in found(folder)[KEPT:]:
+        old.unlink(missing_ok=True)
+    return path
+
+
+def found(folder: Path) -> list[Path]:
+    """The checkpoints in ``folder``, the last one first."""
+    return sorted(folder.glob("cycle_[0-9]*.checkpoint"), reverse=True)
+
+
+def read_header(path: Path) -> dict[str, Any]:
+    """The header of the checkpoint ``path``. Raises NotResumable where it is none, or not whole."""
+    with open(path, "rb") as file:
+        return _read_header(path, file)
+
+
+def read(path: Path) -> Any:
+    """The content of the checkpoint ``path``, which these sources wrote. Raises NotResumable where it is not whole."""
+    with open(path, "rb") as file:
+        header = _read_header(path, file)
+        if header["format"] != FORMAT:
+            raise NotResumable(f"{path} is a checkpoint of format {header['format']}, and this geomech reads {FORMAT}")
+        try:
+            return plain_data.read(file, _ALLOWED)
+        except plain_data.Broken as error:
+            raise NotResumable(f"{path} does not hold what a checkpoint holds ({error}): run the scene anew") from error
+
+
+def whole(folder: Path) -> Iterator[tuple[dict[str, Any], Path]]:
+    """(header, path) of the checkpoints in ``folder`` that are whole, the last one first."""
+    for path in found(folder):
+        try:
+            yield read_header(path), path
+        except (NotResumable, OSError):
+            continue
+
+
+def _read_header(path: Path, file: BinaryIO) -> dict[str, Any]:
+    """The header; ``file`` then stands at the content, whose sum is right. Of another format the header says no more
+    than which."""
+    damaged = NotResumable(f"{path} is no whole checkpoint: remove it, and the one before it is taken")
+    first = file.readline(256)
+    if first.startswith(b"{"):
+        return {"format": 1}
+    found = _FIRST_READ.fullmatch(first)
+    if found is None:
+        raise damaged
+    head = file.read(min(int(found[3]), _LONGEST_HEADER))
+    if zlib.crc32(head) != int(found[2], 16) or file.read(1) != b"\n":
+        raise damaged
+    if int(found[1]) != FORMAT:
+        return {"format": int(found[1])}
+    start = file.tell()
+    length = file.seek(0, os.SEEK_END) - start - _TRAILER.size
+    if length < 0:
+        raise damaged
+    file.seek(start)
+    crc, left = 0, length
+    while left:
+        piece = file.read(min(left, 1 << 22))
+        crc, left = zlib.crc32(piece, crc), left - len(piece)
+    if _TRAILER.unpack(file.read(_TRAILER.size)) != (crc, length):
+        raise damaged
+    file.seek(start)
+    try:
+        return json.loads(head) | {"format": FORMAT}
+    except (ValueError, TypeError):
+        raise damaged from None
+
+
+class _Summed(io.RawIOBase):
+    """A file that knows the sum and the length of what was written to it."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self.crc, self.length = file, 0, 0
+
+    def write(self, data: Any) -> int:
+        self.crc = zlib.crc32(data, self.crc)
+        self.length += memoryview(data).nbytes
+        return self._file.write(data)
+
+
+def _sources() -> str:
+    """A digest of the sources that decide what a run does."""
+    house = Path(__file__).parents[2]
+    digest = hashlib.sha256()
+    for name in _DECISIVE:
+        place = house / name
+        for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
+            digest.update(str(path.relative_to(house)).encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _processor() -> str:
+    """The processor's own name, where the system tells."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            return next(line.partition(":")[2].strip() for line in file if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor()

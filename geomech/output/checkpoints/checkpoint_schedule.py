@@ -1,0 +1,107 @@
+"""When a run is stored, and what its checkpoints say about where it came from."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from geomech import __version__, plain_data
+from geomech.model import Cycle, Problem
+
+from . import checkpoint_file
+
+log = logging.getLogger(__name__)
+
+#: Unless a scene says otherwise a checkpoint comes so many seconds after the one before, at the earliest …
+INTERVAL = 30.0
+#: … and as late as keeps what checkpoints cost below this part of the run's time.
+SHARE = 0.02
+#: Keys of a scene that name files.
+_NAMING_FILES = ("model", "file")
+
+
+class Checkpoints:
+    """Observer that knows when a checkpoint is `due`; whoever runs the cycles then lets it `write` one, between two
+    cycles.
+
+    ``every`` counts cycles between two, 0 for none at all; None leaves it to `INTERVAL` and `SHARE`. ``scene`` is the
+    resolved scene, which a resumed run must still have. That a checkpoint cannot be written is told to the log and ends
+    nothing.
+    """
+
+    def __init__(self, *, every: int | None = None, scene: Mapping[str, Any] | None = None) -> None:
+        if every is not None and every < 0:
+            raise ValueError(f"checkpoints come every n-th cycle, or never with 0; got {every}")
+        self.every, self.scene = every, None if scene is None else dict(scene)
+        self.seconds = 0.0
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        if self.wanted:
+            checkpoint_file.identity()
+        self.on_resume(problem, folder, digests(self.scene or {}))
+
+    def memory(self) -> dict[str, str]:
+        return self._files
+
+    def on_resume(self, problem: Problem, folder: Path, memory: dict[str, str]) -> None:
+        self._folder, self._files = Path(folder) / checkpoint_file.FOLDER, memory
+        self._cycles, self._interval, self._last = 0, INTERVAL, time.monotonic()
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        self._cycles += 1
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there are to be any."""
+        return self.every != 0
+
+    @property
+    def due(self) -> bool:
+        if self.every is not None:
+            return 0 < self.every <= self._cycles
+        return time.monotonic() - self._last >= self._interval
+
+    def write(self, cycle: int, now: float, content: Any) -> bool:
+        """Store ``content`` as what the run goes on with after ``cycle``, at the time ``now`` s; whether it could
+        be."""
+        began = time.monotonic()
+        header = {
+            **checkpoint_file.identity(), **checkpoint_file.surroundings(), "geomech": __version__, "cycle": cycle, "time_s": now,
+            "scene": self.scene, "files": self._files,
+        }  # fmt: skip
+        try:
+            checkpoint_file.write(self._folder, header, content)
+        except (OSError, plain_data.NotPlain) as error:
+            why = getattr(error, "strerror", None) or error
+            log.warning("no checkpoint of cycle %d: %s; the one before it is kept", cycle, why)
+            written = False
+        else:
+            written = True
+        self._cycles, self._last = 0, time.monotonic()
+        self._interval = max(INTERVAL, (self._last - began) / SHARE)
+        self.seconds += self._last - began
+        return written
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        summary.setdefault("seconds", {})["writing checkpoints"] = round(self.seconds, 4)
+
+
+def digests(scene: Mapping[str, Any]) -> dict[str, str]:
+    """file → SHA-256 of what stands in every file that the resolved ``scene`` names."""
+    return {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in sorted(set(_files(scene)))}
+
+
+def _files(node: Any) -> Iterator[str]:
+    if isinstance(node, Mapping):
+        for key, value in node.items():
+            if key in _NAMING_FILES and isinstance(value, str) and Path(value).is_file():
+                yield value
+            else:
+                yield from _files(value)
+    elif isinstance(node, (list, tuple)):
+        for item in node:
+            yield from _files(item)

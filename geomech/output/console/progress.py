@@ -1,0 +1,246 @@
+"""What a run shows while it runs: a bar on a terminal, a line every few seconds elsewhere, a few lines at the end."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import sys
+import textwrap
+import time
+from collections import deque
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from geomech.model import STOPS, Cycle, Problem, counted
+
+from ..checkpoints import checkpoint_file
+from ..tables.deepest_penetration import limits_line
+from ..tables.motion_state import closing, told
+from ..units import length_text, stress_text
+
+#: So many warnings of a run are shown at its end, each this long at most.
+SHOWN_WARNINGS, WIDTH = 3, 400
+
+
+#: Of a static run in which blocks slide or turn on and on.
+NO_ANSWER = "since the mechanism what blocks move by means nothing: nothing holds them (events.csv)"
+
+
+class Warned(logging.Handler):
+    """Counts what geomech warns of while a run lasts, from its making to its `end`; and keeps the first of each
+    kind."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.count = 0
+        self.first: dict[str, str] = {}
+        logging.getLogger("geomech").addHandler(self)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        # Warnings about the scene were said before the run; how it was ended is said after it.
+        if record.name in ("geomech.pipeline", "geomech.output.run_record"):
+            return
+        self.count += 1
+        self.first.setdefault(str(record.msg), record.getMessage())
+
+    def end(self) -> None:
+        logging.getLogger("geomech").removeHandler(self)
+
+    def lines(self) -> list[str]:
+        if not self.count:
+            return []
+        shown = [textwrap.shorten(text, WIDTH, placeholder=" …") for text in list(self.first.values())[:SHOWN_WARNINGS]]
+        return [f"  {counted(self.count, 'warning')} in run.log" + (", such as" if self.count > len(shown) else ""),
+                *(f"    {text}" for text in shown)]  # fmt: skip
+
+
+class Pace:
+    """How fast a run goes through its scene, by the later half of the wall time it has taken.
+
+    A pace means something after `LEAST` s, where the two halves of that span went at paces that differ by less than a
+    factor `UNEVEN`: rock that begins to crack stops the clock of the scene.
+    """
+
+    LEAST, UNEVEN = 3.0, 2.5
+
+    def __init__(self) -> None:
+        self._began: float | None = None
+        self._seen: deque[tuple[float, float]] = deque()
+
+    def add(self, wall: float, time: float) -> None:
+        """The scene has come to ``time``, s, at ``wall``, s."""
+        self._began = wall if self._began is None else self._began
+        self._seen.append((wall, time))
+        half = 0.5 * (self._began + wall)
+        while len(self._seen) > 2 and self._seen[1][0] <= half:
+            self._seen.popleft()
+
+    def time_for(self, rest: float) -> float:
+        """Wall time, s, for ``rest`` s of the scene; inf where that is not known."""
+        if len(self._seen) < 5 or self._seen[-1][0] - self._began < self.LEAST:
+            return math.inf
+        first, last = self._seen[0], self._seen[-1]
+        middle = min(self._seen, key=lambda seen: abs(seen[0] - 0.5 * (first[0] + last[0])))
+        early, late = (
+            (b[1] - a[1]) / (b[0] - a[0]) if b[0] > a[0] else 0.0 for a, b in ((first, middle), (middle, last))
+        )
+        if not 0.0 < early <= self.UNEVEN * late <= self.UNEVEN**2 * early:
+            return math.inf
+        return max(0.0, rest) * (last[0] - first[0]) / (last[1] - first[1])
+
+
+class Progress:
+    """Observer for people. On a terminal it draws a tqdm bar over the scene's time, elsewhere a line now and then. The
+    time left is that of the rest of the scene at the recent `Pace`, once there is a steady one; a scene that stops at
+    an event ends sooner. ``quiet`` leaves only where a failed run stopped.
+
+    ``stream`` defaults to stderr; ``interval`` s is the least time between two lines off a terminal, twice that
+    between two with the same percentage.
+    """
+
+    def __init__(self, *, quiet: bool = False, stream: TextIO | None = None, interval: float = 5.0) -> None:
+        self.quiet, self.stream, self.interval = quiet, stream, interval
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        self._warnings = Warned()
+        self._out = self.stream or sys.stderr
+        self._folder, self._end = Path(folder), problem.run.end_time
+        self._said = time.perf_counter()
+        self._percent, self._last = -1, None
+        self._pace = Pace()
+        self._bar = None
+        if not self.quiet and self._out is not None and self._out.isatty():
+            from tqdm import tqdm
+
+            self._bar = tqdm(
+                total=self._end,
+                file=self._out,
+                desc=problem.title[:40],
+                bar_format="{desc}: {percentage:3.0f}%|{bar}| [{elapsed}{postfix}]",
+                postfix="starting",
+                mininterval=0.1,
+                dynamic_ncols=True,
+            )
+        elif not self.quiet:
+            self._say(f"{problem.title}: {problem.inventory} → {folder}")
+
+    def memory(self) -> tuple[int, float] | None:
+        return None if self._last is None else (self._last.number, float(self._last.state.time))
+
+    def on_resume(self, problem: Problem, folder: Path, memory: tuple[int, float] | None) -> None:
+        self.on_start(problem, folder)
+        if memory is not None and self._bar is not None:
+            self._bar.update(memory[1])
+        elif memory is not None and not self.quiet:
+            self._say(f"  resumed after cycle {memory[0]}, t = {memory[1]:.4g} s")
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        self._last = cycle
+        if self.quiet:
+            return
+        now = time.perf_counter()
+        if cycle.state.time > 0:  # from the first load step on: it may have compiled kernels, and sets no pace
+            self._pace.add(now, float(cycle.state.time))
+        if self._bar is not None:
+            # The text is made only as often as the bar is drawn.
+            if now - self._said >= self._bar.mininterval:
+                self._said = now
+                self._bar.set_postfix_str(_told(cycle) + self._left(cycle), refresh=False)
+            with suppress(OSError):  # of a terminal that is gone
+                self._bar.update(max(0.0, min(cycle.state.time, self._end) - self._bar.n))
+        elif now - self._said >= self.interval:
+            percent = self._share(cycle)
+            if percent == self._percent and now - self._said < 2 * self.interval:
+                return
+            self._said, self._percent = now, percent
+            self._say(f"  {percent:3d} %  {_told(cycle)}{self._left(cycle)}")
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        self._warnings.end()
+        if self._bar is not None:
+            with suppress(OSError):
+                self._bar.close()
+        if error is not None:
+            # Why it stopped is the exception's own to say, to whoever catches it.
+            last = self._last
+            where = "before the first cycle" if last is None else f"at {self._share(last)} %, {_told(last)}"
+            self._say(f"stopped {where}\n  what was written until then is in {self._folder}")
+            if isinstance(error, (KeyboardInterrupt, OSError)) and checkpoint_file.found(
+                self._folder / checkpoint_file.FOLDER
+            ):
+                self._say(f"  to go on: geomech resume {self._folder}")
+        elif not self.quiet:
+            self._say("\n".join([*closing_lines(summary, self._folder), *self._warnings.lines()]))
+
+    def _share(self, cycle: Cycle) -> int:
+        return round(100 * min(cycle.state.time, self._end) / self._end)
+
+    def _left(self, cycle: Cycle) -> str:
+        """Wall time that the rest of the scene takes; empty where there is no steady pace."""
+        seconds = self._pace.time_for(self._end - float(cycle.state.time))
+        return f", about {_duration(seconds)} left" if 0.5 <= seconds < math.inf else ""
+
+    def _say(self, text: str) -> None:
+        if self._out is None:
+            return
+        try:
+            self._out.write(text + "\n")
+            self._out.flush()
+        except UnicodeEncodeError:
+            self._out.write(text.encode("ascii", "replace").decode() + "\n")
+        except (OSError, ValueError):
+            # Nobody can read it: a full disk, a closed stream, a terminal that is gone. The run goes on.
+            if self._out is sys.stderr:
+                sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+            self._out = None
+
+
+def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
+    """The few lines that end a run: why it ended, at what loads (times, where nothing leads), how long it took, where
+    the files are."""
+    lines = [f"{summary.get('title', 'run')}: {summary.get('end', 'done')}"]
+    for kind, first in summary.get("first", {}).items():
+        # A load of 0 is that of a scene which has no leading one: it is driven by time.
+        load = first.get("load_pa")
+        text = f"  {kind:<13} " + (f"{stress_text(load):>12}" if load else f"t = {first['time_s']:.4g} s")
+        text += " in tension" if load and load < 0 else ""
+        if load and first.get("load_normalised") is not None:
+            text += f"   σ√(πb)/K_Ic = {first['load_normalised']:.3f}"
+        count = summary.get("events", {}).get(kind, 1)
+        lines.append(text + (f"   (first of {count})" if count > 1 else ""))
+    if "cycles" in summary and "key_blocks" in summary:
+        lines += closing(summary)
+        lines.append(f"  {counted(summary['load_steps'], 'load step')} in {summary.get('wall_s', math.nan):.2f} s")
+    elif "cycles" in summary:
+        lines.append(
+            f"  {counted(summary['load_steps'], 'load step')}, {counted(summary['growing_cycles'], 'cycle')} with "
+            f"growth, {length_text(summary['crack_growth_m'])} of new crack in {summary.get('wall_s', math.nan):.2f} s"
+        )
+    lines += limits_line(summary.get("shortened_steps", []), summary.get("load_steps", 0))
+    if "mechanism" in summary.get("first", {}):
+        lines.append(f"  {NO_ANSWER}")
+    if summary.get("end") in STOPS and summary["end"] != "mechanism":
+        lines.append(f"  to go on beyond it: geomech resume {folder} --set 'run.stop_at=[]'")
+    return [*lines, f"  {folder}"]
+
+
+def _told(cycle: Cycle) -> str:
+    if not cycle.cracks.n_cracks:
+        return f"t = {cycle.state.time:.4g} s, {told(cycle)}"
+    growing = int(np.count_nonzero(cycle.tips["grown"] > 0))
+    # A load that has not begun is that of a scene which has no leading one: it is driven by time.
+    pulled = " in tension" if cycle.load < 0 else ""
+    drive = f"load {stress_text(cycle.load, 3)}{pulled}" if cycle.load else f"t = {cycle.state.time:.4g} s"
+    text = f"{drive}, cycle {cycle.number}"
+    return text + (f", {growing} of {len(cycle.tips)} tips growing" if len(cycle.tips) else "")
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"

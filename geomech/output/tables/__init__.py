@@ -1,0 +1,1 @@
+"""Histories as CSV and the summary of a run."""

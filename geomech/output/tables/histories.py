@@ -1,0 +1,199 @@
+"""CSV files that grow with the run: ``history.csv`` a row a cycle, ``tips.csv`` a row a tip, ``events.csv``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geomech.model import OPEN, Cycle, Problem
+
+from ..checkpoints.checkpoint_file import FilesChanged
+from ..fields import EVENTS, HISTORY, TIPS
+
+
+class Histories:
+    """Observer that appends to the three files and flushes after every cycle, so that a crash loses nothing."""
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        self._history = Table(folder / "history.csv", HISTORY)
+        self._tips = Table(folder / "tips.csv", TIPS)
+        self._events = Table(folder / "events.csv", EVENTS)
+
+    def memory(self) -> list[TableEnd]:
+        return [table.end for table in (self._history, self._tips, self._events)]
+
+    def on_resume(self, problem: Problem, folder: Path, memory: list[TableEnd]) -> None:
+        names = ("history.csv", "tips.csv", "events.csv")
+        tables = [Table.cut_back(Path(folder) / name, end) for name, end in zip(names, memory, strict=True)]
+        self._history, self._tips, self._events = tables
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        self._history.add([history_row(cycle)])
+        self._tips.add(tip_rows(cycle))
+        self._events.add(
+            {
+                "kind": event.kind,
+                "cycle": event.cycle,
+                "time": event.time,
+                "load": event.load,
+                "x": event.point[0],
+                "y": event.point[1],
+                "detail": event.detail,
+            }
+            for event in cycle.events
+        )
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        for table in (self._history, self._tips, self._events):
+            table.close()
+
+
+class TableEnd(NamedTuple):
+    """Where a `Table` ends: its columns, rows and bytes."""
+
+    columns: tuple[str, ...]
+    rows: int
+    size: int
+
+
+class Table:
+    """A CSV file that grows row by row. A column not seen before (a monitor's, a step's statistic that only comes
+    with contact) is added at the right, with the rows so far rewritten; that happens a few times in a run."""
+
+    def __init__(self, path: Path, columns: Iterable[str]) -> None:
+        self.path, self.columns = Path(path), list(columns)
+        self._known = set(self.columns)
+        self._rows = 0
+        self._file = open(self.path, "w", newline="", encoding="utf-8")  # noqa: SIM115 (open as long as the run)
+        csv.writer(self._file).writerow(self.columns)
+        self._file.flush()
+
+    @property
+    def end(self) -> TableEnd:
+        return TableEnd(tuple(self.columns), self._rows, os.fstat(self._file.fileno()).st_size)
+
+    @classmethod
+    def cut_back(cls, path: Path, end: TableEnd) -> Table:
+        """Go on with the file ``path`` from where it ended as ``end`` says: columns and rows that came later are
+        dropped. Raises FilesChanged when it has not got what it had then."""
+        table = cls.__new__(cls)
+        table.path, table.columns, table._known, table._rows = path, list(end.columns), set(end.columns), end.rows
+        if not path.is_file():
+            raise FilesChanged(f"{path} is missing")
+        with open(path, "r+b") as file:
+            header = next(csv.reader([file.readline().decode("utf-8")]), [])
+            if header == table.columns and os.fstat(file.fileno()).st_size >= end.size:
+                file.truncate(end.size)
+                header = None
+        if header is not None:
+            table._narrow(header)
+        table._file = open(path, "a", newline="", encoding="utf-8")  # noqa: SIM115
+        if table.end != end:
+            table.close()
+            raise FilesChanged(f"{path} ends before its row {end.rows}, which it had at the checkpoint")
+        return table
+
+    def add(self, rows: Iterable[dict[str, Any]]) -> None:
+        """Append ``rows`` (column → value; a column left out stays empty) and flush."""
+        rows = list(rows)
+        if not rows:
+            return
+        fresh = list(dict.fromkeys(name for row in rows for name in row if name not in self._known))
+        if fresh:
+            self._widen(fresh)
+        text = io.StringIO()
+        csv.writer(text).writerows([[_written(row.get(name)) for name in self.columns] for row in rows])
+        self._rows += len(rows)
+        self._file.write(text.getvalue())
+        self._file.flush()
+
+    def close(self) -> None:
+        self._file.close()
+
+    def _widen(self, fresh: list[str]) -> None:
+        self._file.close()
+        with open(self.path, newline="", encoding="utf-8") as file:
+            _, *rows = csv.reader(file)
+        self.columns += fresh
+        self._known |= set(fresh)
+        self._rewrite([*row, *[""] * len(fresh)] for row in rows)
+        self._file = open(self.path, "a", newline="", encoding="utf-8")  # noqa: SIM115
+
+    def _narrow(self, header: list[str]) -> None:
+        """Take the columns beyond ours, and the rows beyond ours, out of the file, whose ``header`` has more."""
+        if header[: len(self.columns)] != self.columns:
+            raise FilesChanged(f"{self.path} has other columns than it had: {', '.join(header)}")
+        with open(self.path, newline="", encoding="utf-8") as file:
+            _, *rows = csv.reader(file)
+        self._rewrite(row[: len(self.columns)] for row in rows[: self._rows])
+
+    def _rewrite(self, rows: Iterable[list[str]]) -> None:
+        beside = self.path.with_name(self.path.name + ".part")
+        with open(beside, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(self.columns)
+            writer.writerows(rows)
+        os.replace(beside, self.path)
+
+
+def history_row(cycle: Cycle) -> dict[str, Any]:
+    """The row of ``history.csv`` for ``cycle``: `fields.HISTORY`, then its statistics and monitors."""
+    tips, contacts = cycle.tips, cycle.state.contacts
+    row: dict[str, Any] = {
+        "cycle": cycle.number,
+        "time": cycle.state.time,
+        "load_step": cycle.load_step,
+        "growth_pass": cycle.growth_pass,
+        "load": cycle.load,
+        "strain": cycle.strain,
+        "crack_length": float(cycle.cracks.lengths.sum()),
+        "tips": len(tips),
+        "growing": int(np.count_nonzero(tips["grown"] > 0)),
+        "max_k_eq": float(tips["k_eq"].max()) if len(tips) else math.nan,
+        "closed_contacts": int(np.count_nonzero(contacts["state"] != OPEN)),
+    }
+    row.update(cycle.statistics)
+    for name, displacement in cycle.monitors.items():
+        row[f"{name}_ux"], row[f"{name}_uy"] = displacement
+    return row
+
+
+def tip_rows(cycle: Cycle) -> list[dict[str, Any]]:
+    """The rows of ``tips.csv`` for ``cycle``."""
+    tips = cycle.tips
+    same = {"cycle": cycle.number, "time": cycle.state.time, "load": cycle.load}
+    columns = {
+        "crack": tips["crack"],
+        "end": tips["end"],
+        "tip": tips["node"],
+        "x": tips["point"][:, 0],
+        "y": tips["point"][:, 1],
+        "K_I": tips["k_i"],
+        "K_II": tips["k_ii"],
+        "K_eq": tips["k_eq"],
+        "angle_deg": np.degrees(tips["angle"]),
+        "grown_m": tips["grown"],
+        "crack_name": _names(cycle.cracks.names, tips["crack"]),
+    }
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [same | dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _names(names: tuple[str, ...], crack: np.ndarray) -> np.ndarray:
+    return np.array([names[k] if k < len(names) else "" for k in crack.tolist()], dtype=object)
+
+
+def _written(value: Any) -> Any:
+    """Floats in the shortest form that reads back as the same number; nan as an empty cell."""
+    if isinstance(value, (float, np.floating)):
+        return "" if math.isnan(value) else repr(float(value))
+    return value

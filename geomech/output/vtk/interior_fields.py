@@ -1,0 +1,218 @@
+"""Stress and displacement inside cracked rock, on a triangle mesh whose crack faces can part."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geomech.conventions import rotate_stress
+from geomech.model import Cracks, Cycle, Material
+from geomech.model.blocks.block_motion import Motion
+
+from .block_motion import rotation
+from .grids import principal_stresses, six_components, von_mises
+from .triangulate import Triangles
+from .vtu import TRIANGLE, Grid
+
+#: A node on a crack face is evaluated this far inside its own side, relative to its shortest triangle edge.
+_ASIDE = 1e-5
+#: Cracks that turn by more than this are sharp there: stress is singular, rad.
+_SHARP = math.radians(20)
+
+
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """The mesh of a block with its cracks: ``points`` (n, 2) where its nodes are looked at, ``areas`` (n,) of
+    the rock about them. Below, nodes where stress is singular: ``centres`` (k, 2) of the triangles about them and the
+    node of each, ``owner`` (k,)."""
+
+    mesh: Any
+    points: np.ndarray
+    areas: np.ndarray
+    centres: np.ndarray
+    owner: np.ndarray
+
+
+class InteriorMeshes:
+    """Meshes of the cracked blocks, kept while their geometry stands (whatever number a block has by then: where one is
+    split, all after it get others), and the fields of a cycle on them.
+
+    ``n_triangles`` is about how many triangles an uncracked block gets; crack tips are meshed ``tip_ratio`` times
+    finer than the rest. Blocks without cracks, but of a material that has been seen to crack, are there as well (what a
+    crack has cut off, above all), each with the one strain and stress that it has.
+    """
+
+    def __init__(self, n_triangles: int = 2000, tip_ratio: float = 15.0) -> None:
+        self.n_triangles, self.tip_ratio = n_triangles, tip_ratio
+        self._kept: dict[bytes, _Kept] = {}
+        self._cracked_materials: set[int] = set()
+        self._triangles = Triangles()
+
+    def grid(self, cycle: Cycle, materials: Sequence[Material], motion: Motion, configuration: str) -> Grid:
+        """The rock of ``cycle`` as one grid; empty until some block holds a crack."""
+        blocks = cycle.blocks
+        self._cracked_materials |= {int(blocks.material[b]) for b in cycle.bodies}
+        whole = np.isin(blocks.material, [*self._cracked_materials]) & ~blocks.fixed
+        whole[[*cycle.bodies]] = False
+        before, self._kept = self._kept, {}
+        parts = [self._block(cycle, b, body, motion, before) for b, body in sorted(cycle.bodies.items())]
+        parts += [self._whole_blocks(cycle, whole)] if whole.any() else []
+        first = np.cumsum([0, *(len(p["points"]) for p in parts)])
+
+        def joined(name: str, tail: tuple[int, ...] = (), kind: type = float) -> np.ndarray:
+            return np.concatenate([p[name] for p in parts]) if parts else np.empty((0, *tail), kind)
+
+        points, moved = joined("points", (2,)), joined("moved", (2,))
+        cells = [p["triangles"] + start for p, start in zip(parts, first)]
+        cells = np.concatenate(cells) if cells else np.empty((0, 3), int)
+        owner_of_point = joined("owner", (), int)
+        stress = six_components(joined("stress", (3,)), blocks.material[owner_of_point], materials)
+        principal = principal_stresses(stress)
+        return Grid(
+            points=points if configuration == "reference" else points + moved,
+            connectivity=cells.ravel(),
+            offsets=np.arange(3, 3 * len(cells) + 1, 3),
+            types=np.full(len(cells), TRIANGLE),
+            point_data={
+                "displacement": moved,
+                "stress": stress,
+                "principal_stress": principal,
+                "von_mises": von_mises(principal),
+            },
+            cell_data={"block_id": owner_of_point[cells[:, 0]] if len(cells) else np.empty(0, int)},
+        )
+
+    def _block(
+        self, cycle: Cycle, b: int, body: Any, motion: Motion, before: dict[bytes, _Kept]
+    ) -> dict[str, np.ndarray]:
+        kept = self._mesh(cycle, b, before)
+        gradient = motion.gradient[b]
+        turn = float(rotation(gradient))
+        n = len(kept.points)
+        stress, own = body.fields(np.concatenate([kept.points, kept.centres]))
+        # At a tip or a sharp corner there is no stress to give: that of the triangles about it is what the mesh
+        # resolves.
+        count = np.bincount(kept.owner, minlength=n)
+        singular = np.flatnonzero(count)
+        for k in range(3):
+            mean = np.bincount(kept.owner, weights=stress[n:, k], minlength=n)
+            stress[singular, k] = mean[singular] / count[singular]
+        return {
+            "owner": np.full(n, b),
+            "points": kept.mesh.points,
+            "triangles": kept.mesh.triangles,
+            "moved": _placed(
+                kept.mesh.points, kept.areas, own[:n], motion.reference_centre[b], motion.centre[b], gradient, turn
+            ),
+            "stress": rotate_stress(stress[:n], turn),
+        }
+
+    def _whole_blocks(self, cycle: Cycle, whole: np.ndarray) -> dict[str, np.ndarray]:
+        """Blocks without cracks (``whole``, a mask) have one strain and one stress each: their corners say it all."""
+        blocks, state = cycle.blocks, cycle.state
+        triangles, owner = self._triangles.of(blocks)
+        corners = np.flatnonzero(whole[blocks.vertex_block])
+        number = np.full(blocks.n_vertices, -1)
+        number[corners] = np.arange(len(corners))
+        return {
+            "owner": blocks.vertex_block[corners],
+            "points": blocks.vertices[corners],
+            "triangles": number[triangles[whole[owner]]],
+            "moved": (state.vertices - blocks.vertices)[corners],
+            "stress": state.stress[blocks.vertex_block[corners]],
+        }
+
+    def _mesh(self, cycle: Cycle, b: int, before: dict[bytes, _Kept]) -> _Kept:
+        loops, cracks = cycle.blocks.loops(b), cycle.cracks.in_block(b)
+        key = b"|".join([*(loop.tobytes() for loop in loops), cracks.nodes.tobytes(), cracks.segments.tobytes()])
+        kept = before.get(key)
+        if kept is None:
+            from geomech.shapes.meshing import mesh_interior
+
+            size = math.sqrt(cycle.blocks.areas()[b] / (0.433 * self.n_triangles))
+            mesh = mesh_interior(loops, cracks, size, size / self.tip_ratio)
+            look_from = mesh.points + _ASIDE * _local_size(mesh)[:, None] * mesh.side
+            kept = _Kept(mesh, look_from, _node_areas(mesh), *_about_singular(mesh, cracks))
+        self._kept[key] = kept
+        return kept
+
+
+def _singular_nodes(cracks: Cracks) -> np.ndarray:
+    """Nodes of ``cracks`` where elastic stress has no bound: tips, junctions and sharp kinks."""
+    along = cracks.nodes[cracks.segments[:, 1]] - cracks.nodes[cracks.segments[:, 0]]
+    along = along / cracks.lengths[:, None]
+    out = np.zeros((len(cracks.nodes), 2))
+    np.add.at(out, cracks.segments[:, 0], along)
+    np.subtract.at(out, cracks.segments[:, 1], along)
+    # The two unit vectors out of a node inside a crack add up to 2 sin(turn / 2).
+    sharp = (cracks.valence == 2) & (np.hypot(*out.T) > 2 * math.sin(_SHARP / 2))
+    singular = sharp | (cracks.valence > 2)
+    singular[cracks.tips] = True
+    return np.flatnonzero(singular)
+
+
+def _about_singular(mesh: Any, cracks: Cracks) -> tuple[np.ndarray, np.ndarray]:
+    """The centres (k, 2) of the triangles about singular nodes and the node of each (k,)."""
+    at = cracks.nodes[_singular_nodes(cracks)]
+    if not len(at):
+        return np.empty((0, 2)), np.empty(0, int)
+    singular = np.zeros(len(mesh.points), bool)
+    reach = 1e-9 * float(np.ptp(mesh.points, axis=0).max())
+    # So few of them that a tree is not worth its import.
+    for node in at:
+        singular |= np.abs(mesh.points - node).max(axis=1) <= reach
+    triangle, corner = np.nonzero(singular[mesh.triangles])
+    return mesh.points[mesh.triangles[triangle]].mean(axis=1), mesh.triangles[triangle, corner]
+
+
+def _local_size(mesh: Any) -> np.ndarray:
+    """(n,) m: the shortest triangle edge at every point."""
+    size = np.full(len(mesh.points), np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        i, j = mesh.triangles[:, a], mesh.triangles[:, b]
+        length = np.hypot(*(mesh.points[i] - mesh.points[j]).T)
+        np.minimum.at(size, i, length)
+        np.minimum.at(size, j, length)
+    return np.where(np.isfinite(size), size, 0.0)
+
+
+def _node_areas(mesh: Any) -> np.ndarray:
+    """(n,) m²: a third of the triangles around every point."""
+    a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
+    u, v = b - a, c - a
+    third = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 6
+    return np.bincount(mesh.triangles.ravel(), weights=np.repeat(third, 3), minlength=len(mesh.points))
+
+
+def _placed(
+    points: np.ndarray,
+    weights: np.ndarray,
+    own: np.ndarray,
+    centre: np.ndarray,
+    centre_now: np.ndarray,
+    gradient: np.ndarray,
+    turn: float,
+) -> np.ndarray:
+    """The body's ``own`` displacement with its rigid part replaced by the block's.
+
+    A body under given tractions knows its displacement up to a rigid motion, so that part is taken out and the block's
+    put in its place; the deformation turns with the block. The rigid part is that of the affine motion which fits best
+    over the area (``weights``): fitted without the strain, it would pick up a spin from strain on a lopsided body.
+    """
+    share = weights / weights.sum()
+    middle = share @ points
+    arm, mean = points - middle, share @ own
+    moments = arm.T @ (share[:, None] * arm)
+    slope = (own - mean).T @ (share[:, None] * arm) @ np.linalg.inv(moments)
+    spin = 0.5 * (slope[1, 0] - slope[0, 1])
+    deforming = own - mean - spin * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+    c, s = math.cos(turn), math.sin(turn)
+    # cos − 1 = −2 sin²(turn/2) keeps the digits of small rotations.
+    less = -2 * math.sin(turn / 2) ** 2
+    # The body's middle goes where the block's affine motion takes it; about it, the block turns.
+    shift = (centre_now - centre) + (gradient - np.eye(2)) @ (middle - centre)
+    return shift + arm @ np.array([[less, -s], [s, less]]).T + deforming @ np.array([[c, -s], [s, c]]).T

@@ -1,0 +1,233 @@
+"""The ParaView series of a run: one PVD a kind of thing, its files under ``vtk/``, readable after every cycle."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+from geomech.model import CHANGES, Cycle, Problem, Skip
+
+from ..background_jobs import Beside
+from ..checkpoints.checkpoint_file import FilesChanged
+from ..fields import SERIES
+from ..tables.skipped_work import told
+from . import grids
+from .interior_fields import InteriorMeshes
+from .triangulate import Triangles
+from .vtu import Collection, Grid, GridFiles, world_origin
+
+#: Growth passes share the time of their load step; each is written this fraction of a step later than the one before.
+PASS_OFFSET = 1e-6
+
+#: Interior fields cost more than everything else that is written; where no crack grows they are this much rarer.
+QUIET = 10
+
+
+#: What a `Series` knows of the run so far, besides what it has listed.
+_REMEMBERED = (
+    "_triangles", "_lines", "_meshes", "_keys", "_time", "_pending", "_last_interior", "_segments_then", "seconds",
+    "_cycles", "_cracked", "_interior_seconds", "_series_seconds",
+)  # fmt: skip
+
+#: Grids with more bytes of fields than these take longer to pack (some 20 ms a MB) than to hand over to another thread.
+LARGE = 1 << 19
+
+
+class Series:
+    """Observer that writes ``blocks``, ``cracks``, ``tips``, ``contacts`` and ``interior_fields``.
+
+    ``every`` counts cycles between written ones; cycles in which a tip grew or something happened, the first and the
+    last are always written. ``interior_every`` counts cycles between interior fields while cracks grow; while none does
+    they come `QUIET` times as rarely, since there they mostly scale with the load. They also come with the first load,
+    with every event, before and after blocks are cut and at the end; 0 leaves them out. Raises ValueError for an
+    unknown ``configuration``.
+    """
+
+    def __init__(self, *, every: int = 1, interior_every: int = 5, configuration: str = "reference") -> None:
+        if configuration not in grids.CONFIGURATIONS:
+            raise ValueError(f"configuration must be one of {grids.CONFIGURATIONS}, got {configuration!r}")
+        if every < 1 or interior_every < 0:
+            raise ValueError("every counts from 1, interior_every from 0")
+        self.every, self.interior_every, self.configuration = every, interior_every, configuration
+        self.seconds = 0.0
+
+    def on_start(self, problem: Problem, folder: Path) -> None:
+        self._triangles, self._lines, self._meshes = Triangles(), grids.CrackLines(), InteriorMeshes()
+        self._keys = grids.KeyBlocks(problem)
+        self._time = SeriesTime()
+        self._pending: tuple[Cycle, float, bool] | None = None
+        self._last_interior, self._segments_then = -1, 0
+        self._cycles = self._cracked = 0
+        self._interior_seconds = self._series_seconds = 0.0
+        self._open(problem, Path(folder), {})
+        # Files of a run before this one in the same folder are written over.
+        self._old = self._unlisted()
+
+    def memory(self) -> dict[str, Any]:
+        self._beside.wait()
+        listed = {name: list(collection.entries) for name, collection in self._collections.items()}
+        return {"listed": listed, **{name: getattr(self, name) for name in _REMEMBERED}}
+
+    def on_resume(self, problem: Problem, folder: Path, memory: dict[str, Any]) -> None:
+        """Goes on with the files that were listed then; later ones are deleted. Raises FilesChanged when one is
+        missing."""
+        listed = memory["listed"]
+        vars(self).update({name: memory[name] for name in _REMEMBERED})
+        missing = [file for entries in listed.values() for _, file in entries if not (Path(folder) / file).is_file()]
+        if missing:
+            raise FilesChanged(f"{len(missing)} files of its series are missing in {folder}, the first is {missing[0]}")
+        self._open(problem, Path(folder), listed)
+        for name in self._unlisted():
+            (self._vtk / name).unlink()
+        self._old: set[str] = set()
+
+    def _open(self, problem: Problem, folder: Path, listed: dict[str, list[tuple[float, str]]]) -> None:
+        self._materials, self._world = problem.materials, world_origin(problem)
+        self._folder, self._vtk = folder, folder / "vtk"
+        self._vtk.mkdir(parents=True, exist_ok=True)
+        inside = bool(self.interior_every or listed.get("interior"))
+        names = ["blocks", "cracks", "tips", "contacts"] + ["interior"] * inside
+        for name in set(SERIES) - set(names):
+            (folder / f"{name}.pvd").unlink(missing_ok=True)
+        self._collections = {name: Collection(folder / f"{name}.pvd", listed.get(name, ())) for name in names}
+        self._files = {name: GridFiles(name) for name in names}
+        self._beside, self._large = Beside(), set[str]()
+
+    def _unlisted(self) -> set[str]:
+        """The files of series in ``vtk`` that no collection lists."""
+        listed = {file for collection in self._collections.values() for _, file in collection.entries}
+        there = {path.name for name in SERIES for path in self._vtk.glob(f"{name}_[0-9]*.vtu")}
+        return {name for name in there if f"vtk/{name}" not in listed}
+
+    def on_cycle(self, cycle: Cycle) -> None:
+        began = time.perf_counter()
+        self._cycles += 1
+        self._cracked += bool(cycle.bodies)
+        if self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks:
+            self._write_last_interior()  # of the rock while it was whole
+        # Every cycle takes its time, written or not, so that the times do not depend on what is left out.
+        at = self._time.of(cycle)
+        happened = bool(cycle.events) or bool((cycle.tips["grown"] > 0).any())
+        wanted = cycle.number == 0 or cycle.number % self.every == 0 or happened
+        if wanted:
+            self._write(cycle, at)
+        if self._interior_wanted(cycle):
+            self._write_interior(cycle, at)
+        self._pending = (cycle, at, wanted)
+        self.seconds += time.perf_counter() - began
+
+    def on_end(self, summary: dict[str, Any], error: BaseException | None = None) -> None:
+        began = time.perf_counter()
+        if self._pending is not None:
+            cycle, at, written = self._pending
+            if not written:
+                self._write(cycle, at)
+            self._write_last_interior()
+        try:
+            self._beside.close()
+        finally:
+            for collection in self._collections.values():
+                collection.close()
+            # A longer run before this one must not leave its last files among ours.
+            for name in self._old:
+                (self._vtk / name).unlink(missing_ok=True)
+        self.seconds += time.perf_counter() - began
+        summary.setdefault("seconds", {})["writing series"] = round(self.seconds, 4)
+        summary.setdefault("skipped", {}).update(
+            {name: told(name, skip) for name, skip in self._skips().items() if skip.kept > 0}
+        )
+
+    def _skips(self) -> dict[str, Skip]:
+        """What was not written, beside what was; the first interior fields, for which Gmsh is loaded, are not timed."""
+        inside, all_of = (
+            len(self._collections[name].entries) if name in self._collections else 0 for name in ("interior", "blocks")
+        )
+        return {
+            "interior fields": Skip(self._cracked - inside, inside - 1, self._interior_seconds),
+            "series": Skip(self._cycles - all_of, all_of, self._series_seconds),
+        }
+
+    def _interior_wanted(self, cycle: Cycle) -> bool:
+        if not self.interior_every or cycle.number == 0 or not (cycle.bodies or self._last_interior >= 0):
+            return False
+        cut = self._pending is not None and cycle.blocks.n_blocks != self._pending[0].blocks.n_blocks
+        if any(event.kind not in CHANGES for event in cycle.events) or cut or self._last_interior < 0:
+            return True
+        grew = cycle.cracks.n_segments != self._segments_then
+        return cycle.number - self._last_interior >= self.interior_every * (1 if grew else QUIET)
+
+    def _write(self, cycle: Cycle, at: float) -> None:
+        began, motion, shape = time.perf_counter(), cycle.motion, self.configuration
+        self._save("blocks", cycle, at, grids.blocks_grid(cycle, self._materials, shape, self._triangles, self._keys))
+        self._save("cracks", cycle, at, grids.cracks_grid(cycle, motion, shape, self._lines))
+        self._save("tips", cycle, at, grids.tips_grid(cycle, motion, shape))
+        self._save("contacts", cycle, at, grids.contacts_grid(cycle, shape))
+        self._series_seconds += time.perf_counter() - began
+
+    def _write_last_interior(self) -> None:
+        """The interior of the last cycle that came, unless it is written or there is none."""
+        cycle, at, _ = self._pending
+        begun = bool(cycle.bodies) or self._last_interior >= 0
+        if self.interior_every and begun and cycle.number != self._last_interior:
+            self._write_interior(cycle, at)
+
+    def _write_interior(self, cycle: Cycle, at: float) -> None:
+        self._beside.do(self._interior, cycle, at)
+        self._last_interior, self._segments_then = cycle.number, cycle.cracks.n_segments
+
+    def _interior(self, cycle: Cycle, at: float) -> None:
+        began = time.perf_counter()
+        grid = self._meshes.grid(cycle, self._materials, cycle.motion, self.configuration)
+        self._put("interior", cycle, at, grid)
+        self._interior_seconds += (time.perf_counter() - began) if self._collections["interior"].entries[1:] else 0.0
+
+    def _save(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
+        """Small grids at once; large ones beside the run, which need not wait until they are packed. A series that has
+        been large stays beside, so that its files are listed in their order."""
+        if name in self._large or _size(grid) > LARGE:
+            self._large.add(name)
+            self._beside.do(self._put, name, cycle, at, grid)
+        else:
+            self._put(name, cycle, at, grid)
+
+    def _put(self, name: str, cycle: Cycle, at: float, grid: Grid) -> None:
+        file = f"{name}_{cycle.number:06d}.vtu"
+        numbers = {
+            "CYCLE": cycle.number,
+            "TIME": float(cycle.state.time),
+            "LOAD": float(cycle.load),
+            "REFERENCE": int(self.configuration == "reference"),  # 1: coordinates are the reference ones
+            **self._world,
+        }
+        self._files[name].write(f"{self._vtk}/{file}", grid, numbers)
+        self._old.discard(file)
+        self._collections[name].add(at, f"vtk/{file}")
+
+
+def _size(grid: Grid) -> int:
+    """Bytes of its fields."""
+    return sum(array.nbytes for fields in (grid.point_data, grid.cell_data) for array in fields.values())
+
+
+class SeriesTime:
+    """Strictly increasing times for a PVD: the cycle's time, plus `PASS_OFFSET` load steps for each growth pass."""
+
+    def __init__(self) -> None:
+        self._last = -float("inf")
+        self._physical = -float("inf")
+        self._step = 1.0
+
+    def of(self, cycle: Cycle) -> float:
+        """The time to list ``cycle`` under; call once a cycle, in order."""
+        now = float(cycle.state.time)
+        advance = now - self._physical
+        if 0 < advance < float("inf"):
+            self._step = advance
+        self._physical = now
+        at = now + cycle.growth_pass * PASS_OFFSET * self._step
+        if not at > self._last:
+            at = max(self._last + PASS_OFFSET * self._step, math.nextafter(self._last, math.inf))
+        self._last = at
+        return at

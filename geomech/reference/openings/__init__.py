@@ -1,0 +1,1 @@
+"""Holes, boreholes, tunnels and roof blocks."""

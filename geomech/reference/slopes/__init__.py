@@ -1,0 +1,1 @@
+"""Limit equilibrium and fracture mechanics of slopes."""

@@ -1,0 +1,1 @@
+"""Specimens of the literature, with their published values."""

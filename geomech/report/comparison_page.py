@@ -1,0 +1,122 @@
+"""The page of several runs side by side: one table, what differs between their scenes, a picture and the curves of
+each."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..output.reading import Run
+from .page import Page
+from .run_page import LISTED
+from .table import shown, table
+
+#: Keys of a scene that say where it lies, not what it is.
+_NOT_TOLD = ("title", "geometry.model")
+#: So many runs are shown in pictures.
+PICTURED = 12
+
+
+def page_of_runs(runs: Sequence[Run], folder: Path) -> Page:
+    """The page of ``runs``, which lie in ``folder``."""
+    page = Page(_title(runs), f"{len(runs)} runs in {folder}")
+    page.section("Side by side")
+    add_table(page, runs)
+    different = differences(runs)
+    if different:
+        page.section("What differs between their scenes")
+        page.table(
+            ["key", *(run.folder.name for run in runs)],
+            [[key, *values] for key, values in list(different.items())[:LISTED]],
+        )
+        if len(different) > LISTED:
+            page.text(f"{len(different) - LISTED} more keys differ.")
+    add_ends(page, runs)
+    add_compared_curves(page, runs)
+    _add_times(page, runs)
+    page.section("How to make this page again")
+    page.code(f"geomech report {folder}\n" + "\n".join(f"geomech report {run.folder}" for run in runs))
+    return page
+
+
+def _add_times(page: Page, runs: Sequence[Run]) -> None:
+    spent = [run.summary.get("seconds", {}) for run in runs]
+    phases = sorted(
+        {phase for one in spent for phase in one}, key=lambda name: -max(one.get(name, 0.0) for one in spent)
+    )
+    if phases:
+        page.section("Where the time went")
+        page.table(
+            ["phase, s", *(run.folder.name for run in runs)],
+            [[phase, *(one.get(phase) for one in spent)] for phase in phases],
+        )
+
+
+def add_table(page: Page, runs: Sequence[Run]) -> None:
+    """The table that the terminal shows, columns that no run fills left out."""
+    headers, *rows = shown(table(runs))
+    page.table(headers, rows)
+
+
+def differences(runs: Sequence[Run]) -> dict[str, list[Any]]:
+    """Key of the scene → its value in every run (None: not there), for keys whose values are not all the same."""
+    flat = [dict(_leaves(run.scene)) for run in runs]
+    keys = dict.fromkeys(key for leaves in flat for key in leaves if not key.startswith(_NOT_TOLD))
+    found = {key: [leaves.get(key) for leaves in flat] for key in keys}
+    return {key: values for key, values in found.items() if any(value != values[0] for value in values)}
+
+
+def _leaves(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _leaves(inner, f"{place}.{key}" if place else key)
+    elif isinstance(value, list) and any(isinstance(inner, (dict, list)) for inner in value):
+        for k, inner in enumerate(value):
+            yield from _leaves(inner, f"{place}.{k}")
+    else:
+        yield place, str(value) if isinstance(value, list) else value
+
+
+def add_ends(page: Page, runs: Sequence[Run], title: str = "Pictures") -> None:
+    """How every run ended, in pictures, where a window can be opened to draw them."""
+    from ..render.pictures.look import final_cycle, look
+    from ..render.pictures.offscreen import RenderingUnavailable
+    from ..render.pictures.picture import picture
+
+    pictured = [run for run in runs if len(run.history) and run.grids("blocks")][:PICTURED]
+    if not pictured:
+        return
+    page.section(title)
+    with tempfile.TemporaryDirectory() as folder:
+        shown = []
+        for k, run in enumerate(pictured):
+            last = final_cycle(run)
+            asked = run.scene.get("render", {}).get("component", "yy")
+            try:
+                path = picture(run, Path(folder) / f"{k}.png", look(run, last, component=asked, width=560), last)
+            except RenderingUnavailable as missing:
+                page.text(f"No pictures: {missing}")
+                return
+            shown.append((path, f"{run.folder.name}: {run.summary.get('end', 'not ended')}"))
+        page.figures(shown, least_rem=13)
+    if len(runs) > PICTURED:
+        page.text(f"{len(runs) - PICTURED} more runs are not shown.")
+
+
+def add_compared_curves(page: Page, runs: Sequence[Run]) -> None:
+    """Load against strain of all runs in one drawing, where they have them."""
+    from ..render.curves.plots import compared
+
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = compared({run.folder.name: run for run in runs}, Path(folder) / "compared.svg")
+        if drawn is not None:
+            page.section("Curves")
+            page.figures([(drawn, "Load and axial strain of every run.")], least_rem=24)
+
+
+def _title(runs: Sequence[Run]) -> str:
+    """What the runs' titles have in common, up to a comma."""
+    titles = {run.title.rsplit(",", 1)[0] for run in runs}
+    return titles.pop() if len(titles) == 1 else "Runs side by side"

@@ -1,0 +1,129 @@
+"""Files with traces of the field, [[geometry.traces]], as parts of the drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path as FilePath
+from typing import Any
+
+from ...shapes.traces.field_lines import (
+    UNFINISHED,
+    FieldDrawing,
+    FieldFile,
+    FieldFileError,
+    Named,
+    drawing_of_lines,
+    named_lines,
+)
+from ...shapes.traces.trace_tables import read_field_file
+from ..errors import Fault
+from ..locator import Path
+from ..tables.geometry import Geometry
+from ..validation import nearest
+
+
+def read_traces(
+    geometry: Geometry,
+    folder: FilePath,
+    add: Callable,
+    place: Callable[[Path], str],
+    faults: list[Fault],
+    warnings: list[Fault],
+) -> tuple[bool, dict[str, Any] | None]:
+    """Give what all files hold to ``add`` (a `FieldDrawing`, a function from (part, index) to its path in the scene and
+    its place in the file, and the names of zones that its joints cut); False after saying why one cannot be read. Also
+    the coordinate reference system of the first file that says one, as GeoJSON does."""
+    every: list[Named] = []
+    by_file: dict[int, list[Named]] = {}
+    path_of: dict[str, Path] = {}
+    systems: dict[str, Any] = {}
+    sound = True
+    for k, entry in enumerate(geometry.traces):
+        source: Path = ("geometry", "traces", k, "file")
+        try:
+            file = _read(
+                folder / entry.file, entry.unit or geometry.unit, geometry.chord_tolerance_m, entry.set_property
+            )
+        except FieldFileError as error:
+            faults.append(Fault(place(source), error.message, error.way_out))
+            sound = False
+            continue
+        warnings += [Fault(place(source), message, way_out) for message, way_out in file.warnings]
+        if file.crs is not None:
+            systems[entry.file] = file.crs
+            first = next(iter(systems))
+            if file.crs != systems[first]:
+                warnings.append(
+                    Fault(
+                        place(source),
+                        f"{entry.file} has another coordinate reference system than {first}",
+                        "export both in one: coordinates are taken as they are",
+                    )
+                )
+        named, idle, left = named_lines(file, entry.layers, entry.name, entry.kind)
+        present = list(dict.fromkeys(line.layer for line in file.lines))
+        for pattern, said in entry.layers.items():
+            if said.strip().lower() in UNFINISHED:
+                faults.append(
+                    Fault(
+                        place(("geometry", "traces", k, "layers", pattern)),
+                        f"{said!r} wants a name after it",
+                        f'write "{said}:{"x" if said == "guided" else "NAME"}", or "" to leave it to the name of the '
+                        "layer",
+                    )
+                )
+        for pattern in idle:
+            faults.append(
+                Fault(
+                    place(("geometry", "traces", k, "layers", pattern)),
+                    f"{FilePath(entry.file).name} has no layer {pattern!r}, or one before it means them all",
+                    nearest(pattern, present),
+                )
+            )
+        if not named:
+            what = f"its layers are {', '.join(map(repr, left))}" if left else "it is empty"
+            warnings.append(
+                Fault(place(source), f"{FilePath(entry.file).name} gives no lines: {what}", "name them in `layers`")
+            )
+        every += named
+        by_file[k] = [item for item in named if item.role == "joint"]
+        path_of.update((item.line.place, source) for item in named)
+    crs = next(iter(systems.values()), None)
+    if not sound:
+        return False, crs
+    try:
+        # Joints by file, for each may cut zones of its own; outlines of all files together, for they may close one
+        # another.
+        joints = {k: drawing_of_lines(own) for k, own in by_file.items()}
+        drawn = drawing_of_lines([item for item in every if item.role != "joint"])
+    except FieldFileError as error:
+        at = next(
+            (path for text, path in path_of.items() if error.message.startswith(f"{text}:")), ("geometry", "traces")
+        )
+        faults.append(Fault(place(at), error.message, error.way_out))
+        return False, crs
+
+    for part, zones in ((drawn, ()), *((own, geometry.traces[k].zones) for k, own in joints.items())):
+        for message, way_out in part.warnings:
+            at = next(
+                (path for text, path in path_of.items() if message.startswith(f"{text}:")), ("geometry", "traces")
+            )
+            warnings.append(Fault(place(at), message, way_out))
+        add(part, partial(_source, part, path_of), zones)
+    return True, crs
+
+
+def _read(path: FilePath, unit: str | None, chord_tolerance: float | None, set_property: str) -> FieldFile:
+    """The file; one of a CAD program in a process of its own."""
+    arguments = {"unit": unit, "chord_tolerance": chord_tolerance, "set_property": set_property}
+    if path.suffix.lower() == ".dxf" and path.is_file():
+        from ...shapes.gmsh_models.isolated_reader import field_file_apart
+
+        return field_file_apart(path, arguments)
+    return read_field_file(path, **arguments)
+
+
+def _source(drawn: FieldDrawing, path_of: dict[str, Path], part: str, index: int) -> tuple[Path, str]:
+    text = drawn.places.get((part, index), "")
+    return path_of.get(text, ("geometry", "traces")), text

@@ -1,0 +1,91 @@
+"""Which blocks stand still or slide along an axis: by zone, or by the names of edges that they have after the cut."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..checks.check import Check
+from ..drawing import Drawing
+from ..tables import SceneTables
+
+#: Edges called "fixed" or "fixed:NAME" fix the blocks that have them, "guided:x" or "guided:x:NAME" let them move along
+#: x.
+FIXED, GUIDED = "fixed", "guided"
+#: What a block keeps that is guided along an axis: it moves along it, turns, and strains across nothing.
+_HELD = {"x": [1, 2, 5], "y": [0, 2, 5]}
+
+
+def holds(name: str) -> bool:
+    """Whether edges of this ``name`` hold the blocks they are on."""
+    parts = name.split(":")
+    return parts[0] == FIXED or (parts[0] == GUIDED and len(parts) > 1 and parts[1] in _HELD)
+
+
+def fixed_blocks(tables: SceneTables, drawing: Drawing) -> np.ndarray:
+    """(n_blocks,) whether each block stands still."""
+    zones = tables.zones or {}
+    # Rock without an end does not move either; its cracks do.
+    fixed = np.array(
+        [zone in zones and (zones[zone].fixed or zones[zone].body != "block") for zone in drawing.zones], dtype=bool
+    )
+    for name in drawing.blocks.edge_names:
+        if name.partition(":")[0] == FIXED:
+            fixed[drawing.blocks.vertex_block[drawing.blocks.edges_named(name)]] = True
+    return fixed
+
+
+def first_velocities(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+    """(n_blocks, 2) m/s as the run begins; None where all are at rest."""
+    zones = tables.zones or {}
+    given = [zones[zone].velocity_m_s if zone in zones else None for zone in drawing.zones]
+    found = np.array([(0.0, 0.0) if velocity is None else velocity for velocity in given], dtype=float).reshape(-1, 2)
+    found[fixed_blocks(tables, drawing)] = 0.0
+    return found if found.any() else None
+
+
+def held_unknowns(tables: SceneTables, drawing: Drawing) -> np.ndarray | None:
+    """(n_blocks, 6) which unknowns of guided blocks stay zero; None where no block is guided."""
+    held = np.zeros((len(drawing.zones), 6), bool)
+    zones = tables.zones or {}
+    for block, zone in enumerate(drawing.zones):
+        if zone in zones and zones[zone].guided is not None:
+            held[block, _HELD[zones[zone].guided]] = True
+    for name in drawing.blocks.edge_names:
+        if holds(name) and name.split(":")[0] == GUIDED:
+            blocks = np.unique(drawing.blocks.vertex_block[drawing.blocks.edges_named(name)])
+            held[np.ix_(blocks, _HELD[name.split(":")[1]])] = True
+    return held if held.any() else None
+
+
+def check_holding(c: Check) -> None:
+    """Edges that would guide must say along what."""
+    for name in c.drawing.blocks.edge_names:
+        if name.partition(":")[0] == GUIDED and not holds(name):
+            c.refuse(
+                ("geometry",),
+                f"edges are called {name!r}, and along what their blocks are guided is not said",
+                'call them "guided:x" or "guided:y"',
+            )
+
+
+def check_borne(c: Check) -> None:
+    """Weight wants something that bears it: without it all blocks fall together, and nothing else happens."""
+    t, blocks = c.tables, c.drawing.blocks
+    if t.loads is None or t.zones is None or not any(t.loads.gravity_m_s2):
+        return
+    loads = t.loads
+    pushed = (
+        loads.tractions or loads.forces or loads.motions or loads.point_motions or loads.bolts
+        or loads.viscous_boundaries or loads.water is not None
+    )  # fmt: skip
+    if pushed or fixed_blocks(t, c.drawing).any() or held_unknowns(t, c.drawing) is not None:
+        return
+    lowest = int(blocks.vertex_block[np.argmin(blocks.vertices @ -np.array(loads.gravity_m_s2))])
+    others = blocks.n_blocks - 1
+    falls = f" and {others} more blocks" if others > 1 else " and the other block" if others else ""
+    c.refuse(
+        ("loads", "gravity_m_s2"),
+        f"nothing bears the weight of {blocks.names[lowest]!r}{falls}: no block is fixed or guided, and no load, "
+        "motion, bolt or water holds them",
+        "say `fixed = true` in the [zones.NAME] of what they stand on, or draw it and call its edges `fixed`",
+    )

@@ -1,0 +1,88 @@
+"""Joint laws from their tables, and what is wrong with those that make none."""
+
+from __future__ import annotations
+
+import math
+
+from ...model import JointLaw, Roughness
+from ..checks.check import Check
+from ..tables.rock import JointTable
+
+#: Keys of a rough joint that mean nothing without its roughness.
+_OF_ROUGHNESS = ("joint_length_m", "sample_length_m", "stiffness_from_peak_slip")
+#: What a law that was refused says of itself, the key that it is about, and the way out.
+_FAULTS = (
+    ("residual friction angle (", "residual_friction_angle_deg", "make it at most friction_angle_deg"),
+    ("residual cohesion (", "residual_cohesion_pa", "make it at most cohesion_pa"),
+    ("dilation angle (", "dilation_angle_deg", "make it at most friction_angle_deg"),
+    ("max_closure needs", "max_closure_m", "add normal_stiffness_pa_per_m, the stiffness where closure begins"),
+    ("cohesion does not go", "cohesion_pa", "leave it out, or leave out jrc and jcs_pa"),
+    ("tensile_strength does not go", "tensile_strength_pa", "leave it out, or leave out jrc and jcs_pa"),
+    ("residual_friction_angle does not", "residual_friction_angle_deg", "friction_angle_deg is the residual one"),
+    ("residual_cohesion does not go", "residual_cohesion_pa", "leave it out, or leave out jrc and jcs_pa"),
+    ("softening_slip does not go", "softening_slip_m", "leave it out: roughness wears off by itself"),
+    ("dilation_angle does not go", "dilation_angle_deg", "leave it out: roughness dilates by itself"),
+    ("dilation_slip does not go", "dilation_slip_m", "leave it out: roughness dilates by itself"),
+    ("shear_stiffness is given", "shear_stiffness_pa_per_m", "leave it out, or stiffness_from_peak_slip"),
+    ("below 70°", "friction_angle_deg", "with jrc it is the angle that is left when the roughness is worn off"),
+    ("length of a rough joint must not be below", "joint_length_m", "leave it out: the sample's values then hold"),
+)
+
+
+def joint_law(name: str, joint: JointTable) -> JointLaw:
+    """The law of table ``joint``. Raises ValueError for values that do not go together."""
+    rough = None
+    if joint.jrc is not None:
+        rough = Roughness(
+            joint.jrc,
+            joint.jcs_pa,
+            length=joint.joint_length_m,
+            sample_length=joint.sample_length_m,
+            from_peak_slip=joint.stiffness_from_peak_slip,
+        )
+    residual = joint.residual_friction_angle_deg
+    return JointLaw(
+        name,
+        friction_angle=math.radians(joint.friction_angle_deg),
+        cohesion=joint.cohesion_pa,
+        tensile_strength=joint.tensile_strength_pa,
+        normal_stiffness=joint.normal_stiffness_pa_per_m,
+        shear_stiffness=joint.shear_stiffness_pa_per_m,
+        residual_friction_angle=None if residual is None else math.radians(residual),
+        residual_cohesion=joint.residual_cohesion_pa,
+        softening_slip=joint.softening_slip_m,
+        dilation_angle=math.radians(joint.dilation_angle_deg),
+        dilation_slip=math.inf if joint.dilation_slip_m is None else joint.dilation_slip_m,
+        roughness=rough,
+        max_closure=joint.max_closure_m,
+    )
+
+
+def check_joints(c: Check) -> None:
+    """Values of a joint that do not go together, and laws that crack faces cannot follow."""
+    laws: dict[str, JointLaw] = {}
+    for name, joint in (c.tables.joints or {}).items():
+        missing = {"jrc": "jcs_pa", "jcs_pa": "jrc"}
+        for given, other in missing.items():
+            if getattr(joint, given) is not None and getattr(joint, other) is None:
+                c.refuse(("joints", name, given), f"joint {name!r} has {given} but no {other}", f"add {other}")
+        # A scene written out with all its defaults is right as well.
+        usual = JointTable()
+        idle = [key for key in _OF_ROUGHNESS if joint.jrc is None and getattr(joint, key) != getattr(usual, key)]
+        for key in idle:
+            c.refuse(("joints", name, key), f"joint {name!r} has {key} but no roughness", "add jrc and jcs_pa")
+        if idle or (joint.jrc is None) != (joint.jcs_pa is None):
+            continue
+        try:
+            laws[name] = joint_law(name, joint)
+        except ValueError as error:
+            key, way = next(((key, way) for said, key, way in _FAULTS if said in str(error)), ("", ""))
+            c.refuse(("joints", name, key) if key else ("joints", name), str(error), way)
+    for name, crack in (c.tables.cracks or {}).items():
+        if crack.joint in laws and not laws[crack.joint].straight:
+            c.refuse(
+                ("cracks", name, "joint"),
+                f"crack faces cannot follow joint {crack.joint!r}: they know neither residual friction, softening, "
+                "dilation, roughness nor hyperbolic closure",
+                "name a joint with friction_angle_deg, cohesion_pa, tensile_strength_pa and stiffnesses alone",
+            )

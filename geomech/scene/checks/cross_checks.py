@@ -1,0 +1,413 @@
+"""Checks across the sections of a scene: names that must exist, points that must be in rock, times and lengths."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from ...model import CHANGES, Blocks
+from ...shapes import cutting_cracks
+from ..assembly.fixed_blocks import check_borne, check_holding, fixed_blocks
+from ..assembly.joint_laws import check_joints
+from ..locator import Path
+from ..tables import SceneTables
+from ..validation import nearest
+from .check import Check
+from .edges import check_edges
+
+#: No tip advances by less, in units of the rock's largest side: coordinates of a drawing keep twelve digits.
+SHORTEST_ADVANCE = 1e-9
+
+
+def check(c: Check) -> None:
+    """Run every check that the sections at hand allow."""
+    _times(c)
+    _growth_lengths(c)
+    _names_once(c)
+    _material_names_exist(c)
+    if c.drawing is not None:
+        _zones(c)
+        _cracks(c)
+    _crack_joints(c)
+    check_joints(c)
+    if c.drawing is not None and c.drawing.blocks is not None:
+        _whole(c)
+        check_holding(c)
+        check_borne(c)
+        check_edges(c)
+        _points(c)
+        _toughness(c)
+        _strength(c)
+        _rigid(c)
+    _statics(c)
+    _stepping(c)
+    _told(c)
+
+
+def _times(c: Check) -> None:
+    if c.tables.run is not None and c.tables.dda is not None and c.tables.dda.time_step_s > c.tables.run.end_time_s:
+        # A time step that is not in the file cannot be pointed at.
+        given = "time_step_s" in c.data.get("dda", {})
+        c.refuse(
+            ("dda", "time_step_s") if given else ("run", "end_time_s"),
+            f"the time step ({c.tables.dda.time_step_s:g} s) is longer than the whole run "
+            f"({c.tables.run.end_time_s:g} s)",
+            "shorten dda.time_step_s, or raise run.end_time_s",
+        )
+
+
+def _statics(c: Check) -> None:
+    """What only static or only dynamic runs can do."""
+    dda, loads = c.tables.dda, c.tables.loads
+    if dda is None:
+        return
+    if dda.equilibrium == "loads" and dda.dynamic_factor > 0:
+        c.refuse(
+            ("dda", "equilibrium"),
+            "equilibrium at every load is for static runs, and dda.dynamic_factor is not 0",
+            'say equilibrium = "start" to begin at rest, or dynamic_factor = 0',
+        )
+    if loads is not None and loads.viscous_boundaries and dda.dynamic_factor == 0:
+        c.warn(
+            ("loads", "viscous_boundaries"),
+            "viscous boundaries do nothing in a static run",
+            "set dda.dynamic_factor = 1, or leave them out",
+        )
+
+
+def _stepping(c: Check) -> None:
+    """What steps from event to event can do, and what only they can."""
+    run, dda = c.tables.run, c.tables.dda
+    if run is None or dda is None:
+        return
+    if "mechanism" in run.stop_at and dda.dynamic_factor > 0:
+        c.refuse(
+            ("run", "stop_at"),
+            '"mechanism" is told of in static runs only, and dda.dynamic_factor is not 0: in dynamics blocks just move',
+            "leave it out, or set dda.dynamic_factor = 0",
+        )
+    if run.stepping == "events":
+        for key, hinders, way_out in (
+            ("dynamic_factor", dda.dynamic_factor > 0, "set dda.dynamic_factor = 0"),
+            ("equilibrium", dda.equilibrium == "loads", 'say dda.equilibrium = "start", or ""'),
+            (
+                "automatic_time_step",
+                dda.automatic_time_step,
+                "leave dda.automatic_time_step out: steps grow by themselves",
+            ),
+        ):
+            if hinders:
+                value = getattr(dda, key)
+                c.refuse(
+                    ("run", "stepping"),
+                    f"steps to the next event are for static runs, and dda.{key} is {str(value).lower()}",
+                    f'{way_out}, or stepping = "fixed"',
+                )
+        return
+    for key, belongs in (
+        ("control", run.control != "load"),
+        ("longest_step_s", run.longest_step_s is not None),
+    ):
+        if belongs:
+            c.refuse(("run", key), f'run.{key} belongs to stepping "events"', 'set run.stepping = "events"')
+
+
+def _told(c: Check) -> None:
+    """What ends a run has to be told of."""
+    run = c.tables.run
+    if run is None or (run.events is None and run.stepping == "events") or set(run.events or ()) - {"tips"}:
+        return
+    for kind in sorted(set(run.stop_at) & set(CHANGES)):
+        if run.events is None:
+            what, way_out = (
+                "fixed steps tell of these where run.events names them",
+                'say run.events = ["contacts", "faces"]',
+            )
+        else:
+            what, way_out = "run.events names neither", 'add "contacts" or "faces" to run.events'
+        c.refuse(("run", "stop_at"), f'"{kind}" is of contacts and crack faces, and {what}', way_out)
+
+
+def _growth_lengths(c: Check) -> None:
+    growth = c.tables.growth
+    if growth is not None and growth.trial_kink_m and growth.criterion != "f":
+        c.refuse(
+            ("growth", "trial_kink_m"),
+            f'trial kinks are judged by the criterion "f", not by "{growth.criterion}"',
+            'leave it out, or set growth.criterion = "f"',
+        )
+    if growth is not None and c.drawing is not None and c.drawing.blocks is not None:
+        size = float(np.ptp(c.drawing.blocks.vertices, axis=0).max())
+        for key in ("increment_m", "min_increment_m"):
+            value = getattr(growth, key)
+            if value is not None and value < SHORTEST_ADVANCE * size:
+                c.refuse(
+                    ("growth", key),
+                    f"an advance of {value:g} m is lost in the round-off of coordinates of {size:g} m",
+                    f"make it at least {SHORTEST_ADVANCE * size:.1g} m; a tenth of the shortest crack is usual",
+                )
+    if growth is None or growth.increment_m is None or growth.min_increment_m is None:
+        return
+    if growth.min_increment_m > growth.increment_m:
+        c.refuse(
+            ("growth", "min_increment_m"),
+            f"the shortest advance ({growth.min_increment_m:g} m) is longer than the longest, {growth.increment_m:g} m",
+            "make it at most growth.increment_m",
+        )
+
+
+def _names_once(c: Check) -> None:
+    seen: set[str] = set()
+    for k, monitor in enumerate(c.tables.monitors or ()):
+        if monitor.name in seen:
+            c.refuse(
+                ("monitors", k, "name"), f"there are two monitors called {monitor.name!r}", "give each its own name"
+            )
+        seen.add(monitor.name)
+
+
+def _material_names(c: Check) -> list[str]:
+    materials = c.data.get("materials")
+    return list(materials) if isinstance(materials, dict) else []
+
+
+def _material_names_exist(c: Check) -> None:
+    known = _material_names(c)
+    for name, zone in (c.tables.zones or {}).items():
+        if zone.material is not None and zone.material not in known:
+            c.refuse(
+                ("zones", name, "material"), f"there is no material {zone.material!r}", nearest(zone.material, known)
+            )
+
+
+def _zones(c: Check) -> None:
+    known, materials = list(dict.fromkeys(c.drawing.zones)), _material_names(c)
+    given = c.tables.zones
+    if given is None:
+        return
+    for name in given:
+        if name not in known:
+            # A zone that has its table already is not the one that is meant.
+            free = [zone for zone in known if zone not in given]
+            c.refuse(
+                ("zones", name),
+                f"the geometry has no zone {name!r}",
+                next((told for told in map(partial(nearest, name), (free, known)) if "did you" in told), _are(known)),
+            )
+    if len(materials) > 1:
+        for name in known:
+            if name not in given or given[name].material is None:
+                c.refuse(
+                    ("zones", name),
+                    f"zone {name!r} has no material",
+                    f'add [zones.{name}] with material = "…": {", ".join(materials)}',
+                )
+    if c.tables.dda is not None and c.tables.dda.dynamic_factor == 0:
+        for name in (name for name, zone in given.items() if zone.velocity_m_s is not None):
+            c.refuse(
+                ("zones", name, "velocity_m_s"),
+                "a static run carries no velocity from one step to the next",
+                "leave it out, or set dda.dynamic_factor = 1",
+            )
+    used = {zone.material for zone in given.values()}
+    for name in materials if len(materials) > 1 else ():
+        if name not in used:
+            c.warn(("materials", name), f"no zone is made of {name!r}", "remove it, or name it in [zones]")
+
+
+def _cracks(c: Check) -> None:
+    given = c.tables.cracks or {}
+    for name in given:
+        if name != "default" and name not in c.drawing.cracks_drawn:
+            known = list(c.drawing.cracks_drawn)
+            free = [crack for crack in known if crack not in given]
+            c.refuse(
+                ("cracks", name), f"the geometry has no crack {name!r}", nearest(name, free) if free else _are(known)
+            )
+
+
+def _crack_joints(c: Check) -> None:
+    """The laws of crack faces must be there, and faces that are cemented must touch."""
+    for name, crack in (c.tables.cracks or {}).items():
+        if crack.joint is None or c.tables.joints is None:
+            continue
+        joint = c.tables.joints.get(crack.joint)
+        if joint is None:
+            c.refuse(
+                ("cracks", name, "joint"),
+                f"there is no joint {crack.joint!r}",
+                nearest(crack.joint, list(c.tables.joints)),
+            )
+        elif joint.tensile_strength_pa > 0 and crack.aperture not in ("closed", 0):
+            c.refuse(
+                ("cracks", name, "joint"),
+                f"faces with an aperture cannot have the tensile strength of joint {crack.joint!r}",
+                'say aperture = "closed", or name a joint without tensile strength',
+            )
+
+
+def _are(known: list[str]) -> str:
+    return f"there is {', '.join(known)}" if known else "there is none"
+
+
+def _whole(c: Check) -> None:
+    """What drawn cracks enclose is a block of its own, and must be drawn as one."""
+    for crack, block in cutting_cracks(c.drawing.blocks, c.drawing.cracks):
+        c.refuse(
+            c.drawing.path_of_crack(c.drawing.cracks.names[crack]),
+            f"crack {c.drawing.cracks.names[crack]!r} cuts a piece off zone {c.drawing.zones[block]!r}, alone or with "
+            "the cracks before it",
+            "draw the pieces as zones of their own: blocks part along their outlines",
+        )
+
+
+def blocks_at(blocks: Blocks, point: tuple[float, float]) -> list[int]:
+    """The blocks that hold ``point``, those whose outline it touches included (to 1e-6 of the drawing's size)."""
+    import shapely
+
+    slack = 1e-6 * np.ptp(blocks.vertices, axis=0).max()
+    shapes = [shapely.Polygon(blocks.loops(b)[0], blocks.loops(b)[1:]) for b in range(blocks.n_blocks)]
+    return np.flatnonzero(shapely.distance(shapely.Point(point), np.array(shapes)) <= slack).tolist()
+
+
+def carrier(c: Check, path: Path, what: str, point, zone: str | None, among: list[int] | None = None) -> int:
+    """The block that carries ``point``; −1 after saying why there is none."""
+    known = list(dict.fromkeys(c.drawing.zones))
+    if zone is not None and zone not in known:
+        c.refuse(path[:-1] + ("zone",), f"the geometry has no zone {zone!r}", nearest(zone, known))
+        return -1
+    at = blocks_at(c.drawing.blocks, point)
+    origin = np.array(c.drawing.origin)
+    x, y = np.add(point, origin)
+    here = f"({x:.10g}, {y:.10g})" if origin.any() else f"({x:g}, {y:g})"
+    if zone is not None:
+        inside, at = at, [b for b in at if c.drawing.zones[b] == zone]
+        if inside and not at:
+            c.refuse(path, f"{what} {here} is not in zone {zone!r}", "move it, or name its own zone")
+            return -1
+    if among is not None and len(at) > 1:
+        at = [b for b in at if b in among] or at
+    if not at:
+        low, high = (end(c.drawing.blocks.vertices, axis=0) + origin for end in (np.min, np.max))
+        digits = ".10g" if origin.any() else "g"
+        c.refuse(
+            path,
+            f"{what} {here} is outside all blocks",
+            f"the blocks span x from {low[0]:{digits}} to {high[0]:{digits}} m and y from {low[1]:{digits}} to "
+            f"{high[1]:{digits}} m",
+        )
+        return -1
+    if len(at) > 1:
+        names = [c.drawing.blocks.names[b] for b in at]
+        way = 'add zone = "…"' if len({c.drawing.zones[b] for b in at}) > 1 else "move it into one of them"
+        c.refuse(path, f"{what} {here} lies where blocks {', '.join(names)} touch", way)
+        return -1
+    return at[0]
+
+
+def gauge_carriers(c: Check) -> tuple[int, int] | None:
+    """The blocks that carry the gauge's ends; where an end lies between two blocks, the one that holds the other."""
+    gauge = c.tables.gauge
+    if gauge is None:
+        return None
+    if gauge.start == gauge.to:
+        c.refuse(("gauge", "to"), "both ends of the gauge are the same point", "give two different points")
+        return None
+    both = [set(blocks_at(c.drawing.blocks, p)) for p in (gauge.start, gauge.to)]
+    common = sorted(both[0] & both[1])
+    return (
+        carrier(c, ("gauge", "from"), "the gauge's end", gauge.start, gauge.zone, common),
+        carrier(c, ("gauge", "to"), "the gauge's end", gauge.to, gauge.zone, common),
+    )
+
+
+def _points(c: Check) -> None:
+    gauge_carriers(c)
+    for k, monitor in enumerate(c.tables.monitors or ()):
+        carrier(c, ("monitors", k, "at"), f"monitor {monitor.name!r}", monitor.at, monitor.zone)
+    if c.tables.loads is not None:
+        for k, force in enumerate(c.tables.loads.forces):
+            carrier(c, ("loads", "forces", k, "at"), "the point of a force", force.at, force.zone)
+
+
+def material_of(tables: SceneTables, zone: str) -> str:
+    """The name of the material that ``zone`` is made of."""
+    entry = tables.zones.get(zone)
+    return entry.material if entry is not None and entry.material is not None else next(iter(tables.materials))
+
+
+def _strength(c: Check) -> None:
+    t = c.tables
+    if t.growth is None or t.materials is None:
+        return
+    strong = [m for m in t.materials.values() if m.tensile_strength_pa is not None or m.cohesion_pa is not None]
+    if t.growth.enabled and t.growth.initiation and not strong:
+        c.refuse(
+            ("growth", "initiation"),
+            "cracks are to be born, but no material has a strength that could be reached",
+            "add tensile_strength_pa or cohesion_pa to a material",
+        )
+    for name, m in t.materials.items() if t.growth.enabled and t.growth.initiation else ():
+        if m in strong and m.k_ic_pa_sqrt_m is None:
+            c.refuse(
+                ("materials", name, "k_ic_pa_sqrt_m"),
+                f"material {name!r} has no fracture toughness, and cracks that are born in it may grow",
+                f"add k_ic_pa_sqrt_m to [materials.{name}], Pa √m (1e6 to 2.5e6 for most rocks)",
+            )
+
+
+def _rigid(c: Check) -> None:
+    """Cracks open in rock that strains."""
+    t = c.tables
+    if t.materials is None or t.zones is None:
+        return
+    for block in dict.fromkeys(c.drawing.cracks.block.tolist()):
+        name = material_of(t, c.drawing.zones[block])
+        if name in t.materials and t.materials[name].rigid:
+            c.refuse(
+                ("materials", name, "rigid"),
+                f"zone {c.drawing.zones[block]!r} holds a crack, but its material {name!r} is rigid",
+                "take rigid = true away, or give the zone a material of its own",
+            )
+
+
+def _block_or_zone(t: SceneTables, zone: str) -> str:
+    return f"zone {zone!r}" if zone in t.zones and t.zones[zone].fixed else f"block of zone {zone!r}"
+
+
+def _toughness(c: Check) -> None:
+    t, cracks = c.tables, c.drawing.cracks
+    if t.growth is None or t.materials is None or t.zones is None:
+        return
+    needy: dict[str, str] = {}
+    fixed = fixed_blocks(t, c.drawing)
+    # Of a crack that several segments make, one warning.
+    for k, b in dict.fromkeys(zip(cracks.crack.tolist(), cracks.block.tolist())):
+        zone = c.drawing.zones[b]
+        name = material_of(t, zone)
+        if name in t.materials and t.materials[name].k_ic_pa_sqrt_m is None:
+            needy.setdefault(name, cracks.names[k])
+        if fixed[b] and not (zone in t.zones and t.zones[zone].body != "block"):
+            by_key = zone in t.zones and t.zones[zone].fixed
+            c.warn(
+                ("zones", zone, "fixed") if by_key else ("geometry",),
+                f"crack {cracks.names[k]!r} lies in the fixed {_block_or_zone(t, zone)}, which is not strained",
+                "let it move, or leave the crack out"
+                + ("" if by_key else ': edges called "fixed" hold the block')
+                + (
+                    '; joints that end in rock are none with geometry.dead_ends = "trim"'
+                    if t.geometry.joint_sets
+                    else ""
+                ),
+            )
+    joints = set() if t.geometry is None else {joint.name for joint in (*t.geometry.joints, *t.geometry.joint_sets)}
+    for name, crack in needy.items() if t.growth.enabled else ():
+        dead_end = crack.rpartition(" ")[0] in joints
+        c.refuse(
+            ("materials", name, "k_ic_pa_sqrt_m"),
+            f"material {name!r} has no fracture toughness, and crack {crack!r} in it may grow"
+            + (' (joints that end in rock are cracks: geometry.dead_ends = "cracks")' if dead_end else ""),
+            f"add k_ic_pa_sqrt_m to [materials.{name}], Pa √m (1e6 to 2.5e6 for most rocks), or set growth.enabled = "
+            "false" + (', or geometry.dead_ends = "trim"' if dead_end else ""),
+        )

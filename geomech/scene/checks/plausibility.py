@@ -1,0 +1,316 @@
+"""What a scene may say and hardly means: lengths in millimetres, moduli in GPa, crack ends that just miss a surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...conventions import outward_normal_of
+from ...model import counted
+from ...model.blocks.corners import LARGEST_SHARE, corner_lengths
+from ...model.blocks.polygon import distance_to_edges
+from ...shapes.block_cutting.rock_outline import ground_of
+from ..assembly.fixed_blocks import fixed_blocks, held_unknowns
+from ..assembly.load_functions import traction_history
+from ..tables import SceneTables
+from ..tables.loads import TractionTable
+from .check import Check
+from .cross_checks import material_of
+
+#: A crack end that misses an outline by less than this share of its crack's length was probably meant to reach it.
+NEAR_MISS = 0.01
+#: Largest sides of cracked specimens and outcrops that are likely, m.
+SIZES = 1e-3, 100.0
+#: Rocks are stiffer and tougher by orders of magnitude: Pa, and Pa √m. Below, the number is in GPa or MPa.
+LEAST_MODULUS, LEAST_TOUGHNESS = 1e6, 1e3
+#: The lightest pumice weighs more, kg/m³. Below (but for 0, which is meant), the number is in g/cm³ or t/m³.
+LEAST_DENSITY = 100.0
+#: A cracked block that lies on a fixed one with a side so many times as long as the block is deep behind it. Contacts
+#: press linearly there; on a rigid base true pressure keeps under its load. K is 2 % off for 1, 1.4 times too large for
+#: 1½, twice for 2, 5 times for 3 (`tests/scene/test_plausibility.py`).
+SHALLOW = 1.5
+#: What lies on one another: nearer than this part of the side, over no less than that part of it.
+LIES_ON, MOST_OF_IT = 1e-6, 0.5
+#: A block that moves is a sliver beside one so many times as large by area: in motion, pairs of such blocks shorten steps
+#: (`dda.step_control.relative_motion`) to less than a third of what those of the large one take.
+SLIVER = 1e-2
+#: A slope is where the ground at one end of the section stands above that at the other by this part of its height, and
+#: its back is free where that much of what rises is.
+SLOPES = 0.25
+#: Rock breaks at strains of 0.1 to 1 %, and elements and blocks here are linear elastic.
+LARGEST_STRAIN = 0.05
+
+
+def check_plausible(c: Check) -> None:
+    """Warn of what is likely to be a slip of units or of drawing; for scenes without faults."""
+    _materials(c)
+    _size(c)
+    _near_misses(c)
+    _strain(c)
+    _gravity(c)
+    _weightless(c)
+    _sudden_weight(c)
+    _shallow(c)
+    _increment(c)
+    _slivers(c)
+    _rounding(c)
+    _free_back(c)
+
+
+def _materials(c: Check) -> None:
+    for name, m in c.tables.materials.items():
+        if m.youngs_modulus_pa < LEAST_MODULUS:
+            c.warn(
+                ("materials", name, "youngs_modulus_pa"),
+                f"Young's modulus of {name!r} is {m.youngs_modulus_pa:g} Pa, less than that of soft rubber",
+                "the unit is Pa: 50 GPa is 50e9",
+            )
+        if m.k_ic_pa_sqrt_m is not None and m.k_ic_pa_sqrt_m < LEAST_TOUGHNESS:
+            c.warn(
+                ("materials", name, "k_ic_pa_sqrt_m"),
+                f"the fracture toughness of {name!r} is {m.k_ic_pa_sqrt_m:g} Pa √m, far below that of any rock",
+                "the unit is Pa √m: 1.2 MPa √m is 1.2e6",
+            )
+    # One light material among others of true weight is meant so: walls that only guide.
+    name, heaviest = max(c.tables.materials.items(), key=lambda item: item[1].density_kg_m3)
+    if 0 < heaviest.density_kg_m3 < LEAST_DENSITY:
+        c.warn(
+            ("materials", name, "density_kg_m3"),
+            f"the density of {name!r} is {heaviest.density_kg_m3:g} kg/m³, less than that of any rock",
+            "the unit is kg/m³: 2.6 t/m³ is 2600",
+        )
+
+
+def _slivers(c: Check) -> None:
+    """Small blocks beside large ones, which shorten the steps of a dynamic run."""
+    blocks = c.drawing.blocks
+    if c.tables.dda.dynamic_factor == 0 or blocks.n_blocks < 3:
+        return
+    areas = blocks.areas()
+    free = ~fixed_blocks(c.tables, c.drawing)
+    if not free.any():
+        return
+    usual = float(np.median(areas[free]))
+    slivers = np.flatnonzero(free & (areas < SLIVER * usual))
+    if not len(slivers):
+        return
+    least = int(slivers[np.argmin(areas[slivers])])
+    x, y = blocks.mean_vertices(blocks.vertices)[least]
+    others = f", and {len(slivers) - 1} more are below {SLIVER * usual:.2g} m²" if len(slivers) > 1 else ""
+    c.warn(
+        ("geometry",),
+        f"{blocks.names[least]!r} near x = {x:.4g}, y = {y:.4g} m has {areas[least]:.2g} m², where half of the blocks have "
+        f"more than {usual:.2g} m²{others}: where such slivers move fast, they shorten the time step",
+        f"merge them with their neighbours: geometry.smallest_block_m2 = {SLIVER * usual:.1g}",
+    )
+
+
+def _rounding(c: Check) -> None:
+    """A rounding length that was asked for and that the edges beside corners are too short for."""
+    if "corner_rounding" not in c.tables.dda.model_fields_set:
+        return
+    blocks, share = c.drawing.blocks, c.tables.dda.corner_rounding
+    rounding, longest = corner_lengths(blocks, share)
+    short = np.flatnonzero(longest < rounding)
+    if not len(short):
+        return
+    worst = int(short[np.argmin(longest[short] / rounding[short])])
+    x, y = blocks.vertices[worst]
+    c.warn(
+        ("dda", "corner_rounding"),
+        f"{len(short)} of {len(rounding)} corners have edges too short for {share:g} times √area and are rounded less: that "
+        f"of {blocks.names[int(blocks.vertex_block[worst])]!r} at x = {x:.4g}, y = {y:.4g} m over {longest[worst]:.2g} m "
+        f"instead of {rounding[worst]:.2g} m",
+        f"a corner is rounded over at most {LARGEST_SHARE:g} of its shorter edge",
+    )
+
+
+def _free_back(c: Check) -> None:
+    """A slope whose back is no rock: blocks leave it there as well as at the face."""
+    blocks, t = c.drawing.blocks, c.tables
+    fixed = fixed_blocks(t, c.drawing)
+    if not any(t.loads.gravity_m_s2) or blocks.n_blocks < 3 or not fixed.any() or fixed.all():
+        return
+    ground, low = ground_of(blocks), float(blocks.vertices[:, 1].min())
+    rise = float(ground[0, 1] - ground[-1, 1])
+    if abs(rise) < SLOPES * (ground[:, 1].max() - low):
+        return
+    side = 0 if rise > 0 else -1
+    x = float(ground[side, 0])
+    starts, ends = blocks.vertices, blocks.vertices[blocks.next_vertex]
+    loaded = {load.edge for load in (*t.loads.tractions, *t.loads.viscous_boundaries)}
+    held = held_unknowns(t, c.drawing)
+    free = ~fixed if held is None else ~fixed & ~held.any(axis=1)
+    near = 1e-6 * float(np.ptp(blocks.vertices, axis=0).max())
+    on = free[blocks.vertex_block] & (np.abs(starts[:, 0] - x) < near) & (np.abs(ends[:, 0] - x) < near)
+    on &= ~np.isin(blocks.edge_name, [k for k, name in enumerate(blocks.edge_names) if name in loaded])
+    height = float(np.abs(ends[on, 1] - starts[on, 1]).sum())
+    if height < SLOPES * abs(rise):
+        return
+    count = len(np.unique(blocks.vertex_block[on]))
+    x += c.drawing.origin[0]
+    c.warn(
+        ("geometry",),
+        f"nothing holds the back of the slope: {counted(count, 'block')} that may move {'is' if count == 1 else 'are'} free "
+        f"at x = {x:.6g} m over {height:.3g} m, and leave the rock there",
+        'draw fixed rock behind it ([zones.NAME] fixed = true), or call those edges "guided:y" or "fixed"',
+    )
+
+
+def _gravity(c: Check) -> None:
+    """Weight that points to the sky."""
+    loads, place = c.tables.loads, ("loads", "gravity_m_s2")
+    if not any(loads.gravity_m_s2):
+        return
+    if loads.gravity_m_s2[1] > 0:
+        c.warn(place, "gravity points upwards", "y runs up: the weight of rock is gravity_m_s2 = [0, -9.81]")
+
+
+def _increment(c: Check) -> None:
+    """An advance that crosses a block at a stroke has no path."""
+    increment, blocks = c.tables.growth.increment_m, c.drawing.blocks
+    if increment is None:
+        return
+    for b in np.unique(c.drawing.cracks.block).tolist():
+        own = blocks.vertices[blocks.vertex_start[b] : blocks.vertex_start[b + 1]]
+        largest = float(np.ptp(own, axis=0).max())
+        if increment > largest:
+            c.warn(
+                ("growth", "increment_m"),
+                f"an advance of {increment:g} m is more than all of {blocks.names[b]!r}, which is {largest:.3g} m: a "
+                "tip crosses it at a stroke",
+                "is it in metres? Unset, it is a tenth of the shortest crack",
+            )
+            return
+
+
+def _weightless(c: Check) -> None:
+    loads = c.tables.loads
+    if loads.in_situ is not None and loads.gravity_ramp_s > 0:
+        c.warn(
+            ("loads", "gravity_ramp_s"),
+            "blocks take their in-situ stress at time 0, when gravity is still 0: nothing bears it, and weight comes "
+            "on afterwards",
+            "leave `gravity_ramp_s` out",
+        )
+
+
+def _sudden_weight(c: Check) -> None:
+    """Rock bridges that feel all their weight, and in dynamics up to twice of it, in the first steps."""
+    t = c.tables
+    loads, bridges = t.loads, len(c.drawing.cracks.names) - len(t.geometry.cracks)
+    tough = all(m.k_ic_pa_sqrt_m is None for m in t.materials.values()) or not t.growth.enabled
+    eased = loads.gravity_ramp_s > 0 or loads.in_situ is not None or t.dda.equilibrium
+    if t.geometry.dead_ends != "cracks" or not t.geometry.joint_sets or bridges <= 0 or tough or eased:
+        return
+    if any(loads.gravity_m_s2) and t.dda.dynamic_factor > 0:
+        c.warn(
+            ("geometry", "dead_ends") if "dead_ends" in c.data["geometry"] else ("loads", "gravity_m_s2"),
+            f"all weight comes on at once, and {bridges} cracks before rock bridges feel up to twice of it: blocks may "
+            "split in the first steps that would stand",
+            'let it come by and by (loads.gravity_ramp_s), begin at rest (dda.equilibrium = "start"), or under the '
+            "stress of the "
+            "ground (loads.in_situ)",
+        )
+
+
+def _shallow(c: Check) -> None:
+    blocks = c.drawing.blocks
+    fixed = fixed_blocks(c.tables, c.drawing)
+    base = np.flatnonzero(fixed[blocks.vertex_block])
+    cracked = [b for b in np.unique(c.drawing.cracks.block).tolist() if not fixed[b]]
+    # In dynamics blocks come down on corners and edges: how they would rest is not what loads their cracks.
+    if not (len(base) and cracked) or c.tables.dda.dynamic_factor > 0 or c.tables.run.boundary_stress == "bases":
+        return
+    starts, ends = blocks.vertices[base], blocks.vertices[blocks.next_vertex[base]]
+    weight, found = np.array(c.tables.loads.gravity_m_s2), []
+    for start, side in blocks.sides.items():
+        block = int(blocks.vertex_block[start])
+        if block not in cracked:
+            continue
+        a, b = blocks.vertices[side[0]], blocks.vertices[side[-1]]
+        length = float(np.hypot(*(b - a)))
+        if weight.any() and weight @ outward_normal_of(b - a) < 0.5 * length * np.hypot(*weight):
+            continue  # a wall beside it, not the ground that bears it
+        corners = blocks.vertices[blocks.vertex_start[block] : blocks.vertex_start[block + 1]] - a
+        depth = np.abs((b - a)[0] * corners[:, 1] - (b - a)[1] * corners[:, 0]).max() / length
+        slenderness = length / float(depth)
+        if slenderness > SHALLOW and _overlap(a, b, starts, ends) > MOST_OF_IT * length:
+            found.append((slenderness, block, length))
+    if found:
+        slenderness, block, length = max(found)
+        others = f", and {len(found) - 1} more sides of cracked blocks" if len(found) > 1 else ""
+        c.warn(
+            ("geometry",),
+            f"{blocks.names[block]!r} holds cracks and lies on a fixed block with a side of {length:.3g} m, "
+            f"{slenderness:.2g} times as long as the block is deep{others}: it presses on it linearly, and bends where "
+            "it would not on a true base; K of its cracks may be twice what it should be",
+            'say run.boundary_stress = "bases", or draw it deeper '
+            f"(less than {SHALLOW:g} times as wide as deep), or cut it by joints into pieces that are",
+        )
+
+
+def _overlap(a: np.ndarray, b: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> float:
+    """m of the side from ``a`` to ``b`` along which edges from ``starts`` to ``ends`` (n, 2) lie on it."""
+    along = b - a
+    length = float(np.hypot(*along))
+    off = [np.abs(along[0] * (p[:, 1] - a[1]) - along[1] * (p[:, 0] - a[0])) / length for p in (starts, ends)]
+    on = np.maximum(*off) < LIES_ON * length
+    places = np.clip(np.stack([(p[on] - a) @ along / length for p in (starts, ends)]), 0.0, length)
+    return float(np.abs(places[1] - places[0]).sum())
+
+
+def _size(c: Check) -> None:
+    low, high = c.drawing.blocks.vertices.min(axis=0), c.drawing.blocks.vertices.max(axis=0)
+    size = (high - low).max()
+    if c.drawing.cracks.n_segments and not SIZES[0] <= size <= SIZES[1]:
+        c.warn(
+            ("geometry",),
+            f"the drawing is {high[0] - low[0]:g} × {high[1] - low[1]:g} m",
+            "are all lengths in metres?",
+        )
+
+
+def _near_misses(c: Check) -> None:
+    blocks, cracks = c.drawing.blocks, c.drawing.cracks
+    length = np.bincount(cracks.crack, cracks.lengths) if cracks.n_segments else np.empty(0)
+    owner = dict(zip(cracks.segments.ravel().tolist(), np.repeat(np.arange(cracks.n_segments), 2).tolist()))
+    for tip in cracks.tips.tolist():
+        crack, block = int(cracks.crack[owner[tip]]), int(cracks.block[owner[tip]])
+        own = np.flatnonzero(blocks.vertex_block == block)
+        gap = distance_to_edges(cracks.nodes[tip], blocks.vertices[own], blocks.vertices[blocks.next_vertex[own]])
+        if gap < NEAR_MISS * length[crack]:
+            x, y = cracks.nodes[tip]
+            c.warn(
+                c.drawing.path_of_crack(cracks.names[crack]),
+                f"crack {cracks.names[crack]!r} ends at ({x:g}, {y:g}), {gap:.2g} m from the outline of "
+                f"{blocks.names[block]!r}, without touching it",
+                "end it on the outline if it reaches the surface; the bridge left is very thin",
+            )
+
+
+def _strain(c: Check) -> None:
+    t, blocks = c.tables, c.drawing.blocks
+    concerned = set(c.drawing.cracks.block.tolist())
+    worst, at = 0.0, 0
+    for k, traction in enumerate(t.loads.tractions):
+        concerned.update(blocks.vertex_block[blocks.edges_named(traction.edge)].tolist())
+        stress = _largest(t, traction)
+        worst, at = (stress, k) if stress > worst else (worst, at)
+    if worst == 0.0:
+        return
+    names = {material_of(t, c.drawing.zones[block]) for block in concerned}
+    softest = min(names, key=lambda name: t.materials[name].youngs_modulus_pa)
+    modulus = t.materials[softest].youngs_modulus_pa
+    if worst > LARGEST_STRAIN * modulus:
+        c.warn(
+            ("loads", "tractions", at),
+            f"its {worst / 1e6:.4g} MPa would strain {softest!r} (E = {modulus / 1e9:.4g} GPa) by "
+            f"{100 * worst / modulus:.3g} %, if the run comes so far",
+            "is the modulus, the load or the end of the run wrong?",
+        )
+
+
+def _largest(t: SceneTables, traction: TractionTable) -> float:
+    """The largest magnitude of a traction in the run, Pa: its history is linear between its times and the end."""
+    history, end = traction_history(traction), t.run.end_time_s
+    return max(float(np.hypot(*history.at(time))) for time in (*history.times[history.times < end], end))

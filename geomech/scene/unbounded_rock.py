@@ -1,0 +1,197 @@
+"""Scenes of rock without an end: the infinite plane or a half-plane, of which one zone is the piece that is seen."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from ..conventions import outward_normal_of, traction
+from ..model import EndlessRock, Fluid, History
+from ..model.blocks.polygon import distance_to_edges
+from ..model.unbounded_rock import connected_cracks
+from .checks.check import Check
+from .drawing import Drawing
+from .tables import SceneTables
+from .tables.loads import FluidTable, Rising
+from .validation import nearest
+
+#: Edges lie on the free surface to this part of the drawing's size; a stress loads it not by this part of its own.
+_STRAIGHT, _FREE = 1e-9, 1e-9
+#: What acts on rock without an end; all other loads act on blocks.
+_ACTS = ("remote", "fluids")
+
+
+def endless_zone(tables: SceneTables) -> str | None:
+    """The zone that stands for rock without an end; None where blocks are blocks."""
+    return next((name for name, zone in (tables.zones or {}).items() if zone.body != "block"), None)
+
+
+def endless_of(tables: SceneTables, drawing: Drawing) -> EndlessRock | None:
+    """What a scene without faults says of such rock."""
+    name = endless_zone(tables)
+    if name is None:
+        return None
+    loads = tables.loads
+    return EndlessRock(
+        _surface(drawing, tables.zones[name].surface),
+        tuple(rising_history(table) for table in loads.remote),
+        tuple(_fluid(table, drawing) for table in loads.fluids),
+    )
+
+
+def _fluid(table: FluidTable, drawing: Drawing) -> Fluid:
+    connected = bool(table.cracks) if table.connected is None else table.connected
+    names = tuple(name for pattern in table.cracks for name in drawing.cracks.names if fnmatchcase(name, pattern))
+    return Fluid(rising_history(table), "cracks" in table.fills, "holes" in table.fills, names, connected)
+
+
+def rising_history(table: Rising) -> History:
+    """The history that ``table`` gives, (3,) of a stress or (1,) of a pressure."""
+    if table.value_pa is not None:
+        return History.constant(np.atleast_1d(table.value_pa))
+    if table.rate_pa_per_s is not None:
+        return History.ramp(np.atleast_1d(table.rate_pa_per_s), table.start_s)
+    values = np.array(table.values_pa, dtype=float)
+    return History(np.array(table.times_s, dtype=float), values.reshape(len(values), -1))
+
+
+def _surface(drawing: Drawing, name: str | None) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    if name is None:
+        return None
+    blocks = drawing.blocks
+    first = int(blocks.edges_named(name)[0])
+    a, b = blocks.vertices[first], blocks.vertices[blocks.next_vertex[first]]
+    outward = outward_normal_of((b - a) / np.hypot(*(b - a)))
+    return tuple(a.tolist()), tuple((outward + 0.0).tolist())
+
+
+def check_endless(c: Check) -> None:
+    """Such rock stands alone, and is loaded from far away or by fluids."""
+    t = c.tables
+    if t.zones is None or t.loads is None:
+        return
+    name = endless_zone(t)
+    if name is None:
+        for key in _ACTS:
+            if getattr(t.loads, key):
+                c.refuse(
+                    ("loads", key, 0),
+                    f"loads.{key} act on rock without an end, and there are blocks only",
+                    'say body = "plane" or "half-plane" in the zone\'s table, or load edges by [[loads.tractions]]',
+                )
+        return
+    body = t.zones[name].body
+    for key, field in type(t.loads).model_fields.items():
+        if key not in _ACTS and getattr(t.loads, key) != field.get_default():
+            c.refuse(
+                ("loads", key), f"loads.{key} is for blocks, and zone {name!r} is rock without an end",
+                "load it by [[loads.remote]] and [[loads.fluids]]",
+            )  # fmt: skip
+    if t.dda is not None and (t.dda.dynamic_factor > 0 or t.dda.equilibrium):
+        key = "dynamic_factor" if t.dda.dynamic_factor > 0 else "equilibrium"
+        c.refuse(("dda", key), f'cracks in rock without an end (body = "{body}") grow in statics only', "leave it out")
+    for key in ("gauge", "monitors"):
+        if getattr(t, key):
+            c.refuse((key,), f"points move with a block, and zone {name!r} is rock without an end", "leave it out")
+    if c.drawing is None or c.drawing.blocks is None or name not in c.drawing.zones:
+        return
+    _alone(c, name)
+    if _surface_is_straight(c, name):
+        _surface_is_free(c, name)
+        _ends(c, name)
+    _fluids(c)
+
+
+def _fluids(c: Check) -> None:
+    """Cracks that a fluid is pumped into are there; one that stands in cracks which nothing connects is told."""
+    cracks = c.drawing.cracks
+    for k, table in enumerate(c.tables.loads.fluids):
+        for n, pattern in enumerate(table.cracks):
+            if not any(fnmatchcase(name, pattern) for name in cracks.names):
+                c.refuse(
+                    ("loads", "fluids", k, "cracks", n), f"there is no crack {pattern!r}",
+                    nearest(pattern, list(cracks.names)),
+                )  # fmt: skip
+        if "cracks" not in table.fills or table.cracks or not cracks.n_segments:
+            continue
+        group = connected_cracks(cracks)
+        parts = [cracks.names[int(cracks.crack[np.argmax(group == part)])] for part in np.unique(group)]
+        if len(parts) > 1:
+            shown = ", ".join(map(repr, parts[:4])) + (", …" if len(parts) > 4 else "")
+            c.warn(
+                ("loads", "fluids", k),
+                f"it fills {len(parts)} cracks, or groups of them, that nothing connects ({shown})",
+                'name those it is pumped into: cracks = ["NAME"]',
+            )
+
+
+def _alone(c: Check, name: str) -> None:
+    n = c.drawing.blocks.n_blocks
+    if n > 1:
+        c.refuse(
+            ("zones", name, "body"), f"rock without an end holds cracks and holes only, and there are {n} blocks",
+            "draw one zone, without joints that cut it; what is hollow is a hole in it",
+        )  # fmt: skip
+
+
+def _surface_is_straight(c: Check, zone: str) -> bool:
+    name, blocks = c.tables.zones[zone].surface, c.drawing.blocks
+    if name is None:
+        return True
+    place = ("zones", zone, "surface")
+    edges = blocks.edges_named(name)
+    if not len(edges):
+        known = [known for known in blocks.edge_names if known]
+        c.refuse(place, f"the geometry has no edge {name!r}", nearest(name, known))
+        return False
+    point, outward = _surface(c.drawing, name)
+    height = (blocks.vertices - point) @ outward
+    off = _STRAIGHT * np.ptp(blocks.vertices, axis=0).max()
+    on = np.concatenate([height[edges], height[blocks.next_vertex[edges]]])
+    if np.abs(on).max() > off or height.max() > off:
+        c.refuse(
+            place, f"the edges {name!r} are no straight line with all of zone {zone!r} on one side of it",
+            "a half-plane has one straight surface; a notch or a slope is a block of its own",
+        )  # fmt: skip
+        return False
+    return True
+
+
+def _surface_is_free(c: Check, zone: str) -> None:
+    """No stress from far away pulls at the free surface: nothing there would bear it."""
+    if c.tables.zones[zone].surface is None:
+        return
+    _, outward = _surface(c.drawing, c.tables.zones[zone].surface)
+    histories = [rising_history(table) for table in c.tables.loads.remote]
+    end = c.tables.run.end_time_s if c.tables.run is not None else 1.0
+    for k, table in enumerate(c.tables.loads.remote):
+        values = [history.at(time) for history in histories[k : k + 1] for time in (*history.times.tolist(), end)]
+        worst = max(values, key=lambda stress: np.hypot(*traction(stress, np.array(outward))))
+        pulled = traction(worst, np.array(outward))
+        if np.hypot(*pulled) > _FREE * np.abs(worst).max():
+            key = next(key for key in ("value_pa", "rate_pa_per_s", "values_pa") if getattr(table, key) is not None)
+            c.refuse(
+                ("loads", "remote", k, key),
+                f"the free surface bears none of the traction ({pulled[0]:g}, {pulled[1]:g}) Pa that this stress has "
+                "there",
+                "only a stress along the surface stands in a half-plane: [σ, 0, 0] below a level one",
+            )
+
+
+def _ends(c: Check, zone: str) -> None:
+    """Cracks end in the rock, at a hole or at the free surface: the outline of what is seen is no end of the rock."""
+    blocks, cracks, name = c.drawing.blocks, c.drawing.cracks, c.tables.zones[zone].surface
+    outline = np.arange(blocks.loop_start[0], blocks.loop_start[1])
+    if name is not None:
+        outline = np.setdiff1d(outline, blocks.edges_named(name))
+    a, b = blocks.vertices[outline], blocks.vertices[blocks.next_vertex[outline]]
+    for node in np.flatnonzero(cracks.surface).tolist():
+        at = cracks.nodes[node]
+        if distance_to_edges(at, a, b) <= _STRAIGHT * np.ptp(blocks.vertices, axis=0).max():
+            crack = cracks.names[cracks.crack[np.argmax((cracks.segments == node).any(axis=1))]]
+            c.refuse(
+                c.drawing.path_of_crack(crack),
+                f"crack {crack!r} ends at ({at[0]:g}, {at[1]:g}) on the outline of zone {zone!r}, beyond which the rock goes on",
+                "draw the zone larger, or end the crack inside it",
+            )

@@ -1,0 +1,400 @@
+"""Rock cut into blocks by joint traces: cleaned, noded, faces taken, dead ends kept as cracks.
+
+Everything nearer than the tolerance meets: ends stop on what they nearly reach, near corners become one, a trace that
+nearly passes through a corner passes through it. Outlines stand still; joints give way. What was mended is told with
+its place. Cuts are exact otherwise: the blocks tile their zones.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...model import Blocks, Cracks
+from ..assembly import TOLERANCE, block_names
+from ..parts import JOINT, Flaw, Joint, ShapeError, Zone, extent_of, grid_decimals
+from .noding import FREE, Drawn, Graph, Mend, noded
+from .partings import Parting, partings, trace_lengths, trimmed_away
+from .planar_arrangement import Arrangement, arrange, following_in, gathered
+
+#: Two edges at a node go straight on when they turn by less than 5° (its cosine): so much a hand-drawn trace may bend.
+_STRAIGHT_ON = 0.9962
+
+
+@dataclass(frozen=True, eq=False)
+class Cutting:
+    """What cutting gives.
+
+    zone      (n_blocks,)  the zone each block was cut from
+    mends                  what was moved, joined or left out
+    nodes                  {"I": n, "Y": n, "X": n}: ends in rock, junctions of three (T or Y), crossings of four joints
+    partings               of the joints of every name, in their order
+    """
+
+    blocks: Blocks
+    cracks: Cracks
+    zone: np.ndarray
+    mends: tuple[Mend, ...]
+    nodes: dict[str, int]
+    partings: tuple[Parting, ...] = ()
+
+
+def cut(
+    zones: Sequence[Zone],
+    joints: Sequence[Joint],
+    *,
+    tolerance: float | None = None,
+    dead_ends: str = "cracks",
+    shortest_crack: float = 0.0,
+    smallest_area: float = 0.0,
+    lasting: int = 0,
+) -> Cutting:
+    """Cut ``zones`` along ``joints``.
+
+    Joint ends that stop in rock become cracks ("cracks") or are taken away ("trim"), those shorter than
+    ``shortest_crack`` m always. Blocks smaller than ``smallest_area`` m² join a neighbour, of those with at least half
+    as long a common side as any the one across the least important joint; ``joints`` are listed by importance, and no
+    small block breaks one of the first ``lasting`` ones. Only what is thinner than the tolerance joins across any of
+    them. ``tolerance`` m, default `TOLERANCE` of the largest side. Block edges carry their zone's edge names and the
+    joints' names. Raises ShapeError where a joint or zone has no length, area or number, or ``tolerance`` leaves
+    nothing in place.
+    """
+    _refuse_bad(zones, joints)
+    every = [np.asarray(loop, dtype=float) for zone in zones for loop in zone.loops]
+    origin = _origin(every)
+    every = [loop - origin for loop in every]
+    decimals = grid_decimals(every)
+    tolerance = TOLERANCE * extent_of(every) if tolerance is None else float(tolerance)
+    drawn = Drawn.of(zones, joints, origin, decimals)
+    # Crossings keep two digits more than what is drawn: corners of blocks stay on the lines of their neighbours.
+    decimals += 2
+    mends: list[Mend] = []
+    grid = 10.0**-decimals
+    graph = noded(drawn, tolerance, decimals, mends)
+    reach = None
+    while True:
+        arrangement = arrange(graph.nodes, graph.edges)
+        zone = _zones_of(arrangement, graph.source >= drawn.n_outlines, zones, origin)
+        if reach is None:
+            reach = trace_lengths(graph, drawn, ~_outside(arrangement, zone))
+        keep, stay = _kept(
+            arrangement, graph, drawn, zone, tolerance, dead_ends, shortest_crack, smallest_area, lasting, mends
+        )
+        # Faces stay what they are, but for those between which an edge goes.
+        bounds = (arrangement.left != arrangement.right) & ~_outside(arrangement, zone)
+        if keep[bounds].all():
+            break
+        graph = graph.only(keep)
+    mends += stay
+    if not keep.all():
+        arrangement, graph = arrangement.only(keep), graph.only(keep)
+    inside = np.flatnonzero(zone >= 0)
+    if dead_ends == "trim":
+        mends += trimmed_away(drawn, reach, trace_lengths(graph, drawn, np.ones(len(graph.edges), bool)))
+    cutting = trace_lengths(graph, drawn, ~arrangement.dead)
+    cracks = _cracks(arrangement, graph, drawn, inside)
+    blocks = _blocks(arrangement, drawn, graph.source, inside, [zones[z].name for z in zone[inside]], grid)
+    if origin.any():
+        blocks = blocks.with_vertices(blocks.vertices + origin)
+        cracks = replace(cracks, nodes=cracks.nodes + origin)
+        mends = [mend._replace(x=mend.x + origin[0], y=mend.y + origin[1]) for mend in mends]
+    kind = _junctions(graph, drawn)
+    mends = _with_junctions(mends, graph.nodes + origin, kind, tolerance)
+    nodes = {name: int(np.isin(kind, kinds).sum()) for name, kinds in (("I", "I"), ("Y", ("T", "Y")), ("X", "X"))}
+    return Cutting(
+        blocks, cracks, zone[inside], tuple(mends), nodes, partings(drawn, [j.name for j in joints], reach, cutting)
+    )
+
+
+def _origin(loops: Sequence[np.ndarray]) -> np.ndarray:
+    """(2,) where to count from: the drawing's own origin, or a round point in the rock when that is far away."""
+    low, high = (
+        np.min([loop.min(axis=0) for loop in loops], axis=0),
+        np.max([loop.max(axis=0) for loop in loops], axis=0),
+    )
+    size = float((high - low).max())
+    if np.abs([low, high]).max() <= 10 * size:
+        return np.zeros(2)
+    unit = 10.0 ** np.floor(np.log10(size))
+    return np.round(0.5 * (low + high) / unit) * unit
+
+
+def _refuse_bad(zones: Sequence[Zone], joints: Sequence[Joint]) -> None:
+    flaws = []
+    for k, zone in enumerate(zones):
+        if not all(np.isfinite(loop).all() for loop in zone.loops):
+            flaws.append(
+                Flaw("zones", k, f"zone {zone.name!r} has a coordinate that is not a finite number", "mend it")
+            )
+        elif any(len(loop) < 3 for loop in zone.loops):
+            flaws.append(Flaw("zones", k, f"zone {zone.name!r} has a loop of fewer than three corners", "add corners"))
+    for k, joint in enumerate(joints):
+        if not joint.lines:
+            continue
+        points, count = np.concatenate(joint.lines), np.array([len(line) for line in joint.lines])
+        first = np.cumsum(count) - count
+        finite = np.logical_and.reduceat(np.isfinite(points).all(axis=1), first)
+        still = (np.maximum.reduceat(points, first, axis=0) == np.minimum.reduceat(points, first, axis=0)).all(axis=1)
+        flaws += [
+            Flaw("joints", k, f"joint {joint.name!r} has a coordinate that is not a finite number", "mend it")
+        ] * int((~finite).sum())
+        flaws += [
+            Flaw("joints", k, f"joint {joint.name!r} has a trace without length", "give two different points")
+        ] * int((finite & ((count < 2) | still)).sum())
+    if flaws:
+        raise ShapeError(flaws)
+
+
+def _zones_of(arrangement: Arrangement, joint: np.ndarray, zones: Sequence[Zone], origin: np.ndarray) -> np.ndarray:
+    """(n_faces,) the zone each face lies in, −1 for none. Faces on either side of a ``joint`` edge (a mask) are in one
+    zone: the largest face of each such cluster is looked at."""
+    import shapely
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = arrangement.n_faces
+    if not n:
+        return np.full(0, -1)
+    left, right = arrangement.left, arrangement.right
+    link = joint & (left >= 0) & (right >= 0) & (left != right)
+    links = coo_array((np.ones(int(link.sum()), np.int8), (left[link], right[link])), shape=(n, n))
+    n_clusters, cluster = connected_components(links, directed=False)
+    order = np.lexsort((arrangement.areas_and_rims()[0], cluster))
+    largest = order[np.searchsorted(cluster[order], np.arange(n_clusters), side="right") - 1]
+    drawn = [[np.asarray(loop) - origin for loop in zone.loops] for zone in zones]
+    shapes = [shapely.Polygon(loops[0], loops[1:]) for loops in drawn]
+    out = np.full(n_clusters, -1)
+    inside = shapely.point_on_surface(arrangement.polygons(largest))
+    hit, zone = shapely.STRtree(shapes).query(inside, predicate="within")
+    out[hit] = zone
+    return out[cluster]
+
+
+def _outside(arrangement: Arrangement, zone: np.ndarray) -> np.ndarray:
+    """(n_edges,) True for edges with no rock on either side."""
+    side = np.append(zone, -1)  # face −1 is outside
+    return (side[arrangement.left] < 0) & (side[arrangement.right] < 0)
+
+
+def _kept(
+    arrangement: Arrangement, graph: Graph, drawn: Drawn, zone, tolerance, dead_ends, shortest, smallest, lasting, mends
+) -> tuple[np.ndarray, list[Mend]]:
+    """(n_edges,) False for edges to be left out: outside the rock, dead ends too short or unwanted, a joint of blocks
+    too small; and the small blocks that stay."""
+    joint = graph.source >= drawn.n_outlines
+    keep = ~(joint & _outside(arrangement, zone))
+    dead = arrangement.dead & keep & joint
+    if dead.any():
+        shortest, told = (np.inf, []) if dead_ends == "trim" else (max(shortest, tolerance), mends)
+        keep[_short_dead_ends(arrangement, dead, shortest, told)] = False
+    area, rim = arrangement.areas_and_rims()
+    thin = 2 * area < tolerance * rim
+    small = np.flatnonzero((zone >= 0) & ((area < smallest) | thin))
+    if not len(small):
+        return keep, []
+    return keep, _join_small(
+        arrangement, graph, zone, keep, drawn.rank[graph.source], small, np.where(thin[small], 0, lasting), mends
+    )
+
+
+def _join_small(arrangement: Arrangement, graph: Graph, zone, keep, rank, small, lasting, mends) -> list[Mend]:
+    """Take the edges between each of the ``small`` faces and one neighbour out of ``keep``; those that stay."""
+    import shapely
+
+    side = np.append(zone, -1)
+    left, right = arrangement.left, arrangement.right
+    span = np.hypot(*(graph.nodes[graph.edges[:, 1]] - graph.nodes[graph.edges[:, 0]]).T)
+    inner = keep & (rank >= 0) & (side[left] == side[right]) & (left != right)
+    # The edges of each small face, in order.
+    number = np.full(arrangement.n_faces + 1, -1)
+    number[small] = np.arange(len(small))
+    edge = np.flatnonzero(inner & ((number[left] >= 0) | (number[right] >= 0)))
+    owner = np.concatenate([number[left[edge]], number[right[edge]]])
+    edge = np.concatenate([edge, edge])[owner >= 0]
+    owner = owner[owner >= 0]
+    order = np.lexsort((edge, owner))
+    begin = np.searchsorted(owner[order], np.arange(len(small) + 1))
+    edge = edge[order]
+    shapes = arrangement.polygons(small)
+    area = shapely.area(shapes)
+    stay: list[Mend] = []
+    for k in np.argsort(area).tolist():
+        own = edge[begin[k] : begin[k + 1]]
+        own = own[inner[own]]
+        other = left[own] + right[own] - small[k]
+        neighbours, which = np.unique(other, return_inverse=True)
+        # A neighbour is as far away as the most important joint between.
+        between = np.full(len(neighbours), rank.max() + 1)
+        np.minimum.at(between, which, rank[own])
+        length = np.bincount(which, weights=span[own], minlength=len(neighbours))
+        at = shapely.point_on_surface(shapes[k])
+        may = between >= lasting[k]
+        if not may.any():
+            # A block joined to it in this round asks again in the next.
+            stay += [Mend("small block kept", at.x, at.y, float(area[k]))]
+            continue
+        # Joined across a short side, a thin block would be a needle on its neighbour.
+        may &= length >= 0.5 * length[may].max()
+        best = neighbours[np.lexsort((length, between, may))[-1]]
+        keep[own[other == best]] = inner[own[other == best]] = False
+        mends.append(Mend("sliver", at.x, at.y, float(area[k])))
+    return stay
+
+
+def _short_dead_ends(arrangement: Arrangement, dead: np.ndarray, shortest: float, mends: list[Mend]) -> np.ndarray:
+    """Indices of the ``dead`` edges that hang together over less than ``shortest``."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    index = np.flatnonzero(dead)
+    edges, nodes = arrangement.edges[index], arrangement.nodes
+    ring = np.zeros(len(nodes), bool)
+    ring[arrangement.edges[~arrangement.dead].ravel()] = True
+    # Dead ends on either side of a block edge do not hang together: a node on a ring counts once for each of its edges.
+    rows, side = np.nonzero(~ring[edges])
+    columns = edges[rows, side]
+    incidence = coo_array((np.ones(len(rows)), (rows, columns)), shape=(len(index), len(nodes))).tocsr()
+    label = connected_components(incidence @ incidence.T, directed=False)[1]
+    ends = nodes[edges]
+    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    total = np.bincount(label, weights=length)
+    for part in np.flatnonzero(total < shortest):
+        at = ends[label == part].mean(axis=(0, 1))
+        mends.append(Mend("dead end", float(at[0]), float(at[1]), float(total[part])))
+    return index[total[label] < shortest]
+
+
+def _cracks(arrangement: Arrangement, graph: Graph, drawn: Drawn, inside: np.ndarray) -> Cracks:
+    """Dead ends as cracks: one a run of edges of one joint between ends, junctions and mouths."""
+    block_of = np.full(arrangement.n_faces + 1, -1)
+    block_of[inside] = np.arange(len(inside))
+    dead = np.flatnonzero(arrangement.dead & (block_of[arrangement.left] >= 0))
+    ring = np.zeros(len(graph.nodes), bool)
+    ring[graph.edges[~arrangement.dead].ravel()] = True
+    chains: list[tuple[int, list[int], int]] = []
+    # Plain lists: walked edge by edge, arrays would take most of the time.
+    through, owner = (~ring).tolist(), block_of[arrangement.left].tolist()
+    dead = dead[np.argsort(graph.source[dead], kind="stable")]
+    for own in np.split(dead, np.flatnonzero(np.diff(graph.source[dead])) + 1) if len(dead) else ():
+        source = int(graph.source[own[0]])
+        ends = dict(zip(own.tolist(), graph.edges[own].tolist(), strict=True))
+        at: dict[int, list[int]] = {}
+        for e, pair in ends.items():
+            for node in pair:
+                at.setdefault(node, []).append(e)
+        left = set(ends)
+        # Ends first, so that every chain is walked from one end to the other.
+        for node in sorted(at, key=lambda k: (len(at[k]) == 2 and through[k], k)):
+            for first in at[node]:
+                if first not in left:
+                    continue
+                chain, e, here = [node], first, node
+                while e is not None:
+                    left.discard(e)
+                    a, b = ends[e]
+                    here = b if a == here else a
+                    chain.append(here)
+                    onward = [o for o in at[here] if o in left]
+                    e = onward[0] if len(onward) == 1 and through[here] and len(at[here]) == 2 else None
+                chains.append((source, chain, owner[first]))
+    if not chains:
+        return Cracks.from_polylines([], names=())
+    count: Counter[str] = Counter()
+    names = []
+    for source, _, _ in chains:
+        name = drawn.names[source].removeprefix(JOINT)
+        count[name] += 1
+        names.append(f"{name} {count[name]}")
+    segments = np.array([pair for _, chain, _ in chains for pair in pairwise(chain)])
+    used, flat = np.unique(segments.ravel(), return_inverse=True)
+    lengths = [len(chain) - 1 for _, chain, _ in chains]
+    crack = np.repeat(np.arange(len(chains)), lengths)
+    return Cracks(
+        nodes=graph.nodes[used],
+        segments=flat.reshape(-1, 2),
+        crack=crack,
+        block=np.array([block for _, _, block in chains])[crack],
+        birth_cycle=np.zeros(len(crack), int),
+        aperture=np.zeros(len(crack)),
+        surface=ring[used],
+        names=tuple(names),
+    )
+
+
+def _blocks(
+    arrangement: Arrangement, drawn: Drawn, source: np.ndarray, inside: np.ndarray, zone_names: list[str], grid: float
+) -> Blocks:
+    block_loop, loops = gathered(arrangement.face_loop, inside)
+    start, flat = gathered(arrangement.loop_start, loops)
+    count = np.diff(start)
+    known = sorted(set(drawn.names) | {""})
+    number = {name: k for k, name in enumerate(known)}
+    label = np.array([number[name] for name in drawn.names], dtype=int)[source[arrangement.loop_edge[flat]]]
+    points = arrangement.nodes[arrangement.loop_node[flat]]
+    following = following_in(start)
+    before = np.empty(len(points), int)
+    before[following] = np.arange(len(points))
+    a, b = points - points[before], points[following] - points
+    off = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    short = np.minimum(np.hypot(*a.T), np.hypot(*b.T))
+    # A neighbour's corner on a straight side is no corner of this block. The turn, over the longer edge, is within the
+    # grid: beside a short edge it may be more, and the corner stays.
+    flat = (off <= 8 * grid * short) & (np.einsum("ij,ij->i", a, b) > 0) & (label == label[before])
+    kept = np.flatnonzero(~flat)
+    owner = np.repeat(np.arange(len(loops)), count)[kept]
+    count = np.bincount(owner, minlength=len(loops))
+    start = np.concatenate([[0], np.cumsum(count)])
+    # From the lowest, then leftmost vertex on, whatever the order of the joints.
+    lowest = np.lexsort((points[kept, 0], points[kept, 1], owner))[start[:-1]]
+    place = np.arange(len(kept)) - start[owner] + (lowest - start[:-1])[owner]
+    kept = kept[start[owner] + place % count[owner]]
+    used, edge_name = np.unique(np.append(0, label[kept]), return_inverse=True)
+    n_blocks = len(inside)
+    return Blocks(
+        vertices=points[kept],
+        loop_start=start,
+        block_loop=block_loop,
+        material=np.zeros(n_blocks, int),
+        fixed=np.zeros(n_blocks, bool),
+        edge_name=edge_name[1:],
+        edge_names=tuple(known[k] for k in used),
+        names=tuple(block_names(zone_names)),
+    )
+
+
+def _junctions(graph: Graph, drawn: Drawn) -> np.ndarray:
+    """(n_nodes,) what the joints do at each node off the outlines: "I" end, "V" bend or meeting of two ends, "T" one
+    abuts another, "Y" three part ways, "X" cross; "E" for nodes on outlines."""
+    joint = graph.source >= drawn.n_outlines
+    edges = graph.edges[joint]
+    n = len(graph.nodes)
+    degree = np.bincount(edges.ravel(), minlength=n)
+    kind = np.array(["", "I", "V", "Y", "X"])[np.minimum(degree, 4)]
+    # Of three edges, two in one line: the third abuts on these.
+    node = np.concatenate([edges[:, 0], edges[:, 1]])
+    away = graph.nodes[np.concatenate([edges[:, 1], edges[:, 0]])] - graph.nodes[node]
+    away /= np.hypot(*away.T)[:, None]
+    three = np.flatnonzero(degree[node] == 3)
+    three = three[np.argsort(node[three], kind="stable")].reshape(-1, 3)
+    a, b, c = away[three[:, 0]], away[three[:, 1]], away[three[:, 2]]
+    straight = np.min([np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a))], axis=0)
+    kind[node[three[:, 0]][straight < -_STRAIGHT_ON]] = "T"
+    kind[graph.home != FREE] = "E"
+    return kind
+
+
+def _with_junctions(mends: list[Mend], nodes: np.ndarray, kind: np.ndarray, tolerance: float) -> list[Mend]:
+    """``mends`` with the junction that is now at the place where things met."""
+    met = [k for k, mend in enumerate(mends) if mend.kind in ("near miss", "near corners")]
+    if met:
+        from scipy.spatial import cKDTree
+
+        away, node = cKDTree(nodes).query([(mends[k].x, mends[k].y) for k in met])
+        for k, distance, there in zip(met, away.tolist(), node.tolist(), strict=True):
+            if distance <= tolerance:
+                mends[k] = mends[k]._replace(junction=str(kind[there]))
+    return mends

@@ -1,0 +1,1 @@
+"""Gmsh models, meshes and CAD files read as drawings."""

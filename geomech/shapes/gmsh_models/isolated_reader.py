@@ -1,0 +1,90 @@
+"""Files of CAD programs read in a process of their own: what takes the reader down, or never ends, is a bad file.
+
+OpenCASCADE and mesh readers trust what they read: a line that is missing can end the process, a flipped byte keep it
+busy for ever. A child process reads the file within `SECONDS` of processor time and `BYTES` of memory, and hands back
+what it found as plain data.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from geomech import plain_data
+
+from ..traces.field_lines import FieldFile, FieldFileError
+from .model_drawing import GmshDrawing, GmshModelError
+from .session import GmshUnavailable
+
+#: Processor time that reading one file may take, s: a hundred times that of a section with thousands of curves.
+SECONDS = 60
+#: By the clock, in units of `SECONDS`, should the child wait instead.
+PATIENCE = 10
+#: Memory that it may take, bytes.
+BYTES = 4 << 30
+
+ALLOWED = plain_data.Allowed(
+    classes=(
+        "geomech.shapes.curves:Chords", "geomech.shapes.traces.field_lines:FieldFile", "geomech.shapes.traces.field_lines:FieldLine",
+        "geomech.shapes.gmsh_models.model_drawing:GmshDrawing", "geomech.shapes.gmsh_models.model_drawing:Parameter",
+        "geomech.shapes.parts:Joint", "geomech.shapes.parts:Mark", "geomech.shapes.parts:Trace",
+        "geomech.shapes.parts:Zone",
+    )
+)  # fmt: skip
+ERRORS = {"model": GmshModelError, "field": FieldFileError, "gmsh": GmshUnavailable}
+#: What the child runs; the job comes by its standard input.
+_CHILD = (
+    "import json, sys; job = json.load(sys.stdin); sys.path[:] = job['path']; "
+    "from geomech.shapes.gmsh_models.reader_process import serve; serve(job)"
+)
+
+
+def model_apart(path: Path, arguments: Mapping[str, Any]) -> GmshDrawing:
+    """`read_gmsh_model` of ``path``, in another process."""
+    return _read("model", path, arguments, GmshModelError)
+
+
+def field_file_apart(path: Path, arguments: Mapping[str, Any]) -> FieldFile:
+    """`read_field_file` of ``path``, in another process."""
+    return _read("field", path, arguments, FieldFileError)
+
+
+def _read(kind: str, path: Path, arguments: Mapping[str, Any], error: type[Exception]) -> Any:
+    job = {"path": sys.path, "kind": kind, "file": str(path), "arguments": dict(arguments),
+           "limits": [SECONDS, BYTES]}  # fmt: skip
+    # A thread each for libraries that would take memory for as many as there are processors.
+    alone = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _CHILD], input=json.dumps(job).encode(), capture_output=True, check=False,
+            timeout=PATIENCE * SECONDS, env=os.environ | alone, start_new_session=True,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        code, out = -signal.SIGXCPU, b""
+    else:
+        code, out = done.returncode, done.stdout
+    if code == 0:
+        try:
+            said, what = plain_data.read(io.BytesIO(out), ALLOWED)
+        except plain_data.Broken:
+            said, what = "failed", "its reader said nothing that makes sense"
+        if said == "read":
+            return what
+        if said in ERRORS:
+            raise ERRORS[said](*what)
+        raise error(f"{path} cannot be read: {what}", "the file is damaged: export it again")
+    if code in (-signal.SIGXCPU, -signal.SIGKILL):
+        raise error(
+            f"{path} cannot be read within {SECONDS} s of processor time", "the file is damaged: export it again"
+        )
+    if b"MemoryError" in done.stderr or b"bad_alloc" in done.stderr:
+        raise error(f"{path} cannot be read within {BYTES >> 30} GiB of memory", "export it again, with less in it")
+    name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    raise error(f"{path} cannot be read: it ends its reader ({name})", "the file is damaged: export it again")

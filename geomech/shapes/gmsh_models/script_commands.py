@@ -1,0 +1,209 @@
+"""What of a Gmsh model is looked at before Gmsh sees it: a script for Gmsh can run programs and write files.
+
+A .geo file is a program. Beside geometry it may run shell commands (SystemCall), write files (Save, Print, Printf > …),
+end the process (Exit) and read other files. Here these are found by name and line and refused, unless the models are
+the user's own (`TRUST`). Words are read as Gmsh's scanner reads them (`Gmsh.l`: comments, strings in either quotes).
+Loops and macros make Gmsh jump back to the beginning of a line, where it knows nothing of a comment or string that
+began above: in files with loops or macros such lines are read as code as well.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ..mesh_exchange import SUFFIXES as OTHER_MESHES
+from .model_drawing import GmshModelError
+
+#: Set to anything but "" or "0", this environment variable lets models do what Gmsh lets them do.
+TRUST = "GEOMECH_TRUST_MODELS"
+
+#: How files that Gmsh reads by their name's ending are told apart; all others it takes for scripts.
+SCRIPTS, MESHES, SHAPES = (".geo", ".geo_unrolled"), (".msh",), (".brep", ".step", ".stp", ".STEP", ".STP")
+#: What a mesh begins with; Gmsh takes a .msh that begins otherwise for a script.
+_MESH_BEGINS = (b"$PTS", b"$NO", b"$PARA", b"$ELM", b"$MeshFormat", b"$Comments")
+
+#: Words that do more than draw, and what they do.
+_DOES = {
+    **dict.fromkeys(("System", "SystemCall", "NonBlockingSystemCall"), "runs a shell command"),
+    **dict.fromkeys(("OnelabRun", "ExternalProcess"), "runs a program"),
+    **dict.fromkeys(("Save", "Print"), "writes a file"),
+    "CreateDir": "makes a folder",
+    "SendToServer": "sends data to another program",
+    "Plugin": "runs a plugin",
+    "Exit": "ends this process",
+    "Sleep": "waits",
+    "GetEnv": "reads this user's environment",
+    **dict.fromkeys(("StringToName", "S2N"), "makes commands of text"),
+    "Solver": "sets up a program to run",
+}
+#: Words that read the file that is named behind them.
+_READS = ("Include", "Merge", "MergeWithBoundingBox", "ShapeFromFile", "ListFromFile")
+
+#: Longer strings, and longer lines of files with loops, are cut by Gmsh's scanner, and what follows is read as code.
+_LONGEST_STRING, _LONGEST_LINE = 1000, 8000
+
+_TOKEN = re.compile(
+    rb"""(?P<blank>[ \t\n\r\f]+) | (?P<line>//[^\n]*) | (?P<block>/\*.*?(?:\*/|\Z))
+    | (?P<text>"[^"]*(?:"|\Z)|'[^']*(?:'|\Z)) | (?P<word>[A-Za-z_][A-Za-z_0-9]*)
+    | (?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?) | (?P<mark>>>|.)""",
+    re.VERBOSE | re.DOTALL,
+)
+
+
+class _Token(NamedTuple):
+    kind: str
+    text: bytes
+    line: int
+
+
+def trusted() -> bool:
+    """Whether this user has said that models are their own."""
+    return os.environ.get(TRUST, "") not in ("", "0")
+
+
+def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
+    """Refuse a model that would do more than draw: raise GmshModelError with file, line and command.
+
+    Files below the model's folder, or below ``folder``, may be read by it; they are looked at as well. Returns all
+    files that Gmsh will read, the model first.
+    """
+    homes = [path.parent.resolve(), *([folder.resolve()] if folder else [])]
+    seen: list[Path] = []
+    waiting = [path]
+    while waiting:
+        file = waiting.pop(0)
+        # Gmsh reads options beside a file, MODEL.opt, as a script.
+        for found in (file, *([beside] if (beside := file.with_name(file.name + ".opt")).is_file() else [])):
+            if found.resolve() in seen:
+                continue
+            seen.append(found.resolve())
+            waiting += _files_of(found, homes, is_script=found is not file)
+    return seen
+
+
+def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
+    """The files that ``path`` reads, after a look at what else it does."""
+    if not is_script and path.suffix.lower() in OTHER_MESHES:
+        return _other_mesh(path)
+    if not is_script and path.suffix not in (*SCRIPTS, *MESHES, *SHAPES):
+        raise GmshModelError(
+            f"{path}: Gmsh would take a file called *{path.suffix} for a script, or for what is no drawing",
+            f"models are {', '.join((*SCRIPTS, *MESHES, '.step', '.stp', '.brep', *OTHER_MESHES))} (in lower case)",
+        )
+    if not is_script and path.suffix in SHAPES:
+        return []
+    data = path.read_bytes()
+    if not is_script and path.suffix in MESHES:
+        if not data.startswith(_MESH_BEGINS):
+            raise GmshModelError(
+                f"{path}: this is no mesh of Gmsh: it does not begin with $MeshFormat",
+                "save it as .msh again, or call it .geo if it is a script",
+            )
+        return []
+    return _script(path, data, homes)
+
+
+def _other_mesh(path: Path) -> list[Path]:
+    """Meshes that meshio reads name no other files, but those of Abaqus may include some."""
+    if path.suffix.lower() == ".inp":
+        for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
+            if line.strip().upper().startswith(b"*INCLUDE"):
+                raise GmshModelError(
+                    f"{path}:{number}: *INCLUDE reads another file", "put what it includes in its place"
+                )
+    return []
+
+
+def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:
+    if b"\0" in data:
+        line = data[: data.index(b"\0")].count(b"\n") + 1
+        raise GmshModelError(f"{path}:{line}: a zero byte in a script", "save it as text")
+    tokens = list(_tokens(data))
+    words = {token.text for token in tokens if token.kind == "word"}
+    jumps = bool(words & {b"For", b"Macro", b"Function"})
+    for token in tokens:
+        if token.kind == "text" and len(token.text) > _LONGEST_STRING:
+            raise GmshModelError(f"{path}:{token.line}: a text without an end", "close its quotes")
+    if jumps:
+        for number, line in enumerate(re.split(rb"[\r\n]", data), 1):
+            if len(line) > _LONGEST_LINE:
+                raise GmshModelError(f"{path}:{number}: a line of {len(line)} characters", "break it into shorter ones")
+    found = _judged(path, tokens, homes)
+    if jumps:
+        for token in tokens:
+            if token.kind in ("line", "block", "text") and (hidden := re.search(rb"[\r\n]", token.text)):
+                inner = [
+                    piece._replace(line=token.line + k)
+                    for k, line in enumerate(re.split(rb"[\r\n]", token.text[hidden.end() :]), 1)
+                    for piece in _tokens(line)
+                ]
+                found += _judged(path, inner, homes, comment=True)
+    return found
+
+
+def _tokens(data: bytes) -> Iterator[_Token]:
+    line = 1
+    for found in _TOKEN.finditer(data):
+        text, kind = found.group(), found.lastgroup
+        if kind != "blank":
+            yield _Token(kind, text, line)
+        line += text.count(b"\n")
+
+
+def _judged(path: Path, tokens: Sequence[_Token], homes: Sequence[Path], comment: bool = False) -> list[Path]:
+    """The files that ``tokens`` read. Raises GmshModelError for what they do besides."""
+    code = [token for token in tokens if token.kind not in ("line", "block")]
+    found = []
+    for k, token in enumerate(code):
+        word = token.text.decode("latin-1") if token.kind == "word" else ""
+        following = [t.text for t in code[k + 1 : k + 2]]
+        # Print.X = … is an option.
+        if word in _DOES and (word, following) != ("Print", [b"."]):
+            _refuse(path, token.line, word, _DOES[word], comment)
+        option = b"".join(t.text for t in code[k : k + 3]).decode("latin-1")
+        if option.startswith("General.") and "File" in option:
+            _refuse(path, token.line, option, "names a file to write", comment)
+        if word == "Printf" and _is_sent_to_a_file(code[k + 1 :]):
+            _refuse(path, token.line, "Printf > …", "writes a file", comment)
+        if word in _READS:
+            found += _read(path, token, code[k + 1 : k + 4], homes, comment)
+    return found
+
+
+def _is_sent_to_a_file(rest: Sequence[_Token]) -> bool:
+    """Whether ">" stands behind the parenthesis that ``rest`` begins with."""
+    depth = 0
+    for k, token in enumerate(rest):
+        depth += {b"(": 1, b")": -1}.get(token.text, 0) if token.kind == "mark" else 0
+        if depth == 0:
+            return [t.text for t in rest[k + 1 : k + 2]] in ([b">"], [b">>"])
+    return False
+
+
+def _read(path: Path, token: _Token, rest: Sequence[_Token], homes: Sequence[Path], comment: bool) -> list[Path]:
+    """The file that a word which reads one reads: it must be named, and be below one of ``homes``."""
+    word = token.text.decode()
+    rest = rest[1:] if rest and rest[0].text in (b"(", b"[") else rest
+    if len(rest) < 2 or rest[0].kind != "text" or rest[1].text not in (b";", b")", b"]"):
+        if comment:
+            return []
+        _refuse(path, token.line, word, "reads a file whose name is not written out", comment)
+    name = rest[0].text[1:-1].decode("utf-8", "surrogateescape")
+    # Gmsh does not know a drive or "~"; a path that is not absolute counts from the file that names it.
+    file = path.parent / name
+    if not any(file.resolve().is_relative_to(home) for home in homes):
+        _refuse(path, token.line, f'{word} "{name}"', f"reads a file outside {homes[-1]}", comment)
+    # What is not there Gmsh itself complains of; a list of numbers is no script.
+    return [file] if file.is_file() and word not in ("ListFromFile",) else []
+
+
+def _refuse(path: Path, line: int, what: str, does: str, comment: bool) -> None:
+    where = " (in a comment or text of several lines, into which its loops or macros may jump)" if comment else ""
+    raise GmshModelError(
+        f"{path}:{line}: {what} {does}{where}; a model may draw, and read files below the scene's folder",
+        f"remove it; or, if you trust this file and all that it reads, say --trust-models (or {TRUST}=1)",
+    )

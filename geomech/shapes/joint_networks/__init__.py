@@ -1,0 +1,1 @@
+"""Joint sets by statistics, and the statistics of joint networks."""

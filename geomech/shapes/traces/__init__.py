@@ -1,0 +1,1 @@
+"""Traces mapped in the field: DXF, CSV and GeoJSON."""

@@ -1,0 +1,96 @@
+"""Blocks whose cracks cannot grow are left out: runs with and without are the same, and so is what is asked for later."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from geomech.bench.cost.coupling_cost import wall
+from geomech.coupling import cycles
+from geomech.model import CrackFaces
+
+STEPS = 14
+
+
+def problem(k_ic=1e12, skip=True):
+    of = wall(12, 4)
+    run = replace(of.run, end_time=(STEPS - 0.5) * 0.01, skip=skip)
+    return replace(
+        of, run=run, materials=(replace(of.materials[0], k_ic=k_ic),), growth=replace(of.growth, increment=0.02)
+    )
+
+
+@pytest.fixture(scope="module")
+def tough():
+    """The same wall, in which nothing grows: nothing left out, and left out."""
+    return [*cycles(problem(skip=False))], [*cycles(problem())]
+
+
+def same_states(run, other, tolerance):
+    assert len(run) == len(other)
+    for a, b in zip(run, other):
+        for name in ("vertices", "velocity", "stress", "crack_strain"):
+            mine, others = getattr(a.state, name), getattr(b.state, name)
+            assert mine == pytest.approx(others, rel=0, abs=tolerance * np.abs(others).max(initial=1e-30)), name
+
+
+def test_a_wall_moves_as_if_all_of_it_were_solved(tough):
+    """States and all statistics, among them the energy at cracks, agree to what scaling solutions costs in digits."""
+    whole, lean = tough
+    same_states(whole, lean, 1e-10)
+    for a, b in zip(whole, lean):
+        assert list(a.statistics) == list(b.statistics)
+        for name in ("crack_elastic", "traction_imbalance", "kinetic_energy", "fastest_tip"):
+            if name in a.statistics:
+                assert a.statistics[name] == pytest.approx(b.statistics[name], rel=1e-8, abs=1e-9)
+
+
+def test_what_was_left_out_is_there_when_it_is_asked_for(tough):
+    """Tips, faces and bodies, long after the run has gone on, in the order of always."""
+    whole, lean = tough
+    told = lean[-1].skips["left-out solutions"]
+    assert told.kept == 4 * (STEPS - 5) and told.saved > 0 and "left-out solutions" not in whole[-1].skips
+    for a, b in zip(whole, lean):
+        assert [*a.bodies] == [*b.bodies]
+        for name in a.tips.dtype.names:
+            size = np.abs(a.tips[name]).max(initial=0.0)
+            np.testing.assert_allclose(b.tips[name], a.tips[name], rtol=0, atol=1e-9 * size, err_msg=name)
+        if a.faces is not None:
+            for of in fields(CrackFaces):
+                mine, others = getattr(b.faces, of.name), getattr(a.faces, of.name)
+                np.testing.assert_allclose(mine, others, rtol=0, atol=1e-9 * np.abs(others).max(initial=0.0))
+
+
+def test_asking_makes_no_difference_to_what_moves():
+    """To the bit; and where all that is left out is asked for at once, nothing is left out any more."""
+    asked, quiet = [], [*cycles(problem())]
+    for cycle in cycles(problem()):
+        asked.append((cycle, float(cycle.tips["k_eq"].sum())))
+    for (a, _), b in zip(asked, quiet, strict=True):
+        assert a.state.vertices.tobytes() == b.state.vertices.tobytes()
+        assert a.state.crack_strain.tobytes() == b.state.crack_strain.tobytes()
+    assert (
+        "left-out solutions" not in asked[-1][0].skips and asked[-1][0].work["solutions"] > quiet[-1].work["solutions"]
+    )
+
+
+def test_cracks_grow_when_they_would():
+    """A weight that grows until cracks do: events, ways of tips and energy are the same with blocks left out before."""
+    runs = []
+    for skip in (False, True):
+        of = problem(k_ic=5e3, skip=skip)
+        gravity = replace(
+            of.loads.gravity,
+            times=np.array([0.0, 0.08, 0.14]),
+            values=np.outer([0.01, 0.01, 1.0], of.loads.gravity.values[0]),
+        )
+        runs.append([*cycles(replace(of, loads=replace(of.loads, gravity=gravity)))])
+    whole, lean = runs
+    assert lean[-1].skips["left-out solutions"].kept >= 4
+    grown = [sum(float(c.tips["grown"].sum()) for c in run) for run in runs]
+    assert grown[0] > 0 and grown[1] == pytest.approx(grown[0], rel=1e-9)
+    assert [(e.kind, e.cycle) for c in lean for e in c.events] == [(e.kind, e.cycle) for c in whole for e in c.events]
+    same_states(whole, lean, 1e-7)
+    for name in ("fracture_energy", "toughness_energy", "crack_elastic", "crack_residual"):
+        scale = lean[-1].statistics["toughness_energy"]
+        assert lean[-1].statistics[name] == pytest.approx(whole[-1].statistics[name], rel=1e-6, abs=1e-9 * scale)

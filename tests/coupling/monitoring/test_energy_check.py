@@ -1,0 +1,122 @@
+"""A run whose energy is not accounted for says so, once, with the time."""
+
+from __future__ import annotations
+
+import logging
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import geomech
+from geomech.coupling import cycles
+from geomech.coupling.monitoring.energy_check import UNPAID, BendingWatch, BudgetWatch
+from geomech.dda.energy_balance import GAIN, EnergyBudget, StepEnergy
+from geomech.model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    GrowthSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+)
+from geomech.output.tables.motion_state import energy_summary
+
+PIPELINES = Path(__file__).parents[3] / "pipelines"
+
+
+def test_a_share_beyond_the_bound_is_told_once(caplog):
+    watch = BudgetWatch()
+    with caplog.at_level(logging.WARNING):
+        for time, share in ((1.0, 0.9 * GAIN), (2.0, float("nan")), (3.0, -1.5 * GAIN), (4.0, 20.0)):
+            watch.check(share, time)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert line.startswith("t = 3 s: -0.015 of all energy") and "shorten" in line
+
+
+def test_cracks_that_blocks_did_not_pay_for_are_told_of_once(caplog):
+    watch = BendingWatch()
+    with caplog.at_level(logging.WARNING):
+        for time, toughness, spent in ((1.0, 0.0, 0.0), (2.0, 4.0, 0.0), (3.0, 8.0, 4.0), (4.0, 8.0, 7.9 - UNPAID),
+                                       (5.0, 8.0, 2.0), (6.0, 9.0, 0.0)):  # fmt: skip
+            watch.check(toughness, spent, time)
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert line.startswith("t = 5 s: of the 8 J/m that cracks took") and "blocks gave 2:" in line
+
+
+def notched_beam(height: float, speed: float) -> Problem:
+    """A beam with a notch below its middle, that comes down on two supports near its ends."""
+    beam = np.array([[-1.0, height], [1.0, height], [1.0, height + 0.4], [-1.0, height + 0.4]])
+    supports = [np.array([[x, -0.2], [x + 0.1, -0.2], [x + 0.1, 0.0], [x, 0.0]]) for x in (-0.85, 0.75)]
+    return Problem(
+        title="a dropped beam",
+        blocks=Blocks.from_polygons([beam, *supports], fixed=[False, True, True]),
+        cracks=Cracks.from_polylines(
+            [np.array([[0.0, height], [0.0, height + 0.1]])], block=[0], surface=[(True, False)]
+        ),
+        materials=(Material("rock", 20e9, 0.2, density=2400.0, k_ic=1e6),),
+        joints=(JointLaw("joint", friction_angle=0.5),),
+        loads=Loads(gravity=History.constant([0.0, -speed])),
+        dda=DdaSettings(time_step=1e-4, dynamic_factor=1.0),
+        growth=GrowthSettings(increment=0.02, min_increment=2e-3),
+        run=RunSettings(end_time=2e-3, stop_at=()),
+    )
+
+
+def test_a_crack_that_bending_opens_in_motion_is_told_of(caplog):
+    """A weight that comes at once, forty times the earth's: the block does not bend and gives its crack nothing."""
+    with caplog.at_level(logging.WARNING):
+        last = list(cycles(notched_beam(0.0, 400.0)))[-1]
+    assert last.statistics["toughness_energy"] > 0
+    assert last.statistics["fracture_energy"] < 0.1 * last.statistics["toughness_energy"]
+    assert sum("do not store bending" in record.getMessage() for record in caplog.records) == 1
+    assert energy_summary(last)["unpaid_toughness"] > 0.9 * last.statistics["toughness_energy"]
+
+
+def test_a_beam_that_turns_far_in_a_static_step_is_told_of(caplog):
+    """A soft beam on a glued end turns by some degrees at once: static steps keep its forces where they began."""
+    beam = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 1.0], [0.0, 1.0]])
+    wall = np.array([[-2.0, -1.0], [0.0, -1.0], [0.0, 2.0], [-2.0, 2.0]])
+    problem = Problem(
+        title="a soft beam",
+        blocks=Blocks.from_polygons([wall, beam], fixed=[True, False]),
+        cracks=Cracks.from_polylines([]),
+        materials=(Material("rock", 1e8, 0.2, density=2500.0),),
+        joints=(JointLaw("glue", 0.6, 1e12, 1e12),),
+        loads=Loads(gravity=History.ramp([0.0, -9.81])),
+        dda=DdaSettings(time_step=0.25, dynamic_factor=0.0, max_displacement_ratio=0.2),
+        run=RunSettings(end_time=1.0),
+    )
+    with caplog.at_level(logging.WARNING):
+        shares = {c.state.time: c.statistics["budget_residual"] for c in cycles(problem) if c.number}
+    over = [time for time, share in shares.items() if abs(share) > GAIN]
+    lines = [record.getMessage() for record in caplog.records if "not accounted for" in record.getMessage()]
+    assert over and len(lines) == 1
+    # Six digits of it are told.
+    assert float(re.match(r"t = (\S+) s", lines[0])[1]) == pytest.approx(over[0], rel=1e-5)
+
+
+def test_what_unstable_growth_sets_free_is_booked_and_told_once(caplog):
+    """A flaw at the foot of a column runs through it at one load: every pass sets more free than the one before, and
+    there is no time step to shorten."""
+    with caplog.at_level(logging.WARNING):
+        *_, last = geomech.cycles(PIPELINES / "flexural_toppling")
+    lines = [record.getMessage() for record in caplog.records]
+    assert not any("without work" in line for line in lines)
+    (line,) = [line for line in lines if "grow at one load" in line]
+    assert last.statistics["growth_release"] >= float(re.search(r"set free (\S+) J/m", line)[1]) * 0.99 > 1.0
+    assert abs(last.statistics["budget_residual"]) < 1e-6
+
+
+def test_a_scheme_that_gives_without_growth_is_told_of(caplog):
+    step = dict.fromkeys(StepEnergy._fields, 0.0) | {"load_work": 1.0, "scheme": -0.5}
+    with caplog.at_level(logging.WARNING):
+        grown = EnergyBudget().after(StepEnergy(**step), 1.0, growing=True)
+        assert grown.released == 0.5 and not caplog.records
+        EnergyBudget().after(StepEnergy(**step), 1.0)
+    assert "without work" in caplog.records[0].getMessage()

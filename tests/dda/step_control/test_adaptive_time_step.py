@@ -1,0 +1,109 @@
+"""Automatic time steps: bounded, long where nothing happens, short where it is hard."""
+
+from __future__ import annotations
+
+import itertools
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from geomech import dda
+from geomech.coupling.cycle import cycles
+from geomech.dda.step_control import adaptive_time_step
+from geomech.model import (
+    Blocks,
+    Cracks,
+    DdaSettings,
+    History,
+    JointLaw,
+    Loads,
+    Material,
+    Problem,
+    RunSettings,
+)
+
+WEIGHT = Loads(gravity=History.constant([0.0, -9.81]))
+ROCK = Material("rock", 10e9, 0.25, density=2600.0)
+
+
+def rectangle(x0: float, y0: float, x1: float, y1: float) -> np.ndarray:
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], dtype=float)
+
+
+def finished(dt, iterations=1, cuts=0, share=0.0):
+    facts = {"open_close_iterations": iterations, "step_cuts": cuts, "limit_share": share}
+    return SimpleNamespace(dt=dt, statistics=facts)
+
+
+def test_steps_grow_and_shrink_by_what_is_stated_and_stay_bounded():
+    length = dda.StepLength(DdaSettings(time_step=1.0, automatic_time_step=True))
+    assert length.dt == adaptive_time_step.FIRST
+    for _ in range(100):
+        length.after(finished(length.dt), length.dt)
+    assert length.dt == 1.0
+    length.after(finished(1.0, iterations=adaptive_time_step.EASY + 1), 1.0)
+    assert length.dt == 1.0
+    length.after(finished(1.0, iterations=adaptive_time_step.HARD + 1), 1.0)
+    assert length.dt == 0.5
+    length.after(finished(0.125, cuts=2), 0.5)
+    assert length.dt == 0.125
+    # What a step may move is approached from below.
+    length.after(finished(0.125, share=1.0), 0.125)
+    assert length.dt == pytest.approx(0.1)
+    # A step that was short for other reasons says nothing.
+    length.after(finished(1e-3), 1e-3)
+    length.after(finished(1e-3), length.dt)
+    assert length.dt == pytest.approx(0.1)
+    for _ in range(100):
+        length.after(finished(length.dt, iterations=99), length.dt)
+    assert length.dt == adaptive_time_step.SHORTEST
+
+
+def test_without_it_every_step_is_the_one_asked_for():
+    length = dda.StepLength(DdaSettings(time_step=0.5))
+    length.after(finished(0.1, iterations=99, cuts=3), 0.5)
+    assert length.dt == 0.5
+
+
+def brick_wall(rows: int, columns: int) -> Blocks:
+    polygons = [rectangle(-1, -0.5, columns + 1, 0)]
+    for row in range(rows):
+        ends = [0, *np.arange(0.5, columns), columns] if row % 2 else range(columns + 1)
+        polygons += [rectangle(a, 0.5 * row, b, 0.5 * row + 0.5) for a, b in itertools.pairwise(ends)]
+    return Blocks.from_polygons(polygons, fixed=[True] + [False] * (len(polygons) - 1))
+
+
+def test_a_wall_begins_with_short_steps_and_rests_in_long_ones():
+    settings = DdaSettings(time_step=0.1, automatic_time_step=True, dynamic_factor=1.0, max_displacement_ratio=0.05)
+    states = list(
+        dda.run(brick_wall(5, 6), [ROCK], [JointLaw("joint", friction_angle=0.6)], WEIGHT, settings, end_time=2.0)
+    )
+    dt = np.diff([s.time for s in states])
+    assert dt.max() <= 0.1 * (1 + 1e-12)
+    # From the first step to the longest at the rate of growth, and all further ones as long.
+    least = np.ceil(np.log(1 / adaptive_time_step.FIRST) / np.log(adaptive_time_step.GROWTH))
+    assert dt[-2] == pytest.approx(0.1)
+    assert len(dt) <= least + 2.0 / 0.1 + 10
+    rows = states[-1].contacts[states[-1].contacts["other"] == 0]
+    # Shi's scheme turns what it does not resolve about from step to step, at this dt with a hundredth of the amplitude.
+    assert rows["normal_force"].sum() == pytest.approx(2600 * 9.81 * 6 * 2.5, rel=1e-2)
+
+
+def test_coupled_runs_take_them_too():
+    # A block in free fall: steps grow until the displacement allowed in one holds them, and never beyond.
+    blocks = Blocks.from_polygons([rectangle(0, 0, 1, 1)])
+    settings = DdaSettings(time_step=0.05, automatic_time_step=True, dynamic_factor=1.0, max_displacement_ratio=0.05)
+    problem = Problem(
+        "falling", blocks, Cracks.from_polylines([]), (ROCK,), (JointLaw("none"),), loads=WEIGHT, dda=settings,
+        run=RunSettings(end_time=0.2),
+    )  # fmt: skip
+    recorded = list(cycles(problem))
+    dt = np.diff([c.state.time for c in recorded])
+    assert dt[0] == pytest.approx(0.05 * adaptive_time_step.FIRST)
+    assert dt[1] == pytest.approx(adaptive_time_step.GROWTH * dt[0])
+    assert dt.max() <= 0.05
+    ratios = [c.statistics["max_displacement_ratio"] for c in recorded[1:]]
+    assert max(ratios) <= 0.05 * 1.001
+    fallen = recorded[-1].state.vertices[0, 1]
+    assert fallen == pytest.approx(-0.5 * 9.81 * 0.2**2, rel=1e-10)
