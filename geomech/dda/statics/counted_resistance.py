@@ -186,7 +186,7 @@ def with_hairlines(
     a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
     line = (
         f"{'a face' if len(loose) == 1 else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
-        f"{'' if len(loose) == 1 else ' and others'} hold nothing, open by {1e3 * worst.gap:.2g} mm because blocks strain "
+        f"{'' if len(loose) == 1 else ' and others'} hold{'s' if len(loose) == 1 else ''} nothing, open by {1e3 * worst.gap:.2g} mm because blocks strain "
         f"evenly; rigid blocks have the factor {rigid.factor:.4f}"
     )
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))

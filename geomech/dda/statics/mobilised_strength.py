@@ -13,7 +13,7 @@ import numpy as np
 
 from ...model import OPEN, SLIP, Blocks, JointLaw, State
 from ...model.joints.joint_law import STEEPEST
-from .reduced_strength import reduced
+from ..joint_laws.reduced_strength import reduced
 
 #: Faces without a name are told by their blocks up to so many pairs, and in one line beyond.
 _FEW = 12

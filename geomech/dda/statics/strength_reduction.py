@@ -19,6 +19,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..joint_laws.reduced_strength import reduced
 from ..results import NotConverged
 from ..system import BlockSystem
 from .counted_resistance import (
@@ -33,7 +34,6 @@ from .counted_resistance import (
 )
 from .displacement_limit import DisplacementLimit
 from .pseudo_time_equilibrium import equilibrium
-from .reduced_strength import reduced
 from .safety_answer import FactorOfSafety, mechanism_of, moving_in
 from .sharp_toes import FREE, ROUNDED, SHARP
 from .stability_trial import Trial, TrialLoads, stability_trial
