@@ -292,7 +292,16 @@ def test_stepped_planes_keep_their_cohesion_under_a_block_that_strains_evenly(wh
     what it were without is told. Where it parts all along a plane, the answer of rigid blocks is told."""
     corners, friction, cohesion = STEPPED[which]
     low = corners[0][1] - 5.0
-    base = [(-30, low - 10), (70, low - 10), (70, corners[-1][1]), *corners[4:1:-1], corners[1], (0, 0), (0, low), (-30, low)]
+    base = [
+        (-30, low - 10),
+        (70, low - 10),
+        (70, corners[-1][1]),
+        *corners[4:1:-1],
+        corners[1],
+        (0, 0),
+        (0, low),
+        (-30, low),
+    ]
     polygons = [np.asarray(base, float), np.asarray(corners, float)]
     edges = [[""] * len(base), ["plane", "riser", "plane", "riser", "", ""]]
     if way:
