@@ -274,11 +274,13 @@ def test_a_toppling_row_does_not_remember_the_friction_that_it_began_with(mirror
 STEPPED = {
     # Corners of the block from the toe on (m), friction angle (degrees) and cohesion (Pa).
     "one plane parts at an end": (
-        [(0, 0), (8.262589, 6.3428), (8.164088, 7.270935), (13.00272, 10.985325), (13.00272, 16.494298), (7.967869, 16.494298)],
+        [(0, 0), (8.262589, 6.3428), (8.164088, 7.270935),
+         (13.00272, 10.985325), (13.00272, 16.494298), (7.967869, 16.494298)],
         46.176, 23.4e3,
     ),
     "one plane parts all along": (
-        [(0, 0), (4.208661, 3.673296), (4.883509, 5.790067), (10.056331, 10.304878), (10.056331, 14.753437), (8.045065, 14.753437)],
+        [(0, 0), (4.208661, 3.673296), (4.883509, 5.790067),
+         (10.056331, 10.304878), (10.056331, 14.753437), (8.045065, 14.753437)],
         40.692, 12.1e3,
     ),
 }  # fmt: skip
@@ -287,9 +289,9 @@ STEPPED = {
 @pytest.mark.parametrize("way", [{}, {"mirror": True}])
 @pytest.mark.parametrize("which", STEPPED)
 def test_stepped_planes_keep_their_cohesion_under_a_block_that_strains_evenly(which, way):
-    """F = (c Σℓ + W cos β tan φ)/(W sin β) of a block on two parallel planes with an open riser (limit equilibrium). The
-    block, which strains evenly, parts by a thousandth of a millimetre at an end of a plane: c ℓ counts all the same, and
-    what it were without is told. Where it parts all along a plane, the answer of rigid blocks is told."""
+    """F = (c Σℓ + W cos β tan φ)/(W sin β) of a block on two parallel planes with an open riser (limit equilibrium).
+    The block, which strains evenly, parts by a thousandth of a millimetre at an end of a plane: c ℓ counts all the
+    same, and what it were without is told. Where it parts all along a plane, the answer of rigid blocks is told."""
     corners, friction, cohesion = STEPPED[which]
     low = corners[0][1] - 5.0
     base = [
@@ -327,8 +329,8 @@ def test_stepped_planes_keep_their_cohesion_under_a_block_that_strains_evenly(wh
 
 @pytest.mark.parametrize(("gap", "stands"), [(2e-4, True), (2e-3, False)])
 def test_what_stops_a_block_within_its_reach_is_waited_for(gap, stands):
-    """A block of 2 m² on a plane steeper than its friction angle, before a wall: within a two-thousandth of √2 m it comes to
-    rest, beyond it has failed."""
+    """A block of 2 m² on a plane steeper than its friction angle, before a wall: within a two-thousandth of √2 m it
+    comes to rest, beyond it has failed."""
     slope = math.radians(35)
     polygons = [rectangle(-8, -3, 8, 0), rectangle(-3 - gap, 0, -gap, 1), rectangle(0, 0, 2, 1)]
     blocks = Blocks.from_polygons([turned(points, slope) for points in polygons], fixed=[True, True, False])

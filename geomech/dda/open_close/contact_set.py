@@ -50,7 +50,7 @@ class ContactSet:
                 straight one
     swing       (n,)     m that it adds so to the motion along the edge
     cohesive    (n,)     m of its face whose cohesion the contact holds; None: its tributary length
-    whole                      faces that keep their cohesion while they touch anywhere (`whole_faces`); None without any
+    whole                      faces that keep their cohesion while they touch anywhere (`whole_faces`); or None
     tried                      state, direction and bond that open–close iterations begin with, where these are others
     """
 

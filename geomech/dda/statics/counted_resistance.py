@@ -1,5 +1,5 @@
-"""What a factor of safety counts on that is not joint strength alone: toes, anchors, cohesion of faces that have parted at one
-end; and the warnings that name it."""
+"""What a factor of safety counts on that is not joint strength alone: toes, anchors, cohesion of faces that have parted
+at one end; and the warnings that name it."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def bearing_toes(system: BlockSystem, state: State, loads: Loads, load_time: flo
 def with_toes(
     blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool
 ) -> FactorOfSafety:
-    """The answer ``found`` with the ``toes`` that ``hold`` in it, or would were their tips sharp, and the ``other`` answer
-    without them, or with them."""
+    """The answer ``found`` with the ``toes`` that ``hold`` in it, or would were their tips sharp, and the ``other``
+    answer without them, or with them."""
     lines = _of_toes(blocks, toes, other, hold)
     factor = None if other is None else other.factor
     return replace(found, toes=toes, toes_hold=hold, other_factor=factor, warnings=(*found.warnings, *lines))
@@ -86,8 +86,8 @@ def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None
             lines.append(f"{where} and holds {toe.force / 1e3:.4g} kN/m; without it {without}")
         else:
             lines.append(
-                f"{where}; rounded, it stands off by {toe.stands_off:.3g} m and holds nothing before it has moved as far. "
-                f"A sharp tip would hold: factor {factor(other)}, which is not to be relied on"
+                f"{where}; rounded, it stands off by {toe.stands_off:.3g} m and holds nothing before it has moved "
+                f"as far. A sharp tip would hold: factor {factor(other)}, which is not to be relied on"
             )
     return tuple(lines)
 
@@ -120,8 +120,8 @@ def with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorO
         least = min(float(size[b]) for b in (bolt.block, bolt.other) if b != GROUND)
         if math.isinf(bolt.yield_force) and anchor.force > bolt.pretension * (1.0 + _TAKEN):
             lines.append(
-                f"bolt {anchor.name} has no yield force: it counts with the {anchor.force / 1e3:.4g} kN/m that it takes "
-                f"while its block moves {1e3 * anchor.moved:.3g} mm"
+                f"bolt {anchor.name} has no yield force: it counts with the {anchor.force / 1e3:.4g} kN/m that it "
+                f"takes while its block moves {1e3 * anchor.moved:.3g} mm"
             )
         elif anchor.moved > MOVED * least and anchor.stretch > 0.0:
             lines.append(
@@ -184,10 +184,11 @@ def with_hairlines(
     """The answer ``found`` with the faces that are ``loose`` in it by a hair, and the answer of ``rigid`` blocks."""
     worst = loose[0]
     a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+    one = len(loose) == 1
     line = (
-        f"{'a face' if len(loose) == 1 else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
-        f"{'' if len(loose) == 1 else ' and others'} hold{'s' if len(loose) == 1 else ''} nothing, open by {1e3 * worst.gap:.2g} mm because blocks strain "
-        f"evenly; rigid blocks have the factor {rigid.factor:.4f}"
+        f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
+        f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
+        f"blocks strain evenly; rigid blocks have the factor {rigid.factor:.4f}"
     )
     return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
 
@@ -195,13 +196,14 @@ def with_hairlines(
 def with_parted_faces(
     blocks: Blocks, found: FactorOfSafety, parted: tuple[PartedFace, ...], other: FactorOfSafety
 ) -> FactorOfSafety:
-    """The answer ``found`` with the faces that have ``parted`` in it, and the ``other`` answer if these lose cohesion."""
+    """The answer ``found`` with the faces that have ``parted`` in it, and the ``other`` answer if these lose
+    cohesion."""
     worst = parted[0]
     a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
-    number = "a face" if len(parted) == 1 else f"{len(parted)} faces"
+    one = len(parted) == 1
     line = (
-        f"{number} with cohesion touch{'es' if len(parted) == 1 else ''} at one end only, open by up to "
-        f"{1e3 * worst.gap:.2g} mm ({a!r} and {b!r}): as in limit equilibrium, cohesion counts on the whole length; were "
-        f"it lost where faces are open, the factor would be {other.factor:.4f}"
+        f"{'a face' if one else f'{len(parted)} faces'} with cohesion touch{'es' if one else ''} at one end only, open by "
+        f"up to {1e3 * worst.gap:.2g} mm ({a!r} and {b!r}): as in limit equilibrium, cohesion counts on the whole length; "
+        f"were it lost where faces are open, the factor would be {other.factor:.4f}"
     )
     return replace(found, factor_if_parted=other.factor, warnings=(*found.warnings, line))

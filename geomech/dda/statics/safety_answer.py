@@ -18,8 +18,8 @@ _TOLD, _TURNS = 8, 0.05
 
 @dataclass(frozen=True)
 class Anchor:
-    """A bolt of the loads as it holds at the factor: ``force`` N/m in it, by how much it is stretched (``stretch`` m) since it
-    was installed, how far its block has ``moved`` (m) for that, and whether it ``yields``."""
+    """A bolt of the loads as it holds at the factor: ``force`` N/m in it, by how much it is stretched (``stretch`` m)
+    since it was installed, how far its block has ``moved`` (m) for that, and whether it ``yields``."""
 
     name: str
     force: float
@@ -38,8 +38,8 @@ class FactorOfSafety:
     ``toes`` bar the way of what moves. Where they are rounded and hold nothing, ``other_factor`` is what it would be
     were their tips sharp; where they hold (``toes_hold``), what it is without them; None where it is not known.
     ``factor_if_parted``: what it is if faces lose the cohesion of an end that opens, where that is another;
-    ``factor_if_rigid``: what it is of rigid blocks, where faces of elastic ones hold nothing for being open by a hair. ``warnings``
-    in words."""
+    ``factor_if_rigid``: what it is of rigid blocks, where faces of elastic ones hold nothing for being open by a hair.
+    ``warnings`` in words."""
 
     factor: float
     lower: float

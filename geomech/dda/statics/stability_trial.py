@@ -1,10 +1,10 @@
 """One reduced strength tried: do the blocks come to rest where they are, or move on?
 
 Static steps of the length dt leave out of balance what moves the blocks by a dt²/2. Where they stand, the unbalanced
-force falls to round-off within a few steps. Where it stays, steps show which way blocks go: they move on if nothing bars
-that way, and if what is left of the unbalanced force, as it falls with the way, lasts beyond the displacement that an
-equilibrium allows (`displacement_limit`). What these do not tell, as where a corner is about to touch, is followed with
-longer steps until it is at rest or has moved too far.
+force falls to round-off within a few steps. Where it stays, steps show which way blocks go: they move on if nothing
+bars that way, and if what is left of the unbalanced force, as it falls with the way, lasts beyond the displacement that
+an equilibrium allows (`displacement_limit`). What these do not tell, as where a corner is about to touch, is followed
+with longer steps until it is at rest or has moved too far.
 """
 
 from __future__ import annotations
@@ -59,8 +59,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialLoads:
-    """What a trial stands under and by what it is judged: ``loads`` of ``time`` s; at rest below the part ``unbalanced``
-    of the forces on any block; at most ``max_steps`` static steps of ``time_step`` s (None: by the smallest block)."""
+    """What a trial stands under and by what it is judged: ``loads`` of ``time`` s; at rest below the part
+    ``unbalanced`` of the forces on any block; at most ``max_steps`` static steps of ``time_step`` s (None: by the
+    smallest block)."""
 
     loads: Loads
     time: float

@@ -4,8 +4,8 @@ tan φ, cohesion and tensile strength of the joints are divided by F (Zienkiewic
 1992), and the blocks are asked for a static equilibrium, each trial beginning where the last one that held came to
 rest. The criterion is a force, not a displacement: a static step of length dt leaves out of balance what moves the
 blocks by a dt²/2. In a stable trial the unbalanced force falls to round-off within a few steps; in an unstable one it
-stays (`stability_trial`), and for sliding it grows as A − B/F. Two unstable trials thus point at the factor between them,
-and few more close in.
+stays (`stability_trial`), and for sliding it grows as A − B/F. Two unstable trials thus point at the factor between
+them, and few more close in.
 
 Sharp toes in re-entrant corners are rounded (`sharp_toes`), and faces keep all their cohesion while they touch anywhere
 (`whole_faces`), as limit equilibrium has it: what the factor would be otherwise is told beside.
@@ -82,9 +82,10 @@ def factor_of_safety(
     (default: blocks at rest). ``reduce`` names the joint laws that are weakened (default: all). The answer is bracketed
     to ``tolerance`` (relative); a trial stands when no block has more than the part ``unbalanced`` of the forces on it
     left to move it. Static steps are ``time_step`` s long (default: free fall over it is a hundredth of the smallest
-    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `sharp_toes`; with ``whole_faces`` a face
-    keeps all its cohesion while it touches anywhere (`whole_faces`). With ``compare``, rounded toes whose tips would
-    hold, others that hold, and faces that have parted at one end, are told with the factor that it would be otherwise.
+    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `sharp_toes`; with
+    ``whole_faces`` a face keeps all its cohesion while it touches anywhere (`whole_faces`). With ``compare``, rounded
+    toes whose tips would hold, others that hold, and faces that have parted at one end, are told with the factor that
+    it would be otherwise.
 
     Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what
     stands, and another way there may find a factor that differs by some thousandths where contacts slide and stick
@@ -122,8 +123,8 @@ def factor_of_safety(
 
 @dataclass(frozen=True)
 class Counted:
-    """What a factor counts on beside strength: ``toes`` that are "rounded", "sharp" or "free" (`sharp_toes`), and the cohesion of
-    ``whole_faces`` (`whole_faces`)."""
+    """What a factor counts on beside strength: ``toes`` that are "rounded", "sharp" or "free" (`sharp_toes`), and the
+    cohesion of ``whole_faces`` (`whole_faces`)."""
 
     toes: str = ROUNDED
     whole_faces: bool = True
@@ -199,8 +200,8 @@ class _Search:
     def _otherwise(
         self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False
     ) -> FactorOfSafety | None:
-        """The answer with something else ``counted``; arguments as for `run`. None where the blocks do not stand, or the
-        answer is not another."""
+        """The answer with something else ``counted``; arguments as for `run`. None where the blocks do not stand, or
+        the answer is not another."""
         try:
             return self.run(counted, first, above, stands)
         except (NotConverged, _NoOther):
@@ -290,8 +291,8 @@ class _Bracket:
             self.tried(factor)
 
     def _from_afar(self, known: list[Trial], upper: float, tolerance: float) -> bool:
-        """Whether what has failed at ``upper`` was begun from so far below that it may stand, unless the drift of failures
-        says that it does not."""
+        """Whether what has failed at ``upper`` was begun from so far below that it may stand, unless the drift of
+        failures says that it does not."""
         if self._began[upper] >= self.lower * (1.0 - _FROM_AFAR * tolerance):
             return False
         return _drift_ends(known, self.lower, upper) is None
@@ -326,8 +327,8 @@ def _pointed_at(trials: Sequence[Trial], lower: float, upper: float) -> float:
 
 
 def _drift_ends(trials: Sequence[Trial], lower: float, upper: float) -> float | None:
-    """Where the drift of the two weakest failures goes to nothing, drift = A − B/F; None if that is not between ``lower``
-    and ``upper``."""
+    """Where the drift of the two weakest failures goes to nothing, drift = A − B/F; None if that is not between
+    ``lower`` and ``upper``."""
     failed = sorted((t for t in trials if not t.stable and math.isfinite(t.drift)), key=lambda t: t.factor)[:2]
     if len(failed) < 2 or not failed[1].drift > failed[0].drift:
         return None
