@@ -115,6 +115,15 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
 }
 
+#: What readers show first: series → (section, attributes of its tag).
+ACTIVE: dict[str, dict[str, str]] = {
+    "blocks": {"PointData": 'Vectors="displacement"', "CellData": 'Scalars="displacement_rank"'},
+    "cracks": {"PointData": 'Scalars="opening" Vectors="displacement"', "CellData": 'Scalars="birth_cycle"'},
+    "tips": {"PointData": 'Scalars="K_eq" Vectors="displacement"'},
+    "contacts": {"PointData": 'Scalars="normal_force" Vectors="force"'},
+    "interior": {"PointData": 'Scalars="von_mises" Vectors="displacement"', "CellData": 'Scalars="block_id"'},
+}
+
 #: Columns every ``history.csv`` begins with, and their units; the step's statistics and the monitors follow.
 HISTORY: dict[str, str] = {
     "cycle": "-",
