@@ -1,4 +1,4 @@
-"""The contacts of a step: found on the present geometry, given joint laws and springs, remembering the step before."""
+"""Contacts of a time step: detection on the current geometry, joint laws, springs, and history from the last step."""
 
 from __future__ import annotations
 

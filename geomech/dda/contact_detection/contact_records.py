@@ -1,5 +1,4 @@
-"""CONTACT rows made, read and carried on one after the other: field by field, arrays of rows pass through memory ten
-times as often, and NumPy copies what has fields at a tenth of the speed of memory."""
+"""CONTACT rows: filled, read and inherited row by row in compiled loops, ten times as fast as NumPy field by field."""
 
 from __future__ import annotations
 
@@ -31,8 +30,8 @@ def names(rows, n_vertices):
 
 @_jit
 def inherited(rows, parent):
-    """What contacts keep of their rows ``parent`` (n,) in CONTACT ``rows``, nothing where it is −1: state and bonded (2,
-    n); normal and shear force, slip, wear, lift, stretch and bare (7, n); inset (n,)."""
+    """What contacts keep of their rows ``parent`` (n,) in CONTACT ``rows``, nothing where it is −1: state and bonded
+    (2, n); normal and shear force, slip, wear, lift, stretch and bare (7, n); inset (n,)."""
     n = len(parent)
     kinds, sizes, inset = np.zeros((2, n), np.int64), np.zeros((7, n)), np.zeros(n, np.bool_)
     for c in range(n):

@@ -1,15 +1,15 @@
-"""Which vertices may touch which edges of two blocks that are near each other: the entrance-edge rule.
+"""Entrance edges: which vertices may contact which edges of two blocks near each other (Shi 1988).
 
-A vertex meets the interior of an edge when its corner points away from the edge. Where two corners meet, the lines
-through which one can enter the other are the edges that have the other corner wholly on their outer side (Shi 1988,
-entrance lines). Parallel ones (flush faces with common corners) are one line, represented by whichever vertex lies
-within the other's edge, or where they lean to each other by the one whose own face leans away; where each lies within
-the other's, the two corners are the ends of a short common face, and both stand for the line. Corners meet only if
-neither is nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all
-are in reach of all, and the lines of far ones are crossed by blocks that do not touch.
+A vertex contacts the interior of an edge when its corner points away from the edge. Where two corners meet, the
+entrance lines are the edges that have the other corner entirely on their outer side (Shi 1988). Parallel entrance lines
+(flush faces with coincident corners) count as one. It is represented by the vertex that lies within the other's edge,
+or, where the faces are inclined to each other, by the corner whose own face leans away. Where each corner lies within
+the other's edge, both are ends of a short common face, and both represent the line. Two corners meet only if neither is
+nearer to a neighbour of the other: on outlines with edges shorter than the window, as cracks leave them, all corners
+are within reach of all, and lines of distant ones are crossed by blocks that do not touch.
 
-Where two lines remain, the corners are rounded (`corner_rounding`), and one contact stands for both: where and in which
-direction the rounded corners first meet in the step.
+Where two entrance lines remain, the corners are rounded (`rounded_corners`), and one contact represents both: at the
+point and in the direction in which the rounded corners first meet in the step.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from ...compiled import kept, part
 from .neighbour_search import boxes
 from .rounded_corners import EASED, meeting, rounding_length
 
-# Corners and edges that interpenetrate by less than this angle (sine, about 3°) still count as touching face to face.
+# Faces inclined into each other by less than this angle (sine, about 3°) count as face-to-face contacts.
 _ANGLE = 0.05
-# A corner outside an edge whose neighbour is nearer to it may yet come first or as well where their face leans to the edge
-# by less than this (sine): what hits with one end of a face turns flat in the same step.
+# A corner outside an edge whose neighbour is nearer to it may yet come first or as well where their face leans to the
+# edge by less than this (sine): what hits with one end of a face turns flat in the same step.
 _TURN = 0.25
-# Two entrance lines nearer in direction than this are the same line.
+# Entrance lines whose directions differ by less than this are the same line.
 _PARALLEL = 0.0025
 # Of two corners on one line the one that the other's face does not lean past, by more than this (sine), stands for it.
 _LEAN = 0.01
 # Corners that lie within each other's edges by more than this part of them are the two ends of a common face.
 _ENDS = 1e-4
-# Corners are nearer to one than to another when their distances squared differ by more than this part.
+# A corner is nearer to one corner than to another when the squared distances differ by more than this part.
 _NEARER = 1e-2
 #: A vertex and a face; two corners; two corners that may overlap by a little.
 FACE, CORNERS, SMOOTHED = 0, 1, 2
 # Corners whose lines may come within the window of both are so many windows apart at most.
 _CORNERS = 1.5
-# Contacts are sought so many rounding lengths away at least.
+# Least search distance in rounding lengths.
 _ZONE = 2.0
-# Corners may come nearer by so many times the motion that is expected of them.
+# Corners may approach by this many times their expected motion.
 _HASTE = 2.0
 # cos of the angle between edges that count as mating faces, for tributary lengths.
 _MATING = 0.9986
@@ -49,7 +49,7 @@ _MATING = 0.9986
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _dot_to(vertices, origin, target, nx, ny):
-    """Component along (nx, ny) of the unit vector from one vertex to another."""
+    """Component along (nx, ny) of the unit vector from vertex ``origin`` to vertex ``target``."""
     dx, dy = vertices[target, 0] - vertices[origin, 0], vertices[target, 1] - vertices[origin, 1]
     return (dx * nx + dy * ny) / np.sqrt(dx * dx + dy * dy)
 
@@ -84,7 +84,7 @@ def _may_turn_to(vertices, next_vertex, previous_vertex, vertex, nx, ny, gap, wi
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _nearer(vertices, here, one, other):
-    """Whether vertex ``here`` is nearer to vertex ``one`` than to the ``other``."""
+    """True if vertex ``here`` is nearer to vertex ``one`` than to ``other``."""
     ax, ay = vertices[here, 0] - vertices[one, 0], vertices[here, 1] - vertices[one, 1]
     bx, by = vertices[here, 0] - vertices[other, 0], vertices[here, 1] - vertices[other, 1]
     return ax * ax + ay * ay < (bx * bx + by * by) * (1.0 - _NEARER)
@@ -99,7 +99,7 @@ def _by(vertices, v, w, window):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _meet(vertices, next_vertex, previous_vertex, v, w):
-    """Whether two corners are each other's: neither is nearer to a neighbour of the other along its outline."""
+    """True if corners ``v`` and ``w`` meet: neither is nearer to a neighbour of the other along its outline."""
     return not (
         _nearer(vertices, v, next_vertex[w], w)
         or _nearer(vertices, v, previous_vertex[w], w)
@@ -118,7 +118,7 @@ def _shallower(vertices, next_vertex, previous_vertex, vertex, gap, other):
 
 @part(fastmath=False, error_model="numpy", nogil=True)
 def _place(keys, key):
-    """Where ``key`` stands in the sorted ``keys``, −1 if nowhere."""
+    """Index of ``key`` in the sorted ``keys``, −1 if absent."""
     low, high = 0, keys.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -143,14 +143,14 @@ def _add(table, count, first, vertex, edge):
 
 
 class Corners(NamedTuple):
-    """What is known of corners before they are looked at.
+    """Data of corners for the contact search.
 
     convex    (n_vertices,)    bool
     rounding  (n_vertices,)    m, their rounding lengths
-    longest   (n_vertices,)    m, the longest that these may be
-    pressed   (n_blocks,)      m, how deep the faces of each block are pressed in
-    motion    (n_vertices, 2)  m, how far each vertex is expected to move in the step
-    margin                     m, by which corners may come nearer besides: pairs that then stay apart are left out
+    longest   (n_vertices,)    m, largest admissible rounding lengths
+    pressed   (n_blocks,)      m, penetration of each block's faces
+    motion    (n_vertices, 2)  m, expected motion of each vertex in the step
+    margin                     m, further approach that is allowed for: pairs that then stay apart are left out
     """
 
     convex: np.ndarray
