@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -36,8 +37,8 @@ class Number:
         if self.whole and not isinstance(value, (int, np.integer)):
             return False
         if math.isinf(value):
-            return self.infinite and value > 0
-        return self.least <= value <= self.most and (self.closed or value > self.least)
+            return self.infinite and bool(value > 0)
+        return bool(self.least <= value <= self.most and (self.closed or value > self.least))
 
     @property
     def wish(self) -> str:
@@ -75,7 +76,7 @@ def as_text(value: object) -> str:
     return repr(value.item() if isinstance(value, np.generic) else value)
 
 
-def refuse_point(what: str, point: object) -> None:
+def refuse_point(what: str, point: Any) -> None:
     """Raise ValueError that begins with ``what`` unless ``point`` is two finite coordinates."""
     if np.shape(point) != (2,) or not np.isfinite(np.asarray(point, dtype=float)).all():
         raise ValueError(f"{what} needs two finite coordinates (x, y) in m, got {point!r}")

@@ -165,7 +165,7 @@ class Shortened(NamedTuple):
 
     why: str
     blocks: tuple[str, ...]
-    count: int
+    count: int  # type: ignore[assignment]  # tuple.count is of no use here
     way_out: str
 
 

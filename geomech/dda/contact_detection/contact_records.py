@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled import kept
@@ -10,10 +12,21 @@ from ...model import CONTACT, OPEN
 _jit = kept(fastmath=False, error_model="numpy", nogil=True)
 
 
+class Names(NamedTuple):
+    """Of contacts (n,): ``vertex`` and ``edge`` (n,), their ``keys`` vertex·n_vertices + edge (n,), ``normal`` (n, 2), the
+    largest size of a ``lift``, and the lowest ``gap`` of a closed one, or 0, m."""
+
+    vertex: np.ndarray
+    edge: np.ndarray
+    keys: np.ndarray
+    normal: np.ndarray
+    lift: float
+    gap: float
+
+
 @_jit
 def names(rows, n_vertices):
-    """Of CONTACT ``rows`` (n,): vertex and edge (n,), their keys vertex·``n_vertices`` + edge (n,), normals (n, 2), the
-    largest size of a lift, and the lowest gap of a closed one, or 0, m."""
+    """The `Names` of CONTACT ``rows`` (n,) on blocks of ``n_vertices``."""
     n = len(rows)
     vertex, edge, keys, normal = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64), np.empty((n, 2))
     lift = gap = 0.0
@@ -25,7 +38,7 @@ def names(rows, n_vertices):
         lift = max(lift, abs(row.lift))
         if row.state != OPEN:
             gap = min(gap, row.gap)
-    return vertex, edge, keys, normal, lift, gap
+    return Names(vertex, edge, keys, normal, lift, gap)
 
 
 @_jit

@@ -35,6 +35,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,6 +51,15 @@ _GAUSS = 1 / np.sqrt(3.0)
 _KNOWN = 1e-2
 #: Springs that are this much of their face apart are at its corners.
 _AT_CORNERS = 0.99
+
+
+class FaceForces(NamedTuple):
+    """What contacts (n,) have last borne: ``normal`` N, the part of the face from the corner on that was ``bare`` of touch,
+    and whether a bond ``holds`` that may pull."""
+
+    normal: np.ndarray
+    bare: np.ndarray
+    holds: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,17 +99,14 @@ class FacePoints:
         other: np.ndarray,
         geometry: np.ndarray,
         stiff: np.ndarray,
-        normal: np.ndarray,
-        bare: np.ndarray,
-        holds: np.ndarray,
+        borne: FaceForces,
         least: np.ndarray,
         softened: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
     ) -> FacePoints | None:
         """Faces among contacts (n,), ``stiff`` 1 where the law has a stiffness, 2 where a bond is to bend with its
-        blocks, 0 for neither, last known to press by ``normal`` N and to be ``bare`` of touch
-        from their corners on, ``holds`` a bond that may pull, ``least`` m of face
-        that the stiffness is at least that of; ``softened(ends, length)`` the ``apart`` and
-        ``share`` of bonds. None without any."""
+        blocks, 0 for neither, with what they have ``borne``; ``least`` m of face that the stiffness is at least that
+        of; ``softened(ends, length)`` the ``apart`` and ``share`` of bonds. None without any."""
+        holds = borne.holds
         some = np.flatnonzero((stiff > 0) & (geometry[:, 4] > 0))
         if len(some) < 2:
             return None
@@ -123,7 +130,7 @@ class FacePoints:
             ends, length, held, shortest, apart, share, glued = (
                 each[some] for each in (ends, length, held, shortest, apart, share, glued)
             )
-        part = _left(bare[ends], _pressed(normal[ends], held, shortest), held, shortest)
+        part = _left(borne.bare[ends], _pressed(borne.normal[ends], held, shortest), held, shortest)
         still, full = np.zeros_like(part), np.ones(len(part))
         return cls(ends, geometry, length, part, held, shortest, apart, glued, share, still, full)
 

@@ -99,10 +99,7 @@ def meeting(x, y, dx, dy, nx1, ny1, gap1, nx2, ny2, gap2, length):
                 x + t * dx, y + t * dy, nx1, ny1, nx2, ny2, gap1 + t * rate1, gap2 + t * rate2, radius, cx, cy, way
             )
             # Of places in the wedge the first, before them all others the nearest.
-            if near <= tiny:
-                earlier = least > tiny or t < first
-            else:
-                earlier = near < least
+            earlier = (least > tiny or t < first) if near <= tiny else near < least
             if earlier:
                 least, first, mx, my, line = near, t, px, py, on
         gap = zx * mx + zy * my - radius

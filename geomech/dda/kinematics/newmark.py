@@ -165,29 +165,52 @@ def _invert(first, second, out):
             out[k, m] /= determinant
 
 
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _tangent(b, stiffness, compliance, crack_given, crack_compliance, out):
+    """(3, 3) (C⁻¹ + S)⁻¹ of block ``b``, into ``out[b]``."""
+    soft = False
+    if crack_given:
+        for k in range(3):
+            for m in range(3):
+                soft = soft or crack_compliance[b, k, m] != 0.0
+    if soft:
+        _invert(compliance[b], crack_compliance[b], out[b])
+    else:
+        # By numbers: Numba takes seconds to compile the assignment of one array to another.
+        for k in range(3):
+            for m in range(3):
+                out[b, k, m] = stiffness[b, k, m]
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _unit_mass(moments, mass):
+    """(6, 6) the mass matrix of a block of unit density with these ``moments`` (6,), in the unknowns of a step."""
+    area, xx, yy, xy = moments[0], moments[3], moments[4], moments[5]
+    mass[:] = 0.0
+    mass[0, 0] = mass[1, 1] = area
+    mass[2, 2] = (xx + yy) / area
+    mass[3, 3], mass[4, 4], mass[5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area
+    mass[2, 3] = mass[3, 2] = -xy / area
+    mass[2, 4] = mass[4, 2] = xy / area
+    mass[2, 5] = mass[5, 2] = 0.5 * (xx - yy) / area
+    mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
+
+
+@part(fastmath=False, error_model="numpy", nogil=True)
+def _rotated(c, s, xx, yy, xy):
+    """The components of a symmetric tensor turned by the angle of cosine ``c`` and sine ``s``."""
+    return (
+        c * c * xx + s * s * yy - 2 * s * c * xy,
+        s * s * xx + c * c * yy + 2 * s * c * xy,
+        (s * c * (xx - yy) + (c * c - s * s) * xy),
+    )
+
+
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def assemble_blocks(
-    order,
-    moments,
-    density,
-    stiffness,
-    compliance,
-    carried,
-    stress,
-    crack_strain,
-    crack_given,
-    crack_compliance,
-    crack_offset,
-    gravity,
-    load,
-    dt,
-    heavier,
-    weight,
-    block_damping,
-    mass_damping,
-    stiffness_damping,
-    n,
-):
+    order, moments, density, stiffness, compliance, carried, stress, crack_strain, crack_given, crack_compliance,
+    crack_offset, gravity, load, dt, heavier, weight, block_damping, mass_damping, stiffness_damping, n,
+):  # fmt: skip
     """What blocks bring on their own: (matrix (n, 6, 6), right side (n, 6), tangent (n_blocks, 3, 3), stress0
     (n_blocks, 3)).
 
@@ -209,18 +232,7 @@ def assemble_blocks(
     strain = np.empty(3)
     mass = np.empty((6, 6))
     for b in range(n_blocks):
-        soft = False
-        if crack_given:
-            for k in range(3):
-                for m in range(3):
-                    soft = soft or crack_compliance[b, k, m] != 0.0
-        if soft:
-            _invert(compliance[b], crack_compliance[b], tangent[b])
-        else:
-            # By numbers: Numba takes seconds to compile the assignment of one array to another.
-            for k in range(3):
-                for m in range(3):
-                    tangent[b, k, m] = stiffness[b, k, m]
+        _tangent(b, stiffness, compliance, crack_given, crack_compliance, tangent)
         for k in range(3):
             strain[k] = crack_strain[b, k] - crack_offset[b, k] if crack_given else 0.0
             for m in range(3):
@@ -235,14 +247,7 @@ def assemble_blocks(
         area, xx, yy, xy = moments[b, 0], moments[b, 3], moments[b, 4], moments[b, 5]
         h = np.sqrt(area)
         rho = density[b]
-        mass[:] = 0.0
-        mass[0, 0] = mass[1, 1] = area
-        mass[2, 2] = (xx + yy) / area
-        mass[3, 3], mass[4, 4], mass[5, 5] = xx / area, yy / area, 0.25 * (xx + yy) / area
-        mass[2, 3] = mass[3, 2] = -xy / area
-        mass[2, 4] = mass[4, 2] = xy / area
-        mass[2, 5] = mass[5, 2] = 0.5 * (xx - yy) / area
-        mass[3, 5] = mass[5, 3] = mass[4, 5] = mass[5, 4] = 0.5 * xy / area
+        _unit_mass(moments[b], mass)
         for k in range(6):
             for m in range(6):
                 matrix[row, k, m] = inertia * rho * mass[k, m]
@@ -268,21 +273,9 @@ def assemble_blocks(
 
 @kept(fastmath=False, error_model="numpy", nogil=True)
 def advance(
-    increment,
-    carried,
-    dt,
-    static,
-    vertices,
-    vertex_start,
-    moments,
-    tangent,
-    stress0,
-    compliance,
-    offset,
-    crack_given,
-    crack_strain,
-    turns,
-):
+    increment, carried, dt, static, vertices, vertex_start, moments, tangent, stress0, compliance, offset, crack_given,
+    crack_strain, turns,
+):  # fmt: skip
     """The state after a step from its displacement ``increment`` (n_blocks, 6) about the old centroids.
 
     Vertices follow x' = c + d₀ + R(r)(I + ε)(x − c) with the exact rotation R, so that a spinning block does not swell.
@@ -325,9 +318,8 @@ def advance(
         a, d, e = velocity[b, 3], velocity[b, 4], 0.5 * velocity[b, 5]
         spin, xx, yy, xy = velocity[b, 2], moments[b, 3], moments[b, 4], moments[b, 5]
         momentum = (xx + yy) * spin + xy * (d - a) + (xx - yy) * e
-        velocity[b, 3] = c * c * a + s * s * d - 2 * s * c * e
-        velocity[b, 4] = s * s * a + c * c * d + 2 * s * c * e
-        velocity[b, 5] = 2.0 * (s * c * (a - d) + (c * c - s * s) * e)
+        velocity[b, 3], velocity[b, 4], turned_shear = _rotated(c, s, a, d, e)
+        velocity[b, 5] = 2.0 * turned_shear
         if turns[b] and not static:
             # Second moments of the mass, F S Fᵀ with F = R(I + ε).
             fxx, fyy = 1.0 + axx, 1.0 + ayy
@@ -341,16 +333,14 @@ def advance(
             for m in range(3):
                 tensor[k] += tangent[b, k, m] * increment[b, 3 + m]
         a, d, e = tensor[0], tensor[1], tensor[2]
-        new_stress[b, 0] = c * c * a + s * s * d - 2 * s * c * e
-        new_stress[b, 1] = s * s * a + c * c * d + 2 * s * c * e
-        new_stress[b, 2] = s * c * (a - d) + (c * c - s * s) * e
+        new_stress[b, 0], new_stress[b, 1], turned_shear = _rotated(c, s, a, d, e)
+        new_stress[b, 2] = turned_shear
         for k in range(3):
             if crack_given:
                 tensor[k] = offset[b, k] + compliance[b, k, 0] * a + compliance[b, k, 1] * d + compliance[b, k, 2] * e
             else:
                 tensor[k] = crack_strain[b, k]
         a, d, e = tensor[0], tensor[1], 0.5 * tensor[2]
-        new_crack[b, 0] = c * c * a + s * s * d - 2 * s * c * e
-        new_crack[b, 1] = s * s * a + c * c * d + 2 * s * c * e
-        new_crack[b, 2] = 2.0 * (s * c * (a - d) + (c * c - s * s) * e)
+        new_crack[b, 0], new_crack[b, 1], turned_shear = _rotated(c, s, a, d, e)
+        new_crack[b, 2] = 2.0 * turned_shear
     return new_vertices, velocity, new_stress, new_crack, np.sqrt(largest)

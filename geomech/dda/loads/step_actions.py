@@ -212,7 +212,7 @@ class StepActions:
             for label, row in zip(labels(self.loads.bolts), self.memory, strict=True):
                 statistics[f"bolt:{label}"] = float(row["force"])
         all_points = np.concatenate([part.astype(POINT_FORCE, copy=False) for part in rows])
-        for k, motion in enumerate(self.loads.point_motions):
+        for k in range(len(self.loads.point_motions)):
             fx, fy = at_points[k]["force"]
             statistics[f"reaction_x:point {k + 1}"], statistics[f"reaction_y:point {k + 1}"] = float(fx), float(fy)
         driven = [motion.block for motion in self.loads.block_motions]

@@ -95,13 +95,13 @@ class Blocks:
         if loops:
             with np.errstate(invalid="ignore"):
                 simple, turns_left = convex_and_simple(np.concatenate(loops), loop_start)
-            for k in np.flatnonzero(~simple):
+            for k in np.flatnonzero(~simple).tolist():
                 _refuse_crooked(loops[k], names[owner[k]])
-            for k in np.flatnonzero(~outer):
+            for k in np.flatnonzero(~outer).tolist():
                 _refuse_stray(loops[block_loop[owner[k]]], loops[k], names[owner[k]])
-            for b in np.flatnonzero(np.diff(block_loop) > 2):
+            for b in np.flatnonzero(np.diff(block_loop) > 2).tolist():
                 _refuse_shared(loops[block_loop[b] + 1 : block_loop[b + 1]], names[b])
-            for k in np.flatnonzero(turns_left != outer):
+            for k in np.flatnonzero(turns_left != outer).tolist():
                 loops[k] = loops[k][::-1]
                 if labels is not None:
                     # Reversed, the edge that left vertex i arrives at it, so the labels shift by one.

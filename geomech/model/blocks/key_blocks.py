@@ -10,6 +10,7 @@ in.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,7 @@ def key_blocks(
     return out
 
 
-def _principal(angle):
+def _principal(angle: Any) -> Any:
     """``angle`` in [−π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 

@@ -38,7 +38,7 @@ class Cracks:
     aperture: np.ndarray
     surface: np.ndarray
     names: tuple[str, ...] = ()
-    law: np.ndarray | None = None
+    law: np.ndarray = None  # type: ignore[assignment]  # never none once it is made
 
     def __post_init__(self) -> None:
         if self.law is None:
@@ -89,22 +89,22 @@ class Cracks:
                 ends[0], ends[-1] = surface[k]
             mouth.append(ends)
             first += len(line)
-        crack = np.concatenate(crack) if n else np.empty(0, int)
+        of_crack = np.concatenate(crack) if n else np.empty(0, int)
         if join and n:
-            nodes, segments, mouth = _joined(np.concatenate(nodes), np.concatenate(segments), np.concatenate(mouth))
-            for s in np.flatnonzero(segments[:, 0] == segments[:, 1])[:1]:
-                raise ValueError(f"{names[crack[s]]}: a crack segment has no length beside the network's extent")
-            nodes, segments, mouth = [nodes], [segments], [mouth]
+            points, pairs, ends = _joined(np.concatenate(nodes), np.concatenate(segments), np.concatenate(mouth))
+            for s in np.flatnonzero(pairs[:, 0] == pairs[:, 1])[:1]:
+                raise ValueError(f"{names[of_crack[s]]}: a crack segment has no length beside the network's extent")
+            nodes, segments, mouth = [points], [pairs], [ends]
         return cls(
             nodes=np.concatenate(nodes) if n else np.empty((0, 2)),
             segments=np.concatenate(segments) if n else np.empty((0, 2), int),
-            crack=crack,
-            block=blocks[crack] if n else np.empty(0, int),
-            birth_cycle=np.zeros(len(crack), int),
-            aperture=apertures[crack] if n else np.empty(0),
+            crack=of_crack,
+            block=blocks[of_crack] if n else np.empty(0, int),
+            birth_cycle=np.zeros(len(of_crack), int),
+            aperture=apertures[of_crack] if n else np.empty(0),
             surface=np.concatenate(mouth) if n else np.empty(0, bool),
             names=names,
-            law=laws[crack] if n else np.empty(0, int),
+            law=laws[of_crack] if n else np.empty(0, int),
         )
 
     @property

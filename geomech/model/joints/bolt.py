@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -120,7 +121,8 @@ def grouted_bolt(
     length = float(np.hypot(*(b - a)))
     pieces = _pieces(blocks, a, b)
     along = (b - a) / length
-    bolts = []
+    bolts: list[Bolt] = []
+    options: dict[str, Any] = {"compression": True, **properties}
     for (one, s0, s1), (two, s2, s3) in itertools.pairwise(pieces):
         before, after = min(active_length / 2, s1 - s0), min(active_length / 2, s3 - s2)
         points = (a + (s1 - before) * along).tolist(), (a + (s2 + after) * along).tolist()
@@ -132,7 +134,7 @@ def grouted_bolt(
                 tuple(points[1]),
                 stiffness=axial_stiffness / (before + after),
                 name=f"{name}/{len(bolts) + 1}",
-                **{"compression": True, **properties},
+                **options,
             )
         )
     if not bolts:

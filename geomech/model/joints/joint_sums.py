@@ -51,10 +51,10 @@ def joint_sums(blocks: Blocks, contacts: np.ndarray, joints: Sequence[JointLaw])
     names, joint = np.unique(joint_names(blocks, contacts, joints).astype(str), return_inverse=True)
     out = np.zeros(len(names), JOINT_SUM)
 
-    def total(values) -> np.ndarray:
+    def total(values: np.ndarray) -> np.ndarray:
         return np.bincount(joint, values, len(names))
 
-    def largest(values) -> np.ndarray:
+    def largest(values: np.ndarray) -> np.ndarray:
         most = np.zeros(len(names))
         np.maximum.at(most, joint, values)
         return most

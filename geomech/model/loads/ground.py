@@ -53,7 +53,9 @@ def lowest_over(ground: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(xs), np.array(ys)
 
 
-def _together(line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]):
+def _together(
+    line: tuple[np.ndarray, np.ndarray], ground: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(x, y of the ``line``, y of the ``ground``), m, at all their points and crossings."""
     x = np.unique(np.concatenate([line[0], ground[0]]))
     above = np.interp(x, *line) - np.interp(x, *ground)

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 #: Units of columns of a record and their factors to SI. Standard gravity is 9.80665 m/s² (ISO 80000-3),
 #: 1 gal = 1 cm/s².
@@ -113,18 +114,25 @@ class History:
             raise ValueError(f"the times of a history must ascend: {times[at + 1]:g} s follows {times[at]:g} s")
 
     @classmethod
-    def constant(cls, value) -> History:
+    def constant(cls, value: ArrayLike) -> History:
         return cls(np.zeros(1), np.atleast_2d(np.asarray(value, dtype=float)))
 
     @classmethod
-    def ramp(cls, rate, start: float = 0.0) -> History:
+    def ramp(cls, rate: ArrayLike, start: float = 0.0) -> History:
         """Zero until ``start`` s, then growing at ``rate`` per second."""
         rate = np.atleast_1d(np.asarray(rate, dtype=float))
         return cls(np.array([start]), np.zeros((1, len(rate))), rate)
 
     @classmethod
     def sinusoid(
-        cls, amplitude, frequency: float, *, phase: float = 0.0, start: float = 0.0, end: float = math.inf, mean=None
+        cls,
+        amplitude: ArrayLike,
+        frequency: float,
+        *,
+        phase: float = 0.0,
+        start: float = 0.0,
+        end: float = math.inf,
+        mean: ArrayLike | None = None,
     ) -> History:
         """``mean`` (default 0) plus, from ``start`` to ``end`` s, ``amplitude`` · sin(2π ``frequency`` (t − start) +
         ``phase``); frequency Hz, phase rad."""
@@ -133,13 +141,13 @@ class History:
         return replace(base, wave=Wave(amplitude, frequency, phase, start, end))
 
     @classmethod
-    def table(cls, times, values) -> History:
+    def table(cls, times: ArrayLike, values: ArrayLike) -> History:
         """Piecewise linear through ``values`` (n, k) or (n,) at ``times`` (n,) s."""
         values = np.asarray(values, dtype=float)
         return cls(np.asarray(times, dtype=float), values[:, None] if values.ndim == 1 else values)
 
     @classmethod
-    def from_file(cls, path: str | Path, columns: int | None = None, scale=1.0) -> History:
+    def from_file(cls, path: str | Path, columns: int | None = None, scale: ArrayLike = 1.0) -> History:
         """The record in the text file ``path`` (`read_record`), multiplied by ``scale``.
 
         ``columns``: required number of values per line. A ``scale`` (k,) turns a one-column record into a vector.
@@ -163,7 +171,7 @@ class History:
             value = value + self.wave.at(time)
         return value
 
-    def scaled(self, factor) -> History:
+    def scaled(self, factor: ArrayLike) -> History:
         """This history times ``factor``: a number, or one per component (k,)."""
         wave = self.wave
         return History(
@@ -304,11 +312,12 @@ def _header(path: Path, number: int, line: str) -> list[float]:
     factors = []
     for k, column in enumerate(c.strip() for c in columns):
         found = re.search(r"[\[(]([^\])]*)[\])]", column)
-        unit = (found.group(1) if found else "").strip().lower().replace("²", "2").replace("^", "").replace("**", "")
+        written = found.group(1) if found else ""
+        unit = written.strip().lower().replace("²", "2").replace("^", "").replace("**", "")
         known = _TIMES if k == 0 else tuple(UNITS)
         if unit not in known:
             raise ValueError(
-                f"{path}:{number}: column {k + 1} is in {found.group(1)!r}, which is not known; "
+                f"{path}:{number}: column {k + 1} is in {written!r}, which is not known; "
                 f"{'times are' if k == 0 else 'units are'} {', '.join(u for u in known if u)}"
             )
         factors.append(UNITS[unit])
