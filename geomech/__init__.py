@@ -2,8 +2,8 @@
 
 Blocks slide and rotate along joints (discontinuous deformation analysis, `geomech.dda`), cracks grow through the rock
 bridges between them (displacement discontinuity method, `geomech.ddm`), and `geomech.coupling` lets each drive the
-other. `load_scene`, `cycles`, `run`, `resume`, `factor_of_safety` and `safety_report` are the whole pipeline; each solver also stands
-alone.
+other. `load_scene`, `cycles`, `run`, `resume`, `factor_of_safety`, `safety_report` and `sweep` are the whole pipeline; each
+solver also stands alone.
 """
 
 import os
@@ -27,11 +27,15 @@ _PUBLIC = {
     "factor_of_safety": "geomech.pipeline",
     "safety_report": "geomech.pipeline",
 }
+# Packages that are called like a function.
+_CALLED = ("sweep",)
 
-__all__ = ["__version__"] + list(_PUBLIC)
+__all__ = ["__version__", *_PUBLIC, *_CALLED]
 
 
 def __getattr__(name: str):
     if name in _PUBLIC:
         return getattr(import_module(_PUBLIC[name]), name)
+    if name in _CALLED:
+        return import_module(f"geomech.{name}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
