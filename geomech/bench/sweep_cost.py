@@ -113,6 +113,7 @@ def _cluster(workers: int) -> Iterator[str]:
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with tempfile.TemporaryDirectory() as place:
         dask = [sys.executable, "-m", "dask"]
+        worker = ["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
         own = [
             subprocess.Popen(
                 [*dask, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"], cwd=place, **quiet
@@ -120,7 +121,7 @@ def _cluster(workers: int) -> Iterator[str]:
         ]
         try:
             own += [
-                subprocess.Popen([*dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", place], cwd=place, **quiet)
+                subprocess.Popen([*dask, *worker, "--local-directory", place], cwd=place, **quiet)
                 for _ in range(workers)
             ]  # fmt: skip
             with Client(address, timeout=120, set_as_default=False) as client:

@@ -31,6 +31,11 @@ from .page import Page
 
 #: So many variables are drawn, those with the largest swing.
 _DRAWN = 9
+#: Columns that are summed up, where runs have them.
+_RESULTS = (
+    "moved_volume", "moved_mass", "moving_blocks", "run_out_m", "peak_load_pa", "initiation_load_pa",
+    "coalescence_load_pa", "crack_growth_m", "key_blocks", "largest_displacement_m", "blocks",
+)  # fmt: skip
 #: So many reasons, mechanisms and columns are told.
 _LISTED = 20
 
@@ -278,9 +283,9 @@ class _Writer:
         total, table = sum(counts.values()), []
         for name, number in counts.most_common(_LISTED):
             own = [row for row in self.done if row.get(kind) == name]
-            values, (low, high) = numbers(own, self.result), wilson(number, total)
+            low, high = wilson(number, total)
             table.append([name, number, share_text(number / total), f"{share_text(low)} to {share_text(high)}",
-                          sum(bool(row["fails"]) for row in own), float(np.nanmean(values)) if np.isfinite(values).any() else None,
+                          sum(bool(row["fails"]) for row in own), _mean(own, self.result),
                           _mean(own, "moved_volume"), _mean(own, "moving_blocks")])  # fmt: skip
         self.page.table(
             [kind, "runs", "share", "95 %", "that fail", f"mean {self.label}", "moves, m³/m", "blocks"], table
@@ -318,9 +323,7 @@ class _Writer:
     def _columns(self) -> None:
         plan = self.found.plan
         names = [name for name in plan.settings["columns"] if np.isfinite(numbers(self.done, name)).any()]
-        names += [name for name in ("moved_volume", "moved_mass", "moving_blocks", "run_out_m", "peak_load_pa", "initiation_load_pa",
-                                    "coalescence_load_pa", "crack_growth_m", "key_blocks", "largest_displacement_m", "blocks")
-                  if np.isfinite(numbers(self.done, name)).any()]  # fmt: skip
+        names += [name for name in _RESULTS if np.isfinite(numbers(self.done, name)).any()]
         if not names:
             return
         self.page.section("Other results")

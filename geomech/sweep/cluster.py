@@ -6,8 +6,8 @@
 
 The scheduler hands out jobs, hands them out again where a worker goes away, and sends rows back; the journal is written
 here alone. Each thread of a worker keeps a process of its own that makes the runs (`engine.LocalEngine` of one): Dask
-goes on hearing of its workers while kernels compute, and a run that crashes takes no worker with it. Where the scheduler
-goes away the sweep waits for it, and hands out what had not come back.
+goes on hearing of its workers while kernels compute, and a run that crashes takes no worker with it. Where the
+scheduler goes away the sweep waits for it, and hands out what had not come back.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ class EngineRefused(RuntimeError):
 class DaskEngine:
     """The cluster whose scheduler has this ``address``, or that of a ``client`` of dask.distributed (which stays open).
 
-    ``patience`` s: so long a scheduler that has gone away, and workers, are waited for. ``scene`` is looked for on every
-    worker, and ``folder`` where runs leave files. Raises EngineRefused where there is no such scheduler, no worker,
+    ``patience`` s: so long a scheduler that has gone away, and workers, are waited for. ``scene`` is looked for on
+    every worker, and ``folder`` where runs leave files. Raises EngineRefused where there is no such scheduler, no
+    worker,
     another version of geomech, or no such scene.
     """
 

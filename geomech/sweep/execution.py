@@ -42,7 +42,7 @@ class CannotResume(ValueError):
 
 
 class Telling(NamedTuple):
-    """What is said meanwhile: ``say`` takes a line; ``every`` run a line (``log``), or how far it is every ``seconds``."""
+    """What is said meanwhile: ``say`` takes a line; one a run (``log``), and how far it is every ``seconds``."""
 
     say: Callable[[str], None] | None = None
     log: bool = False
@@ -196,7 +196,8 @@ def _prepare(folder: Path, plan: Plan, resume: bool, overwrite: bool) -> None:
     """The folder as this sweep may begin in it. Raises FolderTaken, CannotResume."""
     stored_at = folder / PLAN
     stored = json.loads(stored_at.read_text(encoding="utf-8")) if stored_at.is_file() else None
-    mine = {"plan": plan.as_dict(), "table": digest_of(plan.table) if not plan.settings["rare"] else "", "program": program(),
+    table = "" if plan.settings["rare"] else digest_of(plan.table)
+    mine = {"plan": plan.as_dict(), "table": table, "program": program(),
             "files": _files(plan)}  # fmt: skip
     if resume:
         if stored is None:
@@ -271,7 +272,8 @@ class _Conduct:
         stored = json.loads((self.folder / PLAN).read_text(encoding="utf-8"))
         seconds = stored.get("seconds", 0.0) + time.monotonic() - self.began
         found = Sweep(self.folder, self.plan, tuple(rows), complete, rare, seconds, self.engine.workers, pictures)
-        answer = {"complete": complete, "seconds": round(seconds, 2), "workers": self.engine.workers, "pictures": pictures,
+        answer = {"complete": complete, "seconds": round(seconds, 2), "workers": self.engine.workers,
+                  "pictures": pictures,
                   "probability": found.probability._asdict()}  # fmt: skip
         if rare is not None:
             answer["rare"] = {name: _finite(value) for name, value in vars(rare).items()}
@@ -307,7 +309,7 @@ class _Conduct:
             self._write_sometimes()
 
     def _took(self, row: Mapping[str, Any]) -> None:
-        """Keep how long a run has taken; the first of a process, which loads and compiles, only until there are others."""
+        """Keep how long a run has taken; the first of a process, which loads and compiles, until there are others."""
         process = row["host"], row["process"]
         if process in self.warm:
             if not self.settled:
@@ -361,7 +363,8 @@ class _Conduct:
             left = time_left(
                 self.fresh, self.total - (done - self.fresh), self.durations, self.engine.workers, self.began
             )
-            text += f", {_span(left)} left ({sum(self.durations) / len(self.durations):.2g} s a run, {self.engine.workers} at a time)"
+            mean = sum(self.durations) / len(self.durations)
+            text += f", {_span(left)} left ({mean:.2g} s a run, {self.engine.workers} at a time)"
         return text
 
     def _rare(self) -> RareProbability | None:

@@ -78,7 +78,8 @@ def carry_out(job: Job) -> dict[str, Any]:
     for name in ("_parts", "_summary", "_history"):
         row.pop(name, None)
     row |= {
-        "seconds": round(time.perf_counter() - clock, 5), "processor_seconds": round(time.process_time() - processor, 5),
+        "seconds": round(time.perf_counter() - clock, 5),
+        "processor_seconds": round(time.process_time() - processor, 5),
         "host": socket.gethostname(), "process": os.getpid(),
     }  # fmt: skip
     return row

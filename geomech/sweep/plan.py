@@ -319,7 +319,8 @@ class _Checker:
             yield f"Sobol' points are spread evenly in powers of two: {1 << runs.bit_length()} rather than {runs}"
         random = sum(isinstance(each, Random) for each in variables)
         if self.settings.sampling == "saltelli" and random and runs % (random + 2):
-            yield f"Saltelli's design takes {random + 2} runs a group: {runs // (random + 2) * (random + 2)} of {runs} are run"
+            whole = runs // (random + 2) * (random + 2)
+            yield f"Saltelli's design takes {random + 2} runs a group: {whole} of {runs} are run"
 
     def _seeds(self) -> tuple[int, ...]:
         try:
@@ -399,7 +400,8 @@ class _Checker:
                 high = high if value is None else min(high, float(value))
         outside = made.outside(low, high)
         if outside > _OUTSIDE:
-            cut = f"{made.law}({', '.join(f'{x:g}' for x in made.parameters)}, {max(low, made.low):g}, {min(high, made.high):g})"
+            within = (*made.parameters, max(low, made.low), min(high, made.high))
+            cut = f"{made.law}({', '.join(f'{x:g}' for x in within)})"
             self.refuse(
                 ("vary", made.name),
                 f"{made} lies outside {low:g} to {high:g}, which the key may be, with probability {outside:.2g}",
@@ -421,8 +423,19 @@ class _Checker:
 
     def check_runs(self, plan: Plan, limit: int) -> None:
         """What the runs together ask for."""
-        settings, seeds = self.settings, plan.seeds
-        random = plan.random
+        self._check_samples(plan)
+        self._check_rare(plan)
+        self._check_correlations(plan)
+        self._check_expressions()
+        count = math.prod(len(each.values) for each in plan.variables if isinstance(each, Listed))
+        count *= plan.design.runs if plan.random else max(1, len(plan.seeds))
+        if count > limit:
+            where, message = ("sweep", "runs"), f"{count} runs, more than the limit of {limit}"
+            self.faults.append(Fault(self.place(where), message, f"ask for fewer, or say --limit {count}"))
+
+    def _check_samples(self, plan: Plan) -> None:
+        """Numbers of runs and seeds."""
+        settings, seeds, random = self.settings, plan.seeds, plan.random
         if settings.runs and seeds and len(seeds) != settings.runs:
             self.refuse(
                 ("runs",),
@@ -449,6 +462,9 @@ class _Checker:
                 f"Saltelli's design of {len(random)} variables takes {len(random) + 2} runs a group",
                 "give more",
             )
+
+    def _check_rare(self, plan: Plan) -> None:
+        settings, seeds, random = self.settings, plan.seeds, plan.random
         if settings.rare and (seeds or not random or len(random) < len(plan.variables)):
             self.refuse(
                 ("rare",), "rare failures are sought among random variables alone", "leave seeds and listed values out"
@@ -458,7 +474,9 @@ class _Checker:
                 margin_of(plan.fails)
             except ExpressionError as error:
                 self.refuse(("fails",), str(error), "the method follows how far a run is from failure")
-        names = [each.name for each in random]
+
+    def _check_correlations(self, plan: Plan) -> None:
+        settings, names = self.settings, [each.name for each in plan.random]
         for each in settings.correlated:
             for name in each.between:
                 if name not in names:
@@ -468,6 +486,9 @@ class _Checker:
                 correlation_matrix(names, plan.design.correlations)
             except ValueError as error:
                 self.refuse(("correlated",), str(error), "give smaller coefficients")
+
+    def _check_expressions(self) -> None:
+        settings = self.settings
         for name in ("fails", "columns"):
             for key, text in {"": getattr(settings, name)}.items() if name == "fails" else settings.columns.items():
                 try:
@@ -476,16 +497,6 @@ class _Checker:
                     self.refuse(
                         (name, key) if key else (name,), str(error), "write an expression, as factor_of_safety < 1.3"
                     )
-        count = math.prod(len(each.values) for each in plan.variables if isinstance(each, Listed))
-        count *= plan.design.runs if random else max(1, len(seeds))
-        if count > limit:
-            self.faults.append(
-                Fault(
-                    self.place(("sweep", "runs")),
-                    f"{count} runs, more than the limit of {limit}",
-                    f"ask for fewer, or say --limit {count}",
-                )
-            )
 
     def check_values(self, plan: Plan) -> None:
         """The tables of the scene with the first, the smallest and the largest value of every variable."""

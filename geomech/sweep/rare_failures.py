@@ -148,8 +148,9 @@ def importance_sampling(g: LimitState, dimensions: int, samples: int = 500, seed
 
 
 def design_point(g: LimitState, dimensions: int) -> tuple[np.ndarray, int]:
-    """The point of g = 0 that is nearest to the origin, (d,), by the iteration of Hasofer & Lind and Rackwitz & Fiessler
-    with central differences; and how many runs that took. Raises ValueError where a point on the way has no answer or
+    """The point of g = 0 that is nearest to the origin, (d,), by the iteration of Hasofer & Lind and Rackwitz &
+    Fiessler with central differences; and how many runs that took. Raises ValueError where a point on the way has no
+    answer or
     g does not change."""
     point, made, scale = np.zeros(dimensions), 0, 1.0
     for step in range(_STEPS):

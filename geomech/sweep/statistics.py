@@ -100,8 +100,8 @@ def convergence(rows: Sequence[Mapping[str, Any]]) -> np.ndarray:
 
 
 def distribution(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Sorted ``values``, their shares (k − ½)/n, and the half width of the 95 % band about them that Dvoretzky, Kiefer &
-    Wolfowitz (1956) and Massart (1990) give, √(ln(2/0.05)/2n)."""
+    """Sorted ``values``, their shares (k − ½)/n, and the half width of the 95 % band about them that Dvoretzky, Kiefer
+    & Wolfowitz (1956) and Massart (1990) give, √(ln(2/0.05)/2n)."""
     found = np.sort(np.asarray(values, dtype=float))
     n = len(found)
     return found, (np.arange(n) + 0.5) / max(n, 1), math.sqrt(math.log(40.0) / (2.0 * max(n, 1)))

@@ -1,5 +1,5 @@
-"""Clusters of real `dask scheduler` and `dask worker` processes: the same table as here, and what happens when a part of
-them goes away."""
+"""Clusters of real `dask scheduler` and `dask worker` processes: the same table as here, and what happens when a part
+of them goes away."""
 
 from __future__ import annotations
 

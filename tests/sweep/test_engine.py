@@ -111,7 +111,8 @@ def test_ctrl_c_keeps_what_has_ended(plane, tmp_path, interruptible):
     """The first interrupt lets the runs under way end: exit code 3, and the rest is made by --resume."""
     folder, table = tmp_path / "out", plane.with_name("sweep.toml")
     table.write_text(
-        'measure = "pause"\npause_s = 0.05\nruns = 200\nvary = { materials.rock.density_kg_m3 = "uniform(2000, 3000)" }\n'
+        'measure = "pause"\npause_s = 0.05\nruns = 200\n'
+        'vary = { materials.rock.density_kg_m3 = "uniform(2000, 3000)" }\n'
     )
     command = [
         sys.executable,

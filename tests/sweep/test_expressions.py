@@ -18,8 +18,10 @@ NAMES = {
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("a * 3 - 1", 5.0), ("2 ** 3", 8.0), ("-a", -2.0), ("7 // 2 + 7 % 2", 4.0), ("a < 3", True), ("1 < a < 2", False),
-        ("mechanism == 'toppling' and a > 1", True), ("1 if a > 5 else 2", 2.0), ("first.initiation.load_pa / 1e6", 5.0),
+        ("a * 3 - 1", 5.0), ("2 ** 3", 8.0), ("-a", -2.0), ("7 // 2 + 7 % 2", 4.0), ("a < 3", True),
+        ("1 < a < 2", False),
+        ("mechanism == 'toppling' and a > 1", True), ("1 if a > 5 else 2", 2.0),
+        ("first.initiation.load_pa / 1e6", 5.0),
         ("max(history.load)", 4.0), ("last(history.load) - first(history.load)", 2.0), ("mean(history.load)", 8 / 3),
         ("degrees(atan(1))", 45.0), ("max(a, 7)", 7.0), ("not a > 3", True), ("pi", math.pi),
     ],
@@ -39,8 +41,10 @@ def test_what_is_not_there_is_nan():
 @pytest.mark.parametrize(
     "text",
     [
-        "__import__('os').system('true')", "().__class__", "open('x')", "a.__class__.__mro__[0]", "[x for x in (1,)]", "lambda: 1",
-        "'x' * 10**9", "exec('1')", "f'{a}'", "a := 3", "history", "nothing", "1 +", "max()", "max(*history)", "{}", "a[0]",
+        "__import__('os').system('true')", "().__class__", "open('x')", "a.__class__.__mro__[0]", "[x for x in (1,)]",
+        "lambda: 1",
+        "'x' * 10**9", "exec('1')", "f'{a}'", "a := 3", "history", "nothing", "1 +", "max()", "max(*history)", "{}",
+        "a[0]",
         "first", "9j", "-" * 100 + "1", "+".join(["1"] * 1500),
     ],
 )  # fmt: skip

@@ -21,8 +21,9 @@ LOW_BETA, LOW_PROBABILITY = 1.556, 0.060
 
 @dataclass(frozen=True)
 class PlanarSlope:
-    """A slope ``height`` high whose face is at ``face``, with a plane at ``dip`` through its toe, and an upright tension
-    crack ``crack`` deep behind the crest, filled to ``water`` above its tip; shaken by ``shaking`` g horizontally."""
+    """A slope ``height`` high whose face is at ``face``, with a plane at ``dip`` through its toe, and an upright
+    tension crack ``crack`` deep behind the crest, filled to ``water`` above its tip; shaken by ``shaking`` g
+    horizontally."""
 
     height: float = 60.0
     face: float = math.radians(50.0)

@@ -175,8 +175,8 @@ def draw_responses(
 def draw_map(
     shares: np.ndarray, box: Sequence[float], outlines: Sequence[np.ndarray], fixed: Sequence[bool], path: Path
 ) -> Path:
-    """How often each place moves: ``shares`` (ny, nx) over the ``box`` (x0, y0, x1, y1), with the ``outlines`` of blocks
-    of one drawing; ``fixed`` ones are grey."""
+    """How often each place moves: ``shares`` (ny, nx) over the ``box`` (x0, y0, x1, y1), with the ``outlines`` of
+    blocks of one drawing; ``fixed`` ones are grey."""
     from matplotlib.collections import PolyCollection
 
     ratio = (box[3] - box[1]) / (box[2] - box[0])
