@@ -55,7 +55,7 @@ ONLY_IN = {
     "ezdxf": {"shapes"},
     "vtk": {"output", "render"},
     "vtkmodules": {"output", "render"},
-    "pyvista": {"output", "render", "bench"},
+    "pyvista": {"output", "render", "bench", "report"},
     "matplotlib": {"render"},
     "imageio": {"render"},
     "pydantic": {"scene"},
