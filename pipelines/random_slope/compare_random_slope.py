@@ -137,8 +137,12 @@ def draw(found: Mapping[str, Any], file: Path) -> None:
     from matplotlib.figure import Figure
 
     ink, accent, band, fails = "#2f3136", "#1f6f8b", "#cfe0e6", "#c8553d"
-    figure = Figure(figsize=(11.5, 3.9), dpi=120, layout="constrained")
-    left, middle, right = figure.subplots(1, 3)
+    shown = [name for name in ("sau_mau_ping", "normal_strengths", "two_sets") if name in found]
+    if not shown:
+        return
+    figure = Figure(figsize=(0.6 + 3.9 * len(shown), 3.9), dpi=120, layout="constrained")
+    panels = dict(zip(shown, figure.subplots(1, len(shown), squeeze=False)[0], strict=True))
+    left, middle, right = (panels.get(name) for name in ("sau_mau_ping", "normal_strengths", "two_sets"))
     if "sau_mau_ping" in found:
         values, shares, half = distribution(found["sau_mau_ping"].column("factor_of_safety"))
         left.fill_between(
@@ -181,7 +185,7 @@ def draw(found: Mapping[str, Any], file: Path) -> None:
         right.set(xlim=(-2, 62), ylim=(-2, 42), aspect="equal", xlabel="m")
         figure.colorbar(image, ax=right, shrink=0.7, label="% of networks in which it moves")
         right.set_title("Two random joint sets", fontsize=10)
-    for axes in (left, middle, right):
+    for axes in panels.values():
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=8)
     figure.savefig(file, facecolor="white")
