@@ -78,7 +78,7 @@ def test_the_page(swept):
         f"--set {FRICTION}=0", "Only 2 runs failed", "1 runs have no answer",
     ):  # fmt: skip
         assert told in page, told
-    assert page.count("data:image/svg+xml") >= 4 and page.count("data:image/png") >= 3
+    assert page.count("data:image/svg+xml") >= 3 and page.count("data:image/png") >= 3
     assert {"worst", "median", "typical"} == set(read_sweep(swept.folder).pictures)
 
 
