@@ -163,7 +163,7 @@ class DaskEngine:
             try:
                 future = self._client.submit(made_there, batch, key=key, pure=False)
                 break
-            except Exception:  # noqa: BLE001 (whatever a client says whose scheduler is gone)
+            except Exception:
                 self._reconnect()
         under_way[key] = future, batch
         future.add_done_callback(lambda _: ended.put(key))
@@ -175,7 +175,7 @@ class DaskEngine:
         if status == "finished":
             try:
                 rows = future.result(timeout=30)
-            except Exception:  # noqa: BLE001 (the worker went away with it)
+            except Exception:
                 status = "lost"
             else:
                 for row in rows:

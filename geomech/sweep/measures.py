@@ -68,7 +68,7 @@ def carry_out(job: Job) -> dict[str, Any]:
         try:
             row |= _MEASURES[job.settings["measure"]](job)
             row |= _columns(job, row)
-        except Exception as error:  # noqa: BLE001 (whatever ends a run is counted, not raised)
+        except Exception as error:
             refused = any(kind.__name__ in _REFUSALS for kind in type(error).__mro__)
             row |= {"status": REFUSED if refused else FAILED, "reason": _told(error)}
     row["warnings"] = len(heard)

@@ -40,7 +40,7 @@ class Journal:
         if self.path.exists():
             self.rows, whole = _read(self.path)
             os.truncate(self.path, whole)
-        self._file = open(self.path, "a", encoding="utf-8")  # noqa: SIM115 (as long as this context)
+        self._file = open(self.path, "a", encoding="utf-8")
         return self
 
     def __exit__(self, *_: object) -> None:
