@@ -170,7 +170,7 @@ class LocalEngine:
         while len(taken) < count:
             if again:
                 # Alone: its worker may be killed once more.
-                return [again.popleft()] if not taken else taken
+                return taken if taken else [again.popleft()]
             job = next(waiting, None)
             if job is None:
                 break

@@ -125,10 +125,7 @@ def run_table(variables: Sequence[Variable], design: Design, seeds: Sequence[int
     samples of the random ones, of which the k-th takes the k-th of the ``seeds`` (as "seed")."""
     listed = [each for each in variables if isinstance(each, Listed)]
     random = [each for each in variables if isinstance(each, Random)]
-    if random:
-        drawn = samples(random, design).tolist()
-    else:
-        drawn = [[] for _ in (seeds or [0])]
+    drawn = samples(random, design).tolist() if random else [[] for _ in seeds or [0]]
     order = [each.name for each in variables]
     table = []
     for combination in itertools.product(*(each.values for each in listed)):

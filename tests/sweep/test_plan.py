@@ -75,7 +75,8 @@ def test_a_scene_that_cannot_be_drawn_with_any_value_is_refused_as_it_would_be_a
     # Blocks that overlap.
     with pytest.raises(SceneError) as error:
         plan_of(plane, {"vary": {"geometry.zones.block.polygon.3.1": "-2,-2.5"}})
-    alone = pytest.raises(SceneError, load_scene, plane, ["geometry.zones.1.polygon.3.1=-2"])
+    with pytest.raises(SceneError) as alone:
+        load_scene(plane, ["geometry.zones.1.polygon.3.1=-2"])
     assert str(error.value) == str(alone.value)
 
 

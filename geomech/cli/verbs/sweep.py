@@ -13,6 +13,7 @@ from .run import prepare_for_a_run
 
 
 def declare(verbs: Verbs) -> None:
+    """The verb's arguments."""
     made = add_verb(
         verbs, "sweep", _sweep, "make many runs of a scene: what varies, how often it fails, and how sure that is",
         "geomech sweep slope.toml --vary 'joints.beds.friction_angle_deg=20:40:5'\n"

@@ -10,6 +10,8 @@ from .entries import Names, NotNegative, Positive, Table
 
 
 class CorrelationTable(Table):
+    """Two random variables that go together."""
+
     between: Annotated[tuple[str, str], Strict(False)] = Field(description="names of two random variables")
     coefficient: Annotated[float, Field(gt=-1, lt=1)] = Field(
         description="correlation of the normal variables that they are made of (Gaussian copula)"
@@ -17,6 +19,8 @@ class CorrelationTable(Table):
 
 
 class SweepTable(Table):
+    """[sweep]."""
+
     vary: dict[str, Any] = Field(
         {},
         description='what varies: "section.key" = "20:40:5" (a range), "log(1e3, 1e6, 4)", [20, 30] (values), '
