@@ -266,7 +266,7 @@ def _run(job: Job) -> dict[str, Any]:
         **_motion(job, watcher.problem, watcher.last),
         "_summary": summary,
         "_history": {name: np.array([entry.get(name, np.nan) for entry in watcher.rows], dtype=float)
-                     for name in (watcher.rows[0] if watcher.rows else ())},
+                     for name in dict.fromkeys(key for entry in watcher.rows for key in entry)},
     }  # fmt: skip
     if job.pictures and job.folder is not None:
         _draw_end(job, watcher)
