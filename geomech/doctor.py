@@ -164,60 +164,56 @@ def _run(code: str) -> subprocess.CompletedProcess[str]:
         return subprocess.CompletedProcess(late.cmd, 1, "", "no answer within 120 s")
 
 
-#: Blocks that settle and slide, and one with a crack that grows until it is cut in two: together they call on the
-#: kernels of ordinary scenes.
-_SMALL = (
-    """
-    [geometry]
-    dead_ends = "trim"
-    zones = [{ name = "ground", rectangle = [0, -1, 4, 0] }, { name = "block", rectangle = [1, 0, 3, 1] }]
-    joints = [{ name = "cut", points = [[1, 0.3], [3, 0.6]] }]
-    [materials.rock]
-    youngs_modulus_pa = 1e9
-    poissons_ratio = 0.2
-    density_kg_m3 = 2000
-    [zones.ground]
-    fixed = true
-    [joints.default]
-    friction_angle_deg = 20
-    [loads]
-    gravity_m_s2 = [0, -9.81]
-    [dda]
-    time_step_s = 0.01
-    dynamic_factor = DYNAMIC
-    [run]
-    end_time_s = 0.05
-    """,
-    """
-    [geometry]
-    zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
-    cracks = [{ name = "flaw", points = [[-0.005, 0.0], [0.005, 0.002]] }]
-    edges = [
-        { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
-        { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
-    ]
-    [materials.rock]
-    youngs_modulus_pa = 17e9
-    poissons_ratio = 0.21
-    density_kg_m3 = 2200
-    k_ic_pa_sqrt_m = 1e6
-    [[loads.tractions]]
-    edge = "load:top"
-    rate_pa_per_s = [0.0, 0.05e6]
-    [[loads.tractions]]
-    edge = "load:bottom"
-    rate_pa_per_s = [0.0, -0.05e6]
-    [dda]
-    time_step_s = 10.0
-    max_displacement_ratio = 1.0
-    dynamic_factor = DYNAMIC
-    [growth]
-    increment_m = 6e-3
-    [run]
-    end_time_s = 400.0
-    stop_at = ["split"]
-    """,
-)
+#: Blocks that settle and slide, …
+SLIDING_BLOCKS = """
+[geometry]
+dead_ends = "trim"
+zones = [{ name = "ground", rectangle = [0, -1, 4, 0] }, { name = "block", rectangle = [1, 0, 3, 1] }]
+joints = [{ name = "cut", points = [[1, 0.3], [3, 0.6]] }]
+[materials.rock]
+youngs_modulus_pa = 1e9
+poissons_ratio = 0.2
+density_kg_m3 = 2000
+[zones.ground]
+fixed = true
+[joints.default]
+friction_angle_deg = 20
+[loads]
+gravity_m_s2 = [0, -9.81]
+[dda]
+time_step_s = 0.01
+[run]
+end_time_s = 0.05
+"""
+#: … and one with a crack that grows until it is cut in two: together they call on the kernels of ordinary scenes.
+TORN_PLATE = """
+[geometry]
+zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
+cracks = [{ name = "flaw", points = [[-0.005, 0.0], [0.005, 0.002]] }]
+edges = [
+    { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
+    { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
+]
+[materials.rock]
+youngs_modulus_pa = 17e9
+poissons_ratio = 0.21
+density_kg_m3 = 2200
+k_ic_pa_sqrt_m = 1e6
+[[loads.tractions]]
+edge = "load:top"
+rate_pa_per_s = [0.0, 0.05e6]
+[[loads.tractions]]
+edge = "load:bottom"
+rate_pa_per_s = [0.0, -0.05e6]
+[dda]
+time_step_s = 10.0
+max_displacement_ratio = 1.0
+[growth]
+increment_m = 6e-3
+[run]
+end_time_s = 400.0
+stop_at = ["split"]
+"""
 
 
 def warm() -> None:
@@ -230,8 +226,8 @@ def warm() -> None:
     from .scene import load_scene
 
     with tempfile.TemporaryDirectory() as folder:
-        for k, text in enumerate(_SMALL):
+        for k, text in enumerate((SLIDING_BLOCKS, TORN_PLATE)):
             path = Path(folder) / f"scene_{k}.toml"
-            path.write_text(text.replace("DYNAMIC", "0.0"), encoding="utf-8")
+            path.write_text(text, encoding="utf-8")
             scene = load_scene(path)
             run(scene, Path(folder) / str(k), standard_observers(scene, quiet=True))

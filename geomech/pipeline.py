@@ -119,7 +119,10 @@ class CoupledRun:
         self.stopping = [] if stored is None else [kind for kind in stored["stopping"] if kind in self.stops_at]
         self.ended = stored is not None and stored["ended"] and bool(self.stopping)
         self.spent = 0.0 if stored is None else stored["wall_s"]
-        self.before_the_stop = False
+        #: Whether the last checkpoint is what a run that is to stop or end later goes on from: from before its last
+        #: pass, in
+        #: which no crack may grow, or before the step that its end cuts.
+        self.before_the_last = False
 
     def go(self, warnings: Iterable[str] = ()) -> dict[str, Any]:
         """To the end; the summary. ``warnings`` are logged once the log is open."""
@@ -170,13 +173,15 @@ class CoupledRun:
             self.stopping += [event.kind for event in cycle.events if event.kind in self.stops_at]
             self.group.on_cycle(cycle)
         self.ended = True
-        if self._stores and not self.before_the_stop:
+        if self._stores and not self.before_the_last:
             self._store(coupling)
 
     def _between(self, coupling: Coupling) -> None:
-        # A run that is told afterwards not to stop goes on from before its last pass, in which no crack may grow.
-        self.before_the_stop = coupling.stops_next
-        if self.interruption.asked or self.before_the_stop or self.checkpoints.due:
+        last = coupling.stops_next or coupling.ends_next
+        if coupling.under_way is None or last:
+            self.before_the_last = last
+        # (Between the passes of the last step there is one already, from before it.)
+        if self.interruption.asked or last or (self.checkpoints.due and not self.before_the_last):
             self._store(coupling)
         if self.interruption.asked:
             raise KeyboardInterrupt

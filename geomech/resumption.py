@@ -7,7 +7,7 @@ import logging
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from .output.checkpoints import checkpoint_file
 from .output.checkpoints.checkpoint_file import FilesChanged, NotResumable
@@ -42,33 +42,53 @@ def resume(
     on the same machine with as many threads, but for times of day. Rows and files that are later than the checkpoint
     are dropped.
 
-    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on; it keeps
-    the step that ended at its first end, which a run that was as long from the beginning has not where steps are chosen
-    on the way). A run without a checkpoint so far begins again. ``observers`` are those of the run, by default the
-    standard ones (``quiet``: they say nothing); ``tell`` is told when the run begins again. Raises `Finished` when
+    ``overrides`` may change keys in `ALLOWED` ("run.end_time_s=20" lets a finished run go on: from before the step
+    that its
+    first end has cut, as a run that was as long from the beginning). A run without a checkpoint so far begins again.
+    ``observers`` are those of the run, by default the standard ones (``quiet``: they say nothing); ``tell`` is told
+    when the run begins again. Raises `Finished` when
     there is nothing left to do, `NotResumable` when the run cannot be gone on with, `geomech.output.run_lock.FolderInUse`
     while another process is at work in the folder, SceneError on bad input.
     """
-    folder = Path(folder)
-    _refuse_other_folders(folder)
-    with RunLock(folder) as lock:
+    wish = _Wish(Path(folder), tuple(overrides), observers, quiet, tell)
+    _refuse_other_folders(wish.folder)
+    with RunLock(wish.folder) as lock:
         if lock.stale:
             tell(lock.stale)
-        return _resumed(folder, list(overrides), observers, quiet, tell)
+        return _resumed(wish)
 
 
-def _resumed(
-    folder: Path,
-    overrides: list[str],
-    observers: Iterable[Any] | None,
-    quiet: bool,
-    tell: Callable[[str], None],
-) -> dict[str, Any]:
+class _Wish(NamedTuple):
+    """What was asked for, as `resume` has it."""
+
+    folder: Path
+    overrides: tuple[str, ...]
+    observers: Iterable[Any] | None
+    quiet: bool
+    tell: Callable[[str], None]
+
+    def scene(self) -> Any:
+        """The run's scene, with what was changed."""
+        from .scene import load_scene
+
+        return load_scene(self.folder / "scene.toml", self.overrides)
+
+    def watching(self, scene: Any) -> Iterable[Any]:
+        """The observers of a run of ``scene``."""
+        if self.observers is not None:
+            return self.observers
+        from .output import standard_observers
+
+        return standard_observers(scene, quiet=self.quiet)
+
+
+def _resumed(wish: _Wish) -> dict[str, Any]:
+    folder = wish.folder
     header, path = next(checkpoint_file.whole(folder / checkpoint_file.FOLDER), (None, None))
     if path is None:
-        return _begin_again(folder, overrides, observers, quiet, tell)
+        return _begin_again(wish)
     _refuse_other_sources(header, path)
-    scene = None if header["scene"] is None else _scene(folder, overrides)
+    scene = None if header["scene"] is None else wish.scene()
     changes = {} if scene is None else _changes(header, scene.resolved())
     told = _told_end(folder)
     if told is not None:
@@ -78,14 +98,10 @@ def _resumed(
     if scene is not None:
         wanted = scene.problem()
         problem = replace(problem, title=wanted.title, run=wanted.run)
-    if observers is None:
-        from .output import standard_observers
-
-        observers = standard_observers(scene, quiet=quiet)
     warnings = [f"{name} was {was!r}, is now {now!r}" for name, (was, now) in changes.items()]
     warnings += _other_surroundings(header)
     try:
-        return CoupledRun(problem, folder, observers, stored).go(warnings)
+        return CoupledRun(problem, folder, wish.watching(scene), stored).go(warnings)
     except FilesChanged as error:
         raise NotResumable(f"{error}: run it anew") from error
 
@@ -112,12 +128,6 @@ def _refuse_other_sources(header: Mapping[str, Any], path: Path) -> None:
                 f"{path} was written with another {what}{was}: go on with what wrote it, geomech "
                 f"{header.get('geomech')}, or run the scene anew"
             )
-
-
-def _scene(folder: Path, overrides: list[str]) -> Any:
-    from .scene import load_scene
-
-    return load_scene(folder / "scene.toml", overrides)
 
 
 def _changes(header: Mapping[str, Any], resolved: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
@@ -169,9 +179,10 @@ def _refuse_finished(end: str, changes: Mapping[str, Any], header: Mapping[str, 
     if settings is None or no_further or end in ("collapse", "out of sight"):
         raise Finished(f"the run has ended ({end}): there is nothing to go on with")
     if end == "end of the scene":
-        if settings.end_time > header["time_s"] * (1 + 1e-12):
+        ended = header["scene"]["run"]["end_time_s"]
+        if settings.end_time > ended * (1 + 1e-12):
             return
-        way_out = f"--set run.end_time_s=… beyond {header['time_s']:g}"
+        way_out = f"--set run.end_time_s=… beyond {ended:g}"
     else:
         if end not in settings.stop_at:
             return
@@ -180,25 +191,16 @@ def _refuse_finished(end: str, changes: Mapping[str, Any], header: Mapping[str, 
     raise Finished(f"the run has ended ({end}); to let it go on: {way_out}")
 
 
-def _begin_again(
-    folder: Path,
-    overrides: list[str],
-    observers: Iterable[Any] | None,
-    quiet: bool,
-    tell: Callable[[str], None],
-) -> dict[str, Any]:
+def _begin_again(wish: _Wish) -> dict[str, Any]:
+    folder = wish.folder
     end = _told_end(folder)
     if end is not None:
         raise Finished(f"the run has ended ({end}), and it has no checkpoint: run the scene anew to let it go on")
     if not (folder / "scene.toml").is_file():
         raise NotResumable(f"{folder} holds neither a checkpoint nor a scene.toml: run the scene anew")
-    tell(f"{folder} holds no checkpoint yet: the run begins again")
-    scene = _scene(folder, overrides)
-    if observers is None:
-        from .output import standard_observers
-
-        observers = standard_observers(scene, quiet=quiet)
-    return run(scene, folder, observers, again=True)
+    wish.tell(f"{folder} holds no checkpoint yet: the run begins again")
+    scene = wish.scene()
+    return run(scene, folder, wish.watching(scene), again=True)
 
 
 def _other_surroundings(header: Mapping[str, Any]) -> list[str]:

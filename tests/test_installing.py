@@ -11,6 +11,7 @@ import venv
 from pathlib import Path
 
 import pytest
+from small_scenes import PLATE
 
 ROOT = Path(__file__).parents[1]
 
@@ -48,36 +49,6 @@ def test_the_line_of_the_readme_works_without_sudo():
     assert "$(command -v sudo) apt-get install" in text
 
 
-SPECIMEN = """
-[geometry]
-zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
-cracks = [{ name = "flaw", points = [[-0.005, 0.0], [0.005, 0.002]] }]
-edges = [
-    { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
-    { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
-]
-[materials.rock]
-youngs_modulus_pa = 17e9
-poissons_ratio = 0.21
-density_kg_m3 = 2200
-k_ic_pa_sqrt_m = 1e6
-[[loads.tractions]]
-edge = "load:top"
-rate_pa_per_s = [0.0, 0.05e6]
-[[loads.tractions]]
-edge = "load:bottom"
-rate_pa_per_s = [0.0, -0.05e6]
-[dda]
-time_step_s = 10.0
-max_displacement_ratio = 1.0
-[growth]
-increment_m = 6e-3
-[run]
-end_time_s = 400.0
-stop_at = ["split"]
-"""
-
-
 @pytest.mark.slow
 def test_the_lowest_versions_that_are_said_to_do_run_draw_and_read(tmp_path):
     """An environment with exactly the lower bounds of pyproject.toml: a specimen run to its end, drawn and reported, a
@@ -91,7 +62,7 @@ def test_the_lowest_versions_that_are_said_to_do_run_draw_and_read(tmp_path):
     if got.returncode and re.search("connection|resolution|network|timed out", got.stderr, re.IGNORECASE):
         pytest.skip("no package registry can be reached")
     assert got.returncode == 0, got.stderr
-    (tmp_path / "scene.toml").write_text(SPECIMEN)
+    (tmp_path / "scene.toml").write_text(PLATE)
     around = os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     for arguments in (
         ("run", tmp_path / "scene.toml", "--out", tmp_path / "run"),

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_scenes import PLATE
 
 from geomech import cli
-from geomech.bench.cost.coupling_cost import wall
+from geomech.bench.cost.block_scenes import cracked_wall
 from geomech.model import RunSettings
 from geomech.output import (
     Checkpoints,
@@ -47,36 +48,13 @@ k_ic_pa_sqrt_m = 1e6
 """
 #: A plate that is pulled until its crack has cut it in two, and whose parts then part.
 SPLIT = (
-    """
-title = "A plate that is torn"
-[geometry]
-zones = [{ name = "rock", rectangle = [-0.03, -0.06, 0.03, 0.06] }]
-cracks = [{ name = "flaw", points = [[-0.005, 0.0], [0.005, 0.002]] }]
-edges = [
-    { name = "load:top", line = [[-0.03, 0.06], [0.03, 0.06]] },
-    { name = "load:bottom", line = [[-0.03, -0.06], [0.03, -0.06]] },
-]
-"""
-    + ROCK
+    'title = "A plate that is torn"\n'
+    + PLATE
     + """
-[[loads.tractions]]
-edge = "load:top"
-rate_pa_per_s = [0.0, 0.05e6]
-[[loads.tractions]]
-edge = "load:bottom"
-rate_pa_per_s = [0.0, -0.05e6]
-[dda]
-time_step_s = 10.0
-max_displacement_ratio = 1.0
 [ddm]
 elements_per_crack = 2
 elements_per_side = 2
 grading_layers = 1
-[growth]
-increment_m = 6e-3
-[run]
-end_time_s = 400.0
-stop_at = ["split"]
 [output]
 interior_every = 5
 """
@@ -307,7 +285,7 @@ def test_two_cracks_broken_off_at_every_tenth(how, tmp_path):
 def test_a_problem_made_in_python_is_resumed_as_well(tmp_path):
     """A wall of 300 bricks, five of them cracked, without a scene: the blocks' kept factors, and no file to read it
     from."""
-    problem = replace(wall(300, 5), run=RunSettings(end_time=0.2))
+    problem = replace(cracked_wall(300, 5), run=RunSettings(end_time=0.2))
 
     def observers(*more) -> list:
         return [RunLog(), Histories(), JointHistories(), Series(), Checkpoints(every=4), Summary(), *more]
@@ -363,6 +341,29 @@ def test_a_finished_run_says_so_and_can_be_made_longer(write, tmp_path):
     assert longer.history["time"][-1] == pytest.approx(0.12) and longer.scene["run"]["end_time_s"] == 0.12
 
 
+@pytest.mark.parametrize(
+    ("text", "settings", "first", "then"),
+    [
+        (SLIDING, [], 0.055, 0.1),
+        (SHAKEN, [], 0.07, 0.1),
+        (SPLIT, ["run.stepping='events'", "output.interior=false"], 140.0, 160.0),
+    ],
+    ids=["fixed", "automatic", "events"],
+)
+def test_a_run_made_longer_is_one_that_was_as_long_from_the_start(text, settings, first, then, write, tmp_path):
+    """Its first end lies within a step, which the longer run takes whole."""
+    path = write(text)
+    whole, short = (load_scene(path, [*settings, f"run.end_time_s={end}"]) for end in (then, first))
+    for name, scene in (("whole", whole), ("parts", short)):
+        run(scene, tmp_path / name, standard_observers(scene, quiet=True))
+    assert Run(tmp_path / "parts").history["time"][-1] == pytest.approx(first)
+    assert Run(tmp_path / "whole").history["time"].tolist().count(first) == 0
+    with pytest.raises(Finished, match=f"beyond {first:g}"):
+        resume(tmp_path / "parts")
+    resume(tmp_path / "parts", [f"run.end_time_s={then}"], quiet=True)
+    assert differing(tmp_path / "whole", tmp_path / "parts") == []
+
+
 def test_a_run_that_stopped_goes_on_as_if_never_told_to(write, tmp_path):
     """It stops at the coalescence, before the next pass of growth; told not to, it is the run without that key."""
     path = write(SPLIT)
@@ -407,6 +408,30 @@ def test_another_scene_or_version_is_refused(write, tmp_path, monkeypatch):
         resume(out, quiet=True)
     (out / "history.csv").write_bytes(history)
     assert resume(out, quiet=True)["end"] == "end of the scene"
+
+
+def test_a_changed_file_that_the_model_includes_is_refused(write, tmp_path):
+    """A model is all files that it reads, one in another."""
+    (tmp_path / "sizes.geo").write_text("width = 3;\n")
+    (tmp_path / "parts.geo").write_text('Include "sizes.geo";\nheight = 0.5;\n')
+    model = tmp_path / "ground.geo"
+    model.write_text(
+        'Include "parts.geo";\n// Include "none.geo";\nSetFactory("OpenCASCADE");\n'
+        "Rectangle(1) = {0, -1, 0, width, 1};\nRectangle(2) = {1, 0, 0, 1, height};\nCoherence;\n"
+        'Physical Surface("slope") = {1};\nPhysical Surface("block") = {2};\n'
+    )
+    rest = SLIDING.split("[materials.rock]")[1]
+    text = 'title = "included"\n[geometry]\nmodel = "ground.geo"\n[materials.rock]' + rest
+    out = tmp_path / "out"
+    broken_off(load_scene(write(text)), out, 2)
+    for name, was, now in (("sizes.geo", "3", "4"), ("parts.geo", "0.5", "0.6"), ("ground.geo", "{1, 0", "{0.5, 0")):
+        file = tmp_path / name
+        begun = file.read_text()
+        file.write_text(begun.replace(was, now))
+        with pytest.raises(NotResumable, match=rf"{name} is not what the run was begun with"):
+            resume(out)
+        file.write_text(begun)
+    resume(out, quiet=True)
 
 
 def test_what_is_no_run_is_told(write, tmp_path, capfd):

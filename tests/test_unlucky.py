@@ -10,28 +10,12 @@ import time
 from pathlib import Path
 
 import pytest
+from small_scenes import block
 
 from geomech import kernel_folder
 from geomech.output.console.progress import Progress
 
-SCENE = """
-title = "Böschung"
-[geometry]
-zones = [{ name = "ground", rectangle = [0, -1, 3, 0] }, { name = "block", rectangle = [1, 0, 2, 1] }]
-[materials.rock]
-youngs_modulus_pa = 1e9
-poissons_ratio = 0.2
-density_kg_m3 = 2000
-[zones.ground]
-fixed = true
-[loads]
-gravity_m_s2 = [0, -9.81]
-[dda]
-time_step_s = 0.01
-dynamic_factor = 1.0
-[run]
-end_time_s = 0.03
-"""
+SCENE = block("Böschung", moving=True)
 
 
 @pytest.fixture

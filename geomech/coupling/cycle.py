@@ -177,6 +177,17 @@ class Coupling:
         told = () if self.under_way is None else self.under_way.told + self.under_way.pending
         return self._stops(told + self._brought)
 
+    @property
+    def ends_next(self) -> bool:
+        """Whether the next load step is cut, or may be, because the run ends in it: one that lasted longer would take
+        another."""
+        if self.under_way is not None:
+            return False
+        time, end = self.now.state.time, self.problem.run.end_time
+        if self.events is not None:
+            return self.events.may_pass(self.now, end)
+        return end - time < self.length.dt
+
     def cycles(self) -> Iterator[Cycle]:
         """From the initial state to the end; the same to the bit in whatever process and beside whatever else."""
         return alike(self._from_the_start())
@@ -325,11 +336,7 @@ class Coupling:
     def _energy_balance(self, step: _LoadStep, found: Balance, grown: _Grown) -> _EnergyBalance:
         """The energy budget after the pass, checked, and the pass's statistics."""
         now, result, cracks = self.now, found.result, self.now.crack_energy
-        # What is dug out takes what it stores along.
-        dug = result.state.removed is not now.state.removed
-        budget = (now.budget.cut() if dug else now.budget).after(
-            result.energy, result.state.time, growing=self.static and step.growth_pass > 0
-        )
+        budget = self._budget_after(result, self.static and step.growth_pass > 0)
         statistics = {**result.statistics, **budget.statistics(), **found.statistics}
         gone_by = result.state.time - self.began
         if abs(gone_by - result.dt) > 1e-9 * result.dt:
@@ -393,10 +400,17 @@ class Coupling:
             if until - result.state.time <= 1e-9 * result.dt:
                 return replace(found, result=replace(result, state=replace(result.state, time=until)))
             self.range.check(now.motion(result.state), now.blocks, result.state.time)
-            budget = now.budget.after(result.energy, result.state.time)
+            budget = self._budget_after(result, False)
             now.crack_energy.passed(found.tips, now.blocks, now.problem.materials, *self._felt())
             self._count_at_cracks(result.state, budget)
             now.take_step(result.state, budget)
+
+    def _budget_after(self, result: dda.StepResult, growing: bool) -> dda.EnergyBudget:
+        """The blocks' budget with the step ``result``, in which cracks are ``growing`` at one load or not."""
+        now = self.now
+        # What is dug out takes what it stores along.
+        dug = result.state.removed is not now.state.removed
+        return (now.budget.cut() if dug else now.budget).after(result.energy, result.state.time, growing=growing)
 
     def _count_at_cracks(self, state: State, budget: dda.EnergyBudget, cut: Sequence[int] = ()) -> None:
         """A step has been taken to ``state``, after which the blocks have this ``budget``, and in which some are

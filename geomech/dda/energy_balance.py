@@ -48,6 +48,9 @@ class StepEnergy(NamedTuple):
     carried          lost because only a part of the velocity is carried over (dynamic factor below 1)
     overlap          brought in by contacts that close where blocks already overlap
     residual         of the balance within the step: round-off
+    impact           lost in impacts with a coefficient of restitution, across the contact (`impacts`); their friction
+                     is in
+                     ``friction``
     """
 
     kinetic: float
@@ -64,6 +67,7 @@ class StepEnergy(NamedTuple):
     carried: float
     overlap: float
     residual: float
+    impact: float = 0.0
 
     @property
     def stored(self) -> float:
@@ -157,7 +161,7 @@ def step_energies(
     law,
     closure,
 ):
-    """The terms of `StepEnergy` in its order, (14,).
+    """The terms of `StepEnergy` in its order but for impacts, (14,).
 
     Blocks: ``increment``, ``carried``, ``acceleration``, ``load`` (n_blocks, 6) as solved with, ``old_velocity`` and
     ``velocity`` before and after the step, ``old_stress``, ``tangent``, ``stress0`` with σ′ = tangent Δε + stress0;
@@ -273,7 +277,7 @@ class EnergyBudget:
     result.state.time)``.
 
     work       weight and loads
-    losses     friction, damping, bonds, time scheme, carried velocity, cracks
+    losses     friction, damping, bonds, impacts, time scheme, carried velocity, cracks
     overlap    brought in by blocks that overlapped, and of that ``drawn`` in the first step, as blocks were drawn
     start      stored as the first step began
     stored     stored now
@@ -359,6 +363,7 @@ class EnergyBudget:
         """The columns of a history, J/m."""
         sums = self.totals.tolist()
         out = {column: sums[_SUMS[name]] for column, name in _COLUMNS.items()}
+        out["split_energy"] = self.split
         out["energy_residual"] = self.residual
         out["growth_release"] = self.released
         return out
@@ -374,8 +379,9 @@ _COLUMNS = {
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "bond",
+    "impact_loss": "impact",
     "scheme_loss": "scheme",
     "carried_loss": "carried",
     "overlap_energy": "overlap",
 }
-_LOSSES = [_SUMS[name] for name in ("crack_work", "friction", "damping", "bond", "scheme", "carried")]
+_LOSSES = [_SUMS[name] for name in ("crack_work", "friction", "damping", "bond", "impact", "scheme", "carried")]

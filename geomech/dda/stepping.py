@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..model import Blocks, DdaSettings, JointLaw, Loads, Material, Motion, State
 from .energy_balance import EnergyBudget
@@ -54,7 +54,9 @@ def run(
     watch: Callable[[StepResult], None] | None = None,
 ) -> Iterator[State]:
     """States of a block system from rest (or from ``state``) until ``end_time``, one a step; `StepLength` says how
-    long. ``watch`` sees every `StepResult`.
+    long. ``watch`` sees every `StepResult`. The arrays of states are those that the run goes on with: they can be read
+    and
+    kept, and not written to (`State.writable` has copies).
 
     ``for state in dda.run(blocks, [rock], [joint], loads, settings, 1.0): …``
 
@@ -69,12 +71,13 @@ def run(
     if state is None:
         state = State.at_rest(blocks)
     state.refuse_misfit(blocks)
+    state = state.writable()
     if system.scheme.static and loads.viscous_boundaries:
         log.warning("viscous boundaries do nothing in a static run")
     watched = _Watch(blocks)
     if settings.equilibrium:
         state = _at_rest(system, state, loads, state.time)
-    yield state
+    yield state.read_only()
     length = StepLength(settings)
     at_every_load = settings.equilibrium == "loads" and system.scheme.static
     while state.time < end_time * (1 - 1e-12):
@@ -86,10 +89,11 @@ def run(
         result = system.step(state, loads, dt, load_time=load_time)
         length.after(result, dt)
         watched.look(state, result)
-        if watch is not None:
-            watch(result)
         state = result.state
-        yield state
+        seen = state.read_only()
+        if watch is not None:
+            watch(replace(result, state=seen))
+        yield seen
 
 
 def _at_rest(system: BlockSystem, state: State, loads: Loads, load_time: float) -> State:

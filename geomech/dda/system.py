@@ -223,6 +223,8 @@ class BlockSystem:
         hasty |= not self.scheme.static and len(self.moving) >= MANY
         if not 0 < dt < np.inf:
             raise ValueError(f"a time step must be positive, got {dt!r} s")
+        # (Kernels are compiled for arrays that can be written to.)
+        state = state.writable()
         self._stray_loads.refuse(loads)
         removed = self.removed(loads, state.time)
         if removed is not self.taken_out:
@@ -381,6 +383,7 @@ class BlockSystem:
 
     def contacts_near(self, state: State) -> ContactSet:
         """The contacts that a step from ``state`` would begin with, as CONTACT rows tell of them."""
+        state = state.writable()
         vertices = np.ascontiguousarray(state.vertices)
         return self.finder.find(state, vertices, self._standing(state, vertices), lumped=True)
 

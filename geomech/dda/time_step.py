@@ -6,7 +6,7 @@ too far.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,8 +16,9 @@ from ..conventions import rotate_stress
 from ..model import OPEN, SLIP, STICK, Loads, State
 from .contact_detection.contact_records import copied
 from .energy_balance import StepEnergy, sliding, step_energies
+from .impacts.restitution import Rebound, RigidBlocks, Striking
 from .joint_laws.coulomb_return import reserves
-from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, stop
+from .joint_laws.friction_arrest import Stopped, Unresolved, contact_speeds, dissipating, kinetic_energy, stop
 from .joint_laws.penalty_springs import Springs, end_of_step, over_a_step
 from .joint_laws.sheared_stick import stretched
 from .kinematics.constraints import balanced, hold, with_rigid_motion
@@ -25,6 +26,7 @@ from .kinematics.midpoint_configuration import Middle
 from .kinematics.newmark import advance, assemble_blocks, turned
 from .kinematics.rigid_blocks import mean_stress
 from .kinematics.roundoff import tell_felt, undecided_gaps
+from .kinematics.simplex_integration import block_moments
 from .linear_solver import assembly
 from .loads.load_vectors import AppliedForces, Inertia, generalised
 from .loads.step_actions import StepActions, felt_gravity
@@ -49,6 +51,34 @@ _PLACED = 20
 #: ``precision``; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
 #: (slabs that lean, of a tenth of that, as much in one step as all loads do).
 _BENDS, _KNOWN, _KNOWN_IN_STATICS = 4, 0.1, 1e-3
+
+
+#: Blocks that have struck and are closer than they can be, by what others have made of it, are set apart so often.
+_LANDINGS = 4
+
+
+@dataclass(eq=False)
+class Impact:
+    """What the impacts of a step have done so far.
+
+    without  (n_blocks, 6)   velocities as they would be without
+    moved    (n_blocks, 6)   of blocks beside the step's displacement
+    lost, rubbed             J/m taken by restitution and friction
+    """
+
+    without: np.ndarray
+    moved: np.ndarray
+    lost: float = 0.0
+    rubbed: float = 0.0
+
+    @classmethod
+    def none(cls, velocity: np.ndarray) -> Impact:
+        return cls(velocity, np.zeros_like(velocity))
+
+    def add(self, rebound: Rebound) -> None:
+        self.moved[:, :3] += rebound.moved
+        self.lost += rebound.lost
+        self.rubbed += rebound.rubbed
 
 
 class Attempt:
@@ -84,7 +114,10 @@ class Attempt:
             np.ascontiguousarray(crack.compliance, dtype=float) if self.given else system.no_compliance
         )
         self.crack_offset = np.ascontiguousarray(crack.offset, dtype=float) if self.given else system.no_offset
-        self.stress, self.crack_strain = np.ascontiguousarray(state.stress), np.ascontiguousarray(state.crack_strain)
+        self.stress, self.crack_strain = np.array(state.stress), np.ascontiguousarray(state.crack_strain)
+        if system.taken_out is not None:
+            # What blocks store goes with them, in the first step without them and not after it.
+            self.stress[system.taken_out] = 0.0
         self.iterations = 0
         if not scheme.static and found.tried is None and len(found):
             self.found = found.expecting(*self._expected_states())
@@ -195,6 +228,9 @@ class Attempt:
             if found.points is not None or tries > 1:
                 self.matrix, self.right = own[0].copy(), own[1].copy()
             springs, gap, weight, curved = self._over_the_step(found)
+            striking = self._striking(found)
+            if striking is not None:
+                gap = striking.apart(gap, self.system.half_diagonal)
             geometry = middle.contacts(found.geometry, found.block, found.other, self._along(found))
             vectors = assembly.contact_vectors(found.block, found.other, geometry, order, middle.moments)
             middle.turn_back(vectors, found.block, found.other, geometry)
@@ -217,6 +253,8 @@ class Attempt:
                     self.pattern, self.matrix, self.right, vectors, geometry, found, gap, solve
                 )
             self.iterations += settled.iterations
+            if striking is not None:
+                settled = striking.back(settled, self.system.half_diagonal)
             better = found.misplaced(settled)
             if better is None:
                 break
@@ -230,7 +268,18 @@ class Attempt:
         else:
             raise Unsettled("faces do not settle on the part of them that touches")
         self.found, self.settled, self.unknowns = found, settled, unknowns
-        self.vectors, self.weight, self.acting = vectors, weight, geometry
+        self.vectors, self.weight, self.acting, self.striking = vectors, weight, geometry, striking
+
+    def _striking(self, found: ContactSet) -> Striking | None:
+        """The contacts of ``found`` through which blocks may strike each other with a coefficient of restitution."""
+        restitution = self.system.finder.restitution(found)
+        if restitution is None or self.system.scheme.static or not len(found) or not self.n_free:
+            return None
+        rigid = self.carried.copy()
+        rigid[:, 3:] = 0.0
+        centroid = np.ascontiguousarray(self.moments[:, 1:3])
+        speed = contact_speeds(found, found.geometry, rigid, centroid)
+        return Striking.of(found, restitution, speed, float(np.hypot(*self.gravity)) * self.dt)
 
     def _laboured(self) -> bool:
         """Whether shorter steps are likely to come sooner to where this one goes."""
@@ -393,8 +442,11 @@ class Attempt:
         if imposed is not None:
             imposed.correct_velocity(velocity)
         self.increment, self.velocity, self.acceleration = increment, velocity, acceleration
+        self.impact: Impact | None = None
         if not scheme.static and self.n_free:
             self._stop(imposed)
+            if self.striking is not None:
+                self._rebound(imposed)
 
     def _remembered(self, mean: np.ndarray) -> np.ndarray | None:
         """(n_blocks, 6) the acceleration that the step began with, as far as it still holds; None before there is any.
@@ -443,6 +495,56 @@ class Attempt:
         )
         self.velocity, self.rubbed = velocity + rates, min(max(rubbed, 0.0), taken)
 
+    def _rebound(self, imposed) -> None:
+        """Move blocks that strike each other in the step as their impacts do (`impacts`)."""
+        found, striking = self.found, self.striking
+        gap = self._gaps_now()
+        struck = striking.closed(gap)
+        if not struck.any():
+            return
+        impact = Impact.none(self.velocity)
+        blocks = self._rigid_blocks(self.increment, imposed)
+        self._strike(impact, striking.rebound(found, self.settled, struck, gap, blocks, self.dt))
+        for _ in range(_LANDINGS):
+            gap = self._gaps_now()
+            struck = striking.closed(gap + self.system.rounding)
+            if not struck.any():
+                break
+            blocks = self._rigid_blocks(self.increment + impact.moved, imposed)
+            self._strike(impact, striking.landed(found, self.settled, struck, gap, blocks))
+        self.impact = impact
+
+    def _gaps_now(self) -> np.ndarray:
+        """(n,) m of the contacts at the end of the step, from where faces meet."""
+        found = self.found if self.found.lumped is None else self.found.lumped
+        return self.system.finder.gaps(self.new_vertices, self.vertices, found) - found.lift
+
+    def _strike(self, impact: Impact, rebound: Rebound) -> None:
+        """Add ``rebound`` to what impacts have done in the step."""
+        impact.add(rebound)
+        self.velocity = self.velocity.copy()
+        self.velocity[:, :3] = rebound.velocity
+        self.new_vertices, _, self.new_stress, self.new_crack, self.largest = self._advanced(
+            self.increment + impact.moved
+        )
+
+    def _rigid_blocks(self, increment: np.ndarray, imposed) -> RigidBlocks:
+        """The blocks as rigid bodies after ``increment`` (n_blocks, 6)."""
+        system, moments, found = self.system, self.moments, self.found
+        inertia = self.density * (moments[:, 3] + moments[:, 4])
+        inverse = 1.0 / np.stack([system.mass, system.mass, inertia], axis=1)
+        inverse[system.fixed] = 0.0
+        if system.held is not None:
+            inverse[system.held[:, :3]] = 0.0
+        if imposed is not None:
+            inverse[imposed.driven] = 0.0
+        end = Middle.of(increment, 1.0, self.vertices, system.owner, moments)
+        geometry = end.contacts(found.geometry, found.block, found.other, self._along(found))
+        return RigidBlocks(
+            end.centroid, inverse, self.velocity[:, :3], self.carried[:, :3], increment[:, 2], geometry[:, 1:3],
+            geometry[:, 5:7],
+        )  # fmt: skip
+
     def result(self) -> StepResult:
         """The step as it is told of."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
@@ -453,6 +555,8 @@ class Attempt:
         rows = found.rows(settled, acting)
         reaction, acting_right, largest_force, acted = None, self.right, 0.0, {}
         points, load, turn = self.points, self.load, self.increment[:, 2]
+        if self.impact is not None:
+            turn = turn + self.impact.moved[:, 2]
         if actions is not None:
             points, reaction, acted = actions.acted(settled, self.unknowns, rows, points, self.new_vertices)
             acting_right, largest_force = actions.with_bolt_forces(self.right), actions.largest_bolt_force
@@ -544,9 +648,10 @@ class Attempt:
         """The terms of the step's balance under the generalised ``load``; contacts end it with ``end_shear`` (n,)."""
         system, scheme, found, settled = self.system, self.system.scheme, self.found, self.settled
         weight = self.weight if isinstance(self.weight, np.ndarray) else np.full(len(found), self.weight)
-        energy = StepEnergy._make(
-            step_energies(
-                self.increment, self.state.velocity, self.carried, self.velocity, self.acceleration, self.dt,
+        impact, velocity = self.impact, self.velocity if self.impact is None else self.impact.without
+        energy = StepEnergy(
+            *step_energies(
+                self.increment, self.state.velocity, self.carried, velocity, self.acceleration, self.dt,
                 self.gravity,
                 load, scheme.weight, scheme.block_damping, scheme.mass_damping, scheme.stiffness_damping, self.density,
                 self.moments, system.fixed, self.stress, self.tangent, self.stress0, system.compliance,
@@ -557,6 +662,21 @@ class Attempt:
                 *self._real_springs(), weight, found.law, system.finder.closure,
             ).tolist()
         )  # fmt: skip
+        if impact is not None:
+            end = block_moments(self.new_vertices, system.next, system.vertex_start)
+            kinetic = kinetic_energy(self.velocity, end, system) - kinetic_energy(velocity, end, system)
+            moved = impact.moved[~system.fixed]
+            fallen = float(system.mass[~system.fixed] @ (moved[:, :2] @ self.gravity))
+            pulled = float((load[~system.fixed] * moved).sum())
+            energy = energy._replace(
+                kinetic=energy.kinetic + kinetic,
+                gravity_work=energy.gravity_work + fallen,
+                load_work=energy.load_work + pulled,
+                friction=energy.friction + impact.rubbed,
+                impact=impact.lost,
+                # What is left: impulses at the step's end, displacements in a straight line.
+                scheme=energy.scheme + fallen + pulled - kinetic - impact.rubbed - impact.lost,
+            )
         return energy._replace(
             before=energy.before + found.unbent + found.released,
             bond=energy.bond + found.unbent,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -109,6 +109,18 @@ class State:
             contacts=np.empty(0, CONTACT),
         )
 
+    def read_only(self) -> State:
+        """The same with arrays that cannot be written to: views of these, no copies."""
+        return replace(self, **{name: _view(value) for name, value in self._arrays()})
+
+    def writable(self) -> State:
+        """The same with arrays that can be written to: these, copies of those that cannot."""
+        copies = {name: value.copy() for name, value in self._arrays() if not value.flags.writeable}
+        return replace(self, **copies) if copies else self
+
+    def _arrays(self) -> list[tuple[str, np.ndarray]]:
+        return [(name, value) for name, value in vars(self).items() if isinstance(value, np.ndarray)]
+
     def refuse_misfit(self, blocks: Blocks) -> None:
         """Raise ValueError for arrays that do not fit ``blocks`` in shape, or are not finite."""
         n = blocks.n_blocks
@@ -123,6 +135,12 @@ class State:
                 )
             if not np.isfinite(value).all():
                 raise ValueError(f"the state's {name} is not finite")
+
+
+def _view(array: np.ndarray) -> np.ndarray:
+    out = array.view()
+    out.flags.writeable = False
+    return out
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,12 @@ BLOCKS = {
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "broken bonds",
+    "impact_loss": "impacts",
     "scheme_loss": "time scheme",
     "carried_loss": "velocity carried over",
     "growth_release": "of the time scheme: set free by growth at one load",
     "overlap_energy": "overlaps",
+    "split_energy": "of blocks dug out (they take it along) or cut",
     "energy_residual": "unexplained",
 }
 #: Where what is spent on cracks comes from …

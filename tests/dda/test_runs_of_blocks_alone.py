@@ -150,3 +150,24 @@ def test_an_excavation_of_what_is_not_there_is_refused_before_the_run(excavation
 def test_no_blocks_are_refused():
     with pytest.raises(ValueError, match="no blocks to move"):
         next(dda.run(Blocks.from_polygons([]), [ROCK], [JOINT], WEIGHT, MOVING, 1.0))
+
+
+def test_states_cannot_be_written_to_and_are_no_copies():
+    """What a reader did to a state would be done to the run; gone on with from one, it is the same to the bit."""
+    blocks = on_incline(35.0)
+    results: list[dda.StepResult] = []
+    states = list(dda.run(blocks, [ROCK], [JOINT], WEIGHT, MOVING, 0.02, watch=results.append))
+    for state in (states[0], states[-1], results[-1].state):
+        for name in ("vertices", "velocity", "stress", "rotation", "crack_strain", "contacts"):
+            array = getattr(state, name)
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0.0
+            assert not array.flags.owndata  # a view
+    assert states[-1].writable().velocity.flags.writeable and not states[-1].velocity.flags.writeable
+    middle = states[10]
+    again = list(dda.run(blocks, [ROCK], [JOINT], WEIGHT, MOVING, 0.02, state=middle))
+    for name in ("vertices", "velocity"):
+        assert np.array_equal(getattr(again[-1], name), getattr(states[-1], name))
+    # A step may begin from one as well, which stays as it was.
+    result = dda.BlockSystem(blocks, [ROCK], [JOINT], settings=MOVING).step(middle, WEIGHT)
+    assert np.array_equal(result.state.vertices, states[11].vertices) and result.state.velocity.flags.writeable

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from small_scenes import block
 
 from geomech import cli
 from geomech.output import run_lock
@@ -16,22 +17,7 @@ from geomech.pipeline import overwriting, run
 from geomech.resumption import resume
 from geomech.scene import load_scene
 
-SCENE = """
-[geometry]
-zones = [{ name = "ground", rectangle = [0, -1, 3, 0] }, { name = "block", rectangle = [1, 0, 2, 1] }]
-[materials.rock]
-youngs_modulus_pa = 1e9
-poissons_ratio = 0.2
-density_kg_m3 = 2000
-[zones.ground]
-fixed = true
-[loads]
-gravity_m_s2 = [0, -9.81]
-[dda]
-time_step_s = 0.01
-[run]
-end_time_s = 0.03
-"""
+SCENE = block()
 #: A process that has the folder until it is ended.
 HOLDS = """
 import sys, time

@@ -172,3 +172,18 @@ def test_default_sizes_are_a_few_thousand_triangles_and_quick():
 def test_bad_sizes():
     with pytest.raises(ValueError, match="must be positive"):
         meshed([], size=0.0)
+
+
+def test_flat_triangles_between_near_cracks_are_told_with_their_place(caplog):
+    """Two parallel cracks a ten-thousandth of a side apart: triangles between them are as flat as that."""
+    near = 2e-5
+    with caplog.at_level("INFO", logger="geomech"):
+        _, _, mesh = meshed([[[0.3, 0.5], [0.7, 0.5]], [[0.3, 0.5 + near], [0.7, 0.5 + near]]])
+    angle, place = mesh.flattest()
+    assert angle < np.radians(0.2) and 0.25 < place[0] < 0.75 and abs(place[1] - 0.5) < 0.01
+    (line,) = [record.getMessage() for record in caplog.records]
+    assert f"{np.degrees(angle):.2g} degrees" in line and f"({place[0]:.6g}, {place[1]:.6g})" in line
+    caplog.clear()
+    with caplog.at_level("INFO", logger="geomech"):
+        _, _, mesh = meshed([[[0.3, 0.5], [0.7, 0.5]]])
+    assert mesh.flattest()[0] > np.radians(10.0) and not caplog.records

@@ -181,6 +181,15 @@ class EventSteps:
     def _far(self, way: float) -> bool:
         return self._pace is None or self._pace * way > NEAR
 
+    def may_pass(self, now: CrackedBlocks, end: float) -> bool:
+        """Whether the next first pass would go beyond the time ``end`` s but for it, as far as can be said before: no
+        tip is
+        expected to be driven before."""
+        start = now.state.time
+        if self._limit(now, start, math.inf) <= end:
+            return False
+        return self._drive is None or self._rate <= 0.0 or start + (1.0 - self._drive) / self._rate > end
+
     def _limit(self, now: CrackedBlocks, start: float, end: float) -> float:
         """The latest time to which a step from ``start`` may go, s."""
         stage = until_next_event(now.problem.loads, start, end - start)

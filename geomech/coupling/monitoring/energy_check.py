@@ -14,16 +14,18 @@ UNPAID = 0.25
 
 
 class BudgetWatch:
-    """Logs a warning, once, when more than `GAIN` of all energy turned over is left over, blocks and cracks together."""
+    """Logs a warning when more than `GAIN` of all energy turned over is left over, blocks and cracks together, and
+    again
+    whenever that has doubled since."""
 
     def __init__(self) -> None:
-        self._told = False
+        self._told = GAIN
 
     def check(self, share: float, time: float) -> None:
         """``share`` of what was turned over until ``time``, s, came from nowhere, or went nowhere."""
-        if self._told or not abs(share) > GAIN:
+        if not abs(share) > self._told:
             return
-        self._told = True
+        self._told = 2.0 * abs(share)
         log.warning(
             "t = %g s: %.2g of all energy turned over is not accounted for (budget_residual in history.csv): shorten the "
             "time step, where cracks grow also growth.increment_m",

@@ -89,6 +89,7 @@ class ContactFinder:
         self._settings = settings
         self._modulus, self._area = modulus, blocks.areas()
         self._table = JointTable.of(joints)
+        self._rebounds = bool(np.isfinite(self._table.restitution).any())
         self._stiff = ~np.isnan(self._table.normal_stiffness)
         # What bonds, waves cross as they do rock.
         self._yields = ~self._stiff & (self._table.tension == 0.0) & (self._table.cohesion == 0.0)
@@ -459,6 +460,10 @@ class ContactFinder:
         if not (self._table.curved.any() and self._table.curved[found.law].any()):
             return None
         return CurvedJoints(self._table, found)
+
+    def restitution(self, found: ContactSet) -> np.ndarray | None:
+        """(n,) e of the contacts of ``found``, nan where their law names none; None where no law does."""
+        return self._table.restitution[found.law] if self._rebounds else None
 
     def _laws(self, edge: np.ndarray, mate: np.ndarray) -> np.ndarray:
         a, b = self._edge_name[edge], self._edge_name[mate]

@@ -215,6 +215,12 @@ def _product(u: np.ndarray, w: np.ndarray, moments: np.ndarray) -> np.ndarray:
     return total + (u[:, 3] * r + p * w[:, 3] + q * w[:, 4] + u[:, 4] * s) * xy
 
 
+def kinetic_energy(velocity: np.ndarray, moments: np.ndarray, system) -> float:
+    """J/m of the blocks of ``system`` that move, with ``velocity`` (n_blocks, 6) and these `block_moments`."""
+    density = np.where(system.fixed, 0.0, system.mass / moments[:, 0])
+    return 0.5 * float(density @ _product(velocity, velocity, moments))
+
+
 def dissipating(
     change: np.ndarray, velocity: np.ndarray, moments: np.ndarray, density: np.ndarray, fixed: np.ndarray
 ) -> tuple[np.ndarray, float]:

@@ -51,6 +51,7 @@ class JointTable:
     peak_slip: np.ndarray
     stiff_by_peak: np.ndarray
     closure: np.ndarray
+    restitution: np.ndarray
     normal_stiffness: np.ndarray
     shear_stiffness: np.ndarray
     curved: np.ndarray
@@ -79,6 +80,7 @@ class JointTable:
             peak_slip=rough(lambda r: r.peak_slip, np.inf),
             stiff_by_peak=rough(lambda r: r.from_peak_slip, 0.0) > 0,
             closure=column(lambda j: j.max_closure, np.inf),
+            restitution=column(lambda j: j.restitution),
             normal_stiffness=column(lambda j: j.normal_stiffness),
             shear_stiffness=column(lambda j: j.shear_stiffness),
             curved=np.array([not j.straight for j in joints], dtype=bool),

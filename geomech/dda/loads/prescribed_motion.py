@@ -148,6 +148,11 @@ class ImposedMotion:
         for row, value, speed in zip(rows, by, motion.rate(start, end), strict=True):
             self._add(b, row, value, speed, number)
 
+    @property
+    def driven(self) -> list[int]:
+        """Blocks that are not fixed and have given motion: nothing that strikes them changes it."""
+        return list(self._given)
+
     def _add(self, block: int, row: np.ndarray, by: float, rate: float, source: int) -> None:
         given = self._given.setdefault(block, _Given([], [], [], []))
         given.rows.append(row)

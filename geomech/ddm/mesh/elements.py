@@ -21,7 +21,7 @@ from ...model import Cracks, DdmSettings
 from ...model.blocks.polygon import signed_area
 from ..system.influence_matrix import ElementSet
 from .crack_nodes import cut, ends_at, share_ends, straight_on
-from .grading import KINK, Grading
+from .grading import BESIDE, KINK, Grading
 from .half_plane import ON_SURFACE, HalfPlane
 from .proximity import keep_apart
 
@@ -78,11 +78,12 @@ def mesh(
         (cracks.nodes[k], _layers_at(cracks, k, sides_of_rock, grading))
         for k in (np.flatnonzero(cracks.surface & (cracks.valence > 0)) if len(edges) else ())
     ]
-    key: tuple = float(extent), tuple((*point, deep) for point, deep in mouths)
+    corners = _corners_beside(cracks, loops, settings, grading)
+    key: tuple = float(extent), tuple((*point, deep) for point, deep in [*mouths, *corners])
     if known is not None and known.sides[0] == key:
         sides = known.sides
     else:
-        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, marks), _straight_on(loops)
+        sides = key, _boundary(loops, edges, mouths, settings, grading, extent, [*marks, *corners]), _straight_on(loops)
     boundary = sides[1]
     crack = _cracks(cracks, settings, grading, extent, sides_of_rock)
     start, end, kind, source = (np.concatenate(pair) for pair in zip(boundary, crack))
@@ -140,13 +141,42 @@ def _with_images(half_plane: HalfPlane, ends, kind, source, touching, near: floa
     return ends, np.concatenate([kind, kind]), np.concatenate([source, source + n]), both
 
 
+def _corners_beside(cracks: Cracks, loops: list[np.ndarray], settings: DdmSettings, grading: Grading):
+    """Re-entrant corners of the outline that cracks come near to, and the layers that each takes: (point (2,),
+    layers)."""
+    if grading.target is not None or not cracks.n_segments:
+        return []
+    found = []
+    ends = cracks.nodes[cracks.segments]
+    for loop, span in zip(loops, _spans(loops)):
+        angles = interior_angles(loop)
+        for k in np.flatnonzero(angles > np.pi + KINK):
+            off = _distance(loop[k], ends)
+            # A crack that begins at the corner has a mouth there.
+            near = off.min() < BESIDE * span / settings.elements_per_side and off.min() > 1e-7 * span
+            if near:
+                found.append((loop[k], grading.beside_crack(float(angles[k]))))
+    return found
+
+
+def _distance(point: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """(n,) m from ``point`` (2,) to segments with these ``ends`` (n, 2, 2)."""
+    along, to = ends[:, 1] - ends[:, 0], point - ends[:, 0]
+    part = np.clip((to * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)
+    return np.hypot(*(to - part[:, None] * along).T)
+
+
+def _spans(loops: list[np.ndarray]) -> list[float]:
+    """m, the size that a loop's elements are parts of: √area of the outline, of holes alone each its own."""
+    spans = [math.sqrt(abs(signed_area(loop))) for loop in loops]
+    return spans[:1] * len(loops) if loops and signed_area(loops[0]) > 0 else spans
+
+
 def _boundary(loops, edges, mouths, settings, grading, extent, marks):
     if not len(edges):
         return np.empty((0, 2)), np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64)
     length = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
-    spans = [math.sqrt(abs(signed_area(loop))) for loop in loops]
-    if signed_area(loops[0]) > 0:
-        spans = spans[:1] * len(loops)
+    spans = _spans(loops)
     angles = np.concatenate([interior_angles(loop) for loop in loops])
     corner = [grading.at_corner(angle) for angle in angles]
     if grading.target is not None:

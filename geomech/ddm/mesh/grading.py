@@ -31,6 +31,10 @@ FOLD, FOLD_SHRINKS = math.radians(120), math.radians(20 / 3)
 #: to 45°, 1 to 0.01 of their crack), and ungraded ones leave this error of K, in proportion to the turn up to that
 #: beside it.
 CLOSED_KINK, CLOSED_EXPONENT, CLOSED_ERROR, CLOSED_TURN = math.radians(5) - 1e-9, 0.41, 1.1e-2, math.radians(25)
+#: Re-entrant corners of the outline that a crack comes nearer to than so many of the outline's elements get as many
+#: layers as leave this error of K there, unless none are wanted: three, which serve elsewhere, left 1.5e-2 beside a
+#: right-angled one (`tests/ddm/mesh/test_corner_beside_crack.py`).
+BESIDE, CORNER_ERROR = 3.0, 2e-3
 #: Layers that any node gets; the smallest element stays above `Grading.finest` anyhow.
 MOST_LAYERS = 16
 #: An element of length h at a distance r from the origin loses 1e-13 r/h of K, since its collocation points are
@@ -118,6 +122,14 @@ class Grading:
         if angle > math.pi + KINK:
             return self.layers + 1
         return 1 if angle < math.pi - KINK and self.layers else 0
+
+    def beside_crack(self, angle: float) -> int:
+        """At a re-entrant corner of the outline near a crack; ``angle`` (rad) of rock."""
+        if self.target is not None or not self.layers:
+            return self.at_corner(angle)
+        error, power = ungraded(angle, "outline")
+        wanted = self._layers_for(math.log(max(error / CORNER_ERROR, 1.0)) / power)
+        return max(self.at_corner(angle), wanted + self.layers - KINK_LAYERS)
 
     def at_closed_kink(self, turn: float) -> int:
         """At a kink by ``turn`` of a crack that was drawn closed; no fewer than at an open one."""

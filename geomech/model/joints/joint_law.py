@@ -89,6 +89,9 @@ class JointLaw:
                                 rotation as an elastic bed without tension does
     max_closure                 m: hyperbolic closure σ = kₙ δ/(1 − δ/Vm) of Bandis, Lumsden & Barton (1983), Int. J.
                                 Rock Mech. 20, 249-268, with ``normal_stiffness`` the initial one; None: straight
+    restitution                 e of Newton's impact law v′ = −e v across the faces of blocks that strike each other, 0
+                                to
+                                1; None: what springs and time integration leave of the speed
 
     Raises ValueError that names the joint.
     """
@@ -106,6 +109,7 @@ class JointLaw:
     dilation_slip: float = math.inf
     roughness: Roughness | None = None
     max_closure: float | None = None
+    restitution: float | None = None
 
     def __post_init__(self) -> None:
         angles = ("friction_angle", "residual_friction_angle", "dilation_angle")
@@ -133,6 +137,8 @@ class JointLaw:
             )
         if self.max_closure is not None and self.normal_stiffness is None:
             self._refuse("max_closure needs a normal_stiffness, the initial one")
+        if self.restitution is not None and self.normal_stiffness is not None:
+            self._refuse("restitution does not go with a normal_stiffness, whose spring gives an impact its rebound")
         if self.roughness is not None:
             plain = JointLaw.__dataclass_fields__
             for what in (
@@ -182,4 +188,5 @@ _NUMBERS = {
     "softening_slip": Number(unit="m"),
     "dilation_slip": Number(closed=False, unit="m", infinite=True),
     "max_closure": Number(closed=False, unit="m", optional=True),
+    "restitution": Number(most=1.0, optional=True),
 }

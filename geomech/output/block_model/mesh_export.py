@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import logging
+import math
 from pathlib import Path
 
 import numpy as np
 
 from geomech.model import Blocks, Problem
 from geomech.shapes.mesh_exchange import BLOCK
-from geomech.shapes.meshing import mesh_interior
+from geomech.shapes.meshing import SLIVER, mesh_interior
 
 from ..vtk.triangulate import Triangles
+
+log = logging.getLogger(__name__)
 
 
 def check_format(path: Path) -> None:
@@ -88,6 +92,13 @@ def _fine(problem: Problem, size: float) -> tuple[np.ndarray, np.ndarray, np.nda
     points, triangles, owner, n = [], [], [], 0
     for block in range(blocks.n_blocks):
         mesh = mesh_interior(blocks.loops(block), problem.cracks.in_block(block), size, size)
+        angle, (x, y) = mesh.flattest()
+        if angle < SLIVER:
+            log.warning(
+                "block %d: triangles of %.2g degrees where cracks or its outline nearly touch, at (%.6g, %.6g) m: finite "
+                "elements want such cracks to be joined or moved apart",
+                block, math.degrees(angle), x, y,
+            )  # fmt: skip
         points.append(mesh.points)
         triangles.append(mesh.triangles + n)
         owner.append(np.full(len(mesh.triangles), block))

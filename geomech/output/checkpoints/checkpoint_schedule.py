@@ -11,6 +11,8 @@ from typing import Any
 
 from geomech import __version__, plain_data
 from geomech.model import Cycle, Problem
+from geomech.shapes.gmsh_models.script_commands import SCRIPTS as MODELS
+from geomech.shapes.gmsh_models.script_commands import files_read
 
 from . import checkpoint_file
 
@@ -91,8 +93,13 @@ class Checkpoints:
 
 
 def digests(scene: Mapping[str, Any]) -> dict[str, str]:
-    """file → SHA-256 of what stands in every file that the resolved ``scene`` names."""
-    return {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in sorted(set(_files(scene)))}
+    """file → SHA-256 of what stands in every file that the resolved ``scene`` names, and in those that its models
+    read."""
+    names = set(_files(scene))
+    for name in tuple(names):
+        if Path(name).suffix.lower() in MODELS:
+            names |= {str(path) for path in files_read(Path(name))}
+    return {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in sorted(names)}
 
 
 def _files(node: Any) -> Iterator[str]:

@@ -34,6 +34,7 @@ _ENERGIES = {
     "friction_loss": "friction",
     "damping_loss": "damping",
     "bond_loss": "broken bonds",
+    "impact_loss": "impacts",
     "scheme_loss": "time scheme",
     "overlap_energy": "overlaps",
 }

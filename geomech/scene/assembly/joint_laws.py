@@ -23,6 +23,7 @@ _FAULTS = (
     ("softening_slip does not go", "softening_slip_m", "leave it out: roughness wears off by itself"),
     ("dilation_angle does not go", "dilation_angle_deg", "leave it out: roughness dilates by itself"),
     ("dilation_slip does not go", "dilation_slip_m", "leave it out: roughness dilates by itself"),
+    ("restitution does not go", "restitution", "leave it out, or leave out normal_stiffness_pa_per_m"),
     ("shear_stiffness is given", "shear_stiffness_pa_per_m", "leave it out, or stiffness_from_peak_slip"),
     ("below 70°", "friction_angle_deg", "with jrc it is the angle that is left when the roughness is worn off"),
     ("length of a rough joint must not be below", "joint_length_m", "leave it out: the sample's values then hold"),
@@ -55,6 +56,7 @@ def joint_law(name: str, joint: JointTable) -> JointLaw:
         dilation_slip=math.inf if joint.dilation_slip_m is None else joint.dilation_slip_m,
         roughness=rough,
         max_closure=joint.max_closure_m,
+        restitution=joint.restitution,
     )
 
 

@@ -74,6 +74,13 @@ def _statics(c: Check) -> None:
             "viscous boundaries do nothing in a static run",
             "set dda.dynamic_factor = 1, or leave them out",
         )
+    for name, joint in (c.tables.joints or {}).items() if dda.dynamic_factor == 0 else ():
+        if joint.restitution is not None:
+            c.warn(
+                ("joints", name, "restitution"),
+                "nothing strikes anything in statics, which carry no velocity: restitution does nothing",
+                "set dda.dynamic_factor = 1, or leave it out",
+            )
 
 
 def _stepping(c: Check) -> None:

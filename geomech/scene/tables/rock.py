@@ -123,6 +123,11 @@ class JointTable(Table):
         None,
         description="closure that a joint tends to, m: it stiffens hyperbolically from normal_stiffness_pa_per_m on",
     )
+    restitution: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        None,
+        description="coefficient of restitution of blocks that strike each other, 0 (they stay together) to 1 (elastic), "
+        "at any time step; for rockfall (unset: what springs and time scheme leave, 0.5 to 0.75 of the energy)",
+    )
     edges: Names = Field(
         (),
         description='contacts where either edge has one of these names; "*" matches anything, "crack:NAME" is a '

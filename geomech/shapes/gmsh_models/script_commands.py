@@ -85,6 +85,29 @@ def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
     return seen
 
 
+def files_read(path: Path) -> list[Path]:
+    """The model ``path`` and all files that Gmsh reads with it, as far as their names are written out: what it
+    includes and
+    merges, lists of numbers, options beside it, and what these read. Nothing is refused."""
+    seen: dict[Path, Path] = {}
+    waiting = [path]
+    while waiting:
+        file = waiting.pop(0)
+        if file.resolve() in seen or not file.is_file():
+            continue
+        seen[file.resolve()] = file
+        waiting.append(file.with_name(file.name + ".opt"))
+        if file.suffix in (*MESHES, *SHAPES):
+            continue
+        code = [token for token in _tokens(file.read_bytes()) if token.kind not in ("line", "block")]
+        for k, token in enumerate(code):
+            if token.text.decode("latin-1") in _READS:
+                rest = [t for t in code[k + 1 : k + 3] if t.text not in (b"(", b"[")][:1]
+                names = [t.text[1:-1].decode("utf-8", "surrogateescape") for t in rest if t.kind == "text"]
+                waiting += [file.parent / name for name in names]
+    return list(seen.values())
+
+
 def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
     """The files that ``path`` reads, after a look at what else it does."""
     if not is_script and path.suffix.lower() in OTHER_MESHES:

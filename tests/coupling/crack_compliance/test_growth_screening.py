@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from geomech.bench.cost.coupling_cost import wall
+from geomech.bench.cost.block_scenes import cracked_wall
 from geomech.coupling import cycles
 from geomech.model import CrackFaces
 
@@ -13,7 +13,7 @@ STEPS = 14
 
 
 def problem(k_ic=1e12, skip=True):
-    of = wall(12, 4)
+    of = cracked_wall(12, 4)
     run = replace(of.run, end_time=(STEPS - 0.5) * 0.01, skip=skip)
     return replace(
         of, run=run, materials=(replace(of.materials[0], k_ic=k_ic),), growth=replace(of.growth, increment=0.02)

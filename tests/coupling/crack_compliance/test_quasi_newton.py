@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geomech.bench.cost.coupling_cost import wall
+from geomech.bench.cost.block_scenes import cracked_wall
 from geomech.coupling import cycles
 from geomech.coupling.crack_compliance.quasi_newton import Settling
 from geomech.dda import BlockSystem
@@ -19,7 +19,7 @@ def test_passes_settle_on_shaken_bricks_with_closed_cracks(friction):
     """Bricks that fall onto each other and are shaken by 0.3 g at 10 Hz, one in three with a closed crack: contacts
     and crack faces change their states in every step, and passes agree in each. (With tractions that jumped as a
     contact went, one step in ten never did.)"""
-    given = wall(40, 13)
+    given = cracked_wall(40, 13)
     times = np.linspace(0.0, 0.1, 401)
     shaking = np.column_stack([3.0 * np.sin(20 * np.pi * times), np.full(401, -9.81)])
     given = replace(
@@ -38,7 +38,7 @@ def test_passes_settle_on_shaken_bricks_with_closed_cracks(friction):
 def test_a_pass_begins_with_the_contact_states_of_the_one_before():
     """… and ends where it would have ended anyway, at a fraction of the iterations: bricks that come under their
     weight."""
-    given = wall(60, 20)
+    given = cracked_wall(60, 20)
 
     def step(like):
         system = BlockSystem(given.blocks, given.materials, given.joints, None, given.dda)
@@ -109,7 +109,7 @@ def test_passes_settle_while_cracks_grow_through_shaken_bricks():
     """Closed rough cracks that grow, meet sides and part bricks under their sudden weight and 0.3 g: faces of nearly
     cut bricks open in one pass and close in the next (and did so for ever, one growing pass in ten 0.5 to 0.9 off). All
     passes agree, most of them after three or four."""
-    given = wall(100, 10)
+    given = cracked_wall(100, 10)
     times = np.linspace(0.0, 0.1, 401)
     shaking = np.column_stack([3.0 * np.sin(10 * np.pi * times), np.full(401, -9.81)])
     rock = replace(given.materials[0], k_ic=2.2e4)
