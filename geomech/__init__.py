@@ -11,6 +11,8 @@ other; each solver also stands alone::
     results = geomech.open_run("outputs/slope")              # histories as DataFrames, series as PyVista meshes
     results.history.plot(x="time", y="kinetic_energy")
     print(geomech.safety_report(scene).text())               # factor of safety by strength reduction
+    found = geomech.sweep("slope/scene.toml", {"joints.beds.friction_angle_deg": "normal(28, 3)"}, runs=200)
+    print(found.probability)                                 # of failure, with its interval
     for cycle in geomech.cycles(scene):                      # cycle by cycle, nothing written
         print(cycle.number, cycle.state.time, len(cycle.tips))
 """
@@ -39,7 +41,8 @@ _PUBLIC = {
     "factor_of_safety": "geomech.pipeline",
     "safety_report": "geomech.pipeline",
 }
-_MODULES = ("conventions", "coupling", "dda", "ddm", "model")
+# `sweep` is called like a function, too.
+_MODULES = ("conventions", "coupling", "dda", "ddm", "model", "sweep")
 
 __all__ = ["__version__", *_PUBLIC, *_MODULES]
 

@@ -3,6 +3,7 @@ from . import coupling as coupling
 from . import dda as dda
 from . import ddm as ddm
 from . import model as model
+from . import sweep as sweep
 from .pipeline import cycles as cycles
 from .pipeline import factor_of_safety as factor_of_safety
 from .pipeline import run as run

@@ -46,6 +46,7 @@ EDGE = {
     "report",
     "resumption",
     "study",
+    "sweep",
 }
 
 #: Distributions that only these parts import; benchmarks time the writers of others.
@@ -61,9 +62,13 @@ ONLY_IN = {
     "meshio": {"shapes", "output", "bench"},
     "numba": {"compiled", "dda", "ddm", "coupling"},
     "shapely": {"shapes", "scene", "coupling", "output", "render"},
+    "distributed": {"sweep", "bench"},
+    "pyarrow": {"sweep"},
+    "SALib": {"sweep"},
 }
 #: Heavy ones are imported where they are used, never when a module is.
-LAZY = {"gmsh", "ezdxf", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", "imageio", "meshio"}
+LAZY = {"gmsh", "ezdxf", "vtk", "vtkmodules", "pyvista", "matplotlib", "scipy", "imageio", "meshio", "distributed", "pyarrow",
+        "SALib"}  # fmt: skip
 
 SOURCES = sorted(HOUSE.rglob("*.py"))
 

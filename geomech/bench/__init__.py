@@ -30,6 +30,7 @@ TOPICS = {
     "stability": "geomech.bench.robustness.stability",
     "startup": "geomech.bench.cost.startup",
     "steps": "geomech.bench.accuracy.load_steps",
+    "sweep": "geomech.bench.sweep_cost",
 }
 
 

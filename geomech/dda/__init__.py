@@ -22,7 +22,8 @@ from .statics.in_situ_stress import InSituState, NoInSituEquilibrium, in_situ_st
 from .statics.mobilised_strength import MobilisedJoint, mobilised_joints
 from .statics.partial_factors import PartialFactors, design_problem
 from .statics.pseudo_time_equilibrium import RELAXATION_STEP, Equilibrium, equilibrium
-from .statics.strength_reduction import FactorOfSafety, NothingToReduce, factor_of_safety
+from .statics.safety_answer import FactorOfSafety
+from .statics.strength_reduction import NothingToReduce, factor_of_safety
 from .step_control.adaptive_time_step import StepLength
 from .stepping import run
 from .system import BlockSystem

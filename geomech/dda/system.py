@@ -170,7 +170,7 @@ class BlockSystem:
         """The same blocks with a dynamic factor of zero: steps that carry no velocity."""
         settings = replace(self.settings, dynamic_factor=0.0)
         out = BlockSystem(self.blocks, self.materials, self.joints, self._joint_index, settings, self.work)
-        out.finder.toes = self.finder.toes
+        out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
         return out
 
     def with_joints(self, joints: Sequence[JointLaw]) -> BlockSystem:
@@ -178,7 +178,7 @@ class BlockSystem:
         for."""
         settings = replace(self.settings, max_displacement_ratio=_ANYWHERE)
         out = BlockSystem(self.blocks, self.materials, joints, self._joint_index, settings, self.work)
-        out.finder.toes = self.finder.toes
+        out.finder.toes, out.finder.whole_faces = self.finder.toes, self.finder.whole_faces
         return out
 
     def removed(self, loads: Loads, time: float) -> np.ndarray | None:

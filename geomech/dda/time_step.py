@@ -47,6 +47,8 @@ if TYPE_CHECKING:
 _LABOUR, _EASED = 6, 3
 #: A step is begun again so many times at most for where faces with a stiffness touch. Few take more than four.
 _PLACED = 20
+#: … so often for which ends of faces hold the cohesion of all of them, …
+_SHARED = 8
 #: … and so often for the gaps that blocks which turn come to, until these are known to this part of the contacts'
 #: ``precision``; in statics to the second, where contacts store little, and springs of 40 E' make energy of what is not known
 #: (slabs that lean, of a tenth of that, as much in one step as all loads do).
@@ -223,7 +225,7 @@ class Attempt:
         """The states of contacts and the unknowns; faces with a stiffness are tried on other parts until they fit."""
         actions, found, order, middle = self.actions, self.found, self.order, self.middle
         held = self._held()
-        own = self.matrix, self.right
+        own, shared = (self.matrix, self.right), 0
         for tries in range(1, 2 * _PLACED + 1):
             if found.points is not None or tries > 1:
                 self.matrix, self.right = own[0].copy(), own[1].copy()
@@ -256,6 +258,9 @@ class Attempt:
             if striking is not None:
                 settled = striking.back(settled, self.system.half_diagonal)
             better = found.misplaced(settled)
+            if better is None and shared < _SHARED:
+                sharing = found.sharing_cohesion(settled.state, settled.bonded)
+                better, shared = (None if sharing is found else sharing), shared + 1
             if better is None:
                 break
             if self._laboured():

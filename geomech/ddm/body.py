@@ -131,7 +131,8 @@ class Body:
         holds = Holds(self.boundary, self.supports, self.support_segments, self._extent) if self.supports else None
         holes_held = holds is not None and bool(self.mesh.edge_loop[holds.sources.source].any())
         many = half_plane is None and is_iterated(solver, self.boundary.n_unknowns, holds, holes_held)
-        self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns)
+        factored = previous is not None and not previous.compressed and previous.faces.n > 0
+        self.compressed = is_compressed("compressed" if many else solver, self.faces.n_unknowns, factored)
         if half_plane is not None and self.boundary.n_unknowns > FACTORABLE:
             raise ValueError(
                 f"half_plane: {self.boundary.n_unknowns} unknowns on holes, but below a free surface no more than {FACTORABLE} are "
@@ -329,7 +330,7 @@ class Body:
             matrix = Bordered.whole(c, whole)
         else:
             matrix = known.grown(c, c_old, c_seen, schur)
-        self.crack_system = CrackSystem(matrix, self.work)
+        self.crack_system = CrackSystem(matrix, self.work, old.crack_system if kept else None, c_old)
 
     def _imposed(self, applied: Applied) -> np.ndarray:
         """(h_unknowns,) 2μ times what the supports hold of displacement, less that of particular fields."""

@@ -11,6 +11,7 @@ from typing import Any
 from geomech.model import Cycle, Problem, counted
 
 from .units import stress_text
+from .unreached import unreached
 
 _log = logging.getLogger("geomech.run")
 
@@ -22,13 +23,16 @@ class RunLog:
         self.level = level
 
     def on_start(self, problem: Problem, folder: Path) -> None:
+        self._problem, self._last, self._happened = problem, None, set()
         self._open(Path(folder), "w")
         _log.info("%s: %s, %s", problem.title, problem.inventory, counted(len(problem.materials), "material"))
 
-    def memory(self) -> None:
-        """Nothing: the log goes on where it ends."""
+    def memory(self) -> list[str]:
+        """The kinds of events so far; the log goes on where it ends."""
+        return sorted(self._happened)
 
-    def on_resume(self, problem: Problem, folder: Path, memory: None) -> None:
+    def on_resume(self, problem: Problem, folder: Path, memory: list[str]) -> None:
+        self._problem, self._last, self._happened = problem, None, set(memory)
         self._open(Path(folder), "a")
         _log.info("%s: resumed", problem.title)
 
@@ -44,7 +48,9 @@ class RunLog:
             logger.setLevel(self.level)
 
     def on_cycle(self, cycle: Cycle) -> None:
+        self._last = cycle
         for event in cycle.events:
+            self._happened.add(event.kind)
             # A load of 0 is that of a scene which has no leading one.
             load = f", load {stress_text(event.load)}" if event.load else ""
             _log.info(
@@ -58,6 +64,9 @@ class RunLog:
         elif error is not None:
             _log.error("the run failed", exc_info=error)
         else:
+            missed = unreached(self._problem, self._last, self._happened)
+            if missed:
+                _log.warning("%s", missed)
             _log.info("ended: %s", summary.get("end", "done"))
         logger = logging.getLogger("geomech")
         logger.removeHandler(self._handler)

@@ -8,7 +8,7 @@ from pathlib import Path
 from ..output.reading import Run
 from .table import COLUMNS, as_csv, as_text, table
 
-__all__ = ["COLUMNS", "as_csv", "as_text", "is_benchmark", "table", "write_page"]
+__all__ = ["COLUMNS", "as_csv", "as_text", "is_benchmark", "table", "write_page", "write_sweep_page"]
 
 
 def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> Path:
@@ -29,6 +29,13 @@ def write_page(folder: Path, runs: Sequence[Run], path: Path | None = None) -> P
         made = page_of_runs(runs, folder)
     below = any(run.folder.resolve() != folder.resolve() for run in runs)
     return made.write(folder / ("runs.html" if below else "report.html") if path is None else path)
+
+
+def write_sweep_page(folder: Path, path: Path | None = None) -> Path:
+    """Write the page of the sweep in ``folder``; the file, by default ``report.html`` in it."""
+    from .sweep_page import page_of_sweep
+
+    return page_of_sweep(folder).write(folder / "report.html" if path is None else path)
 
 
 def is_benchmark(folder: Path) -> bool:

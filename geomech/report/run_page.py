@@ -76,6 +76,7 @@ def key_results(run: Run) -> dict[str, Any]:
         return None if value is None else f"{factor * value:{digits}}"
 
     facts: dict[str, Any] = {"how it ended": summary.get("end", "not ended")}
+    facts["but"] = summary.get("not_reached")
     facts |= {f"first {kind}": at(kind) for kind in first}
     if run.led:
         peak = summary.get("peak_load_pa")

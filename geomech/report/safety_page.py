@@ -14,7 +14,7 @@ import numpy as np
 from ..dda.statics.displacement_limit import MOVED
 from ..dda.statics.mobilised_strength import MobilisedJoint, mobilised_joints
 from ..dda.statics.partial_factors import PartialFactors
-from ..dda.statics.strength_reduction import FactorOfSafety
+from ..dda.statics.safety_answer import FactorOfSafety
 from ..model import OPEN, SLIP, Problem, counted
 
 #: A block slides when it turns by less than the first of these (rad) as it goes its own size √area, topples when it

@@ -105,7 +105,7 @@ class Scene:
     def resolved(self) -> dict[str, Any]:
         """The scene with its variant and changes applied and all defaults written out, ready for ``tomli_w``: paths are
         absolute, all parameters of a Gmsh model are given, variants are gone. Loading it gives the same problem."""
-        data = self._written.model_dump(by_alias=True, exclude_none=True, exclude={"variants"})
+        data = self._written.model_dump(by_alias=True, exclude_none=True, exclude={"variants", "sweep"})
         data["title"] = self._full_title
         if any(self.origin):
             data["geometry"]["origin"] = list(self.origin)

@@ -13,6 +13,7 @@ from .errors import Fault
 from .keys import description_at, expected_of, field_of, keys_of, kind_of, places_of_keys, table_at, written
 from .locator import Path
 from .tables import SceneTables
+from .tables.sweep import SweepTable
 
 _COMPARISON = {
     "greater_than": ("gt", "greater than"),
@@ -48,6 +49,17 @@ def validate(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SceneT
         except ValidationError:
             sections[name] = None
     return SceneTables.model_construct(**sections), faults
+
+
+def validate_sweep(data: dict[str, Any], place: Callable[[Path], str]) -> tuple[SweepTable | None, list[Fault]]:
+    """The table [sweep] of ``data``, and everything wrong with it; ``place`` says where a path below "sweep" stands."""
+    try:
+        SceneTables.model_validate({"sweep": data})
+    except ValidationError as error:
+        found = [item for item in error.errors(include_url=False) if item["loc"][:1] == ("sweep",)]
+        if found:
+            return None, [_fault(item, place) for item in found]
+    return SweepTable.model_validate(data), []
 
 
 def nearest(name: str, known: list[str]) -> str:

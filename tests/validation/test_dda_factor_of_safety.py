@@ -7,7 +7,7 @@ import pytest
 from block_problems import GRAVITY, WEIGHT, rectangle, turned
 
 from geomech import dda
-from geomech.dda.statics.strength_reduction import reduced
+from geomech.dda.joint_laws.reduced_strength import reduced
 from geomech.model import (
     GROUND,
     BaseMotion,

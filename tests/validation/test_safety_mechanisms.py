@@ -269,3 +269,74 @@ def test_a_toppling_row_does_not_remember_the_friction_that_it_began_with(mirror
         limits.append(tangent / found.factor)
     print("limit tan φ", limits)
     assert max(limits) < 1.005 * min(limits)
+
+
+STEPPED = {
+    # Corners of the block from the toe on (m), friction angle (degrees) and cohesion (Pa).
+    "one plane parts at an end": (
+        [(0, 0), (8.262589, 6.3428), (8.164088, 7.270935),
+         (13.00272, 10.985325), (13.00272, 16.494298), (7.967869, 16.494298)],
+        46.176, 23.4e3,
+    ),
+    "one plane parts all along": (
+        [(0, 0), (4.208661, 3.673296), (4.883509, 5.790067),
+         (10.056331, 10.304878), (10.056331, 14.753437), (8.045065, 14.753437)],
+        40.692, 12.1e3,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("way", [{}, {"mirror": True}])
+@pytest.mark.parametrize("which", STEPPED)
+def test_stepped_planes_keep_their_cohesion_under_a_block_that_strains_evenly(which, way):
+    """F = (c Σℓ + W cos β tan φ)/(W sin β) of a block on two parallel planes with an open riser (limit equilibrium).
+    The block, which strains evenly, parts by a thousandth of a millimetre at an end of a plane: c ℓ counts all the
+    same, and what it were without is told. Where it parts all along a plane, the answer of rigid blocks is told."""
+    corners, friction, cohesion = STEPPED[which]
+    low = corners[0][1] - 5.0
+    base = [
+        (-30, low - 10),
+        (70, low - 10),
+        (70, corners[-1][1]),
+        *corners[4:1:-1],
+        corners[1],
+        (0, 0),
+        (0, low),
+        (-30, low),
+    ]
+    polygons = [np.asarray(base, float), np.asarray(corners, float)]
+    edges = [[""] * len(base), ["plane", "riser", "plane", "riser", "", ""]]
+    if way:
+        polygons = [points[::-1] * [-1.0, 1.0] for points in polygons]
+        edges = [[*names[::-1][1:], names[-1]] for names in edges]
+    blocks = Blocks.from_polygons(polygons, fixed=[True, False], edge_names=[[names] for names in edges])
+    laws = [JointLaw("plane", math.radians(friction), cohesion), JointLaw("riser")]
+    found = dda.factor_of_safety(
+        blocks, [ROCK], laws, WEIGHT, joint_index=lambda a, b: 0 if "plane" in (a, b) else 1
+    )  # fmt: skip
+    a, b, c, d = (np.array(at) for at in corners[:4])
+    dip, weight = math.atan2(*(b - a)[::-1]), 2600.0 * GRAVITY * blocks.areas()[1]
+    length = np.hypot(*(b - a)) + np.hypot(*(d - c))
+    expected = (cohesion * length / weight + math.cos(dip) * math.tan(math.radians(friction))) / math.sin(dip)
+    print(f"{found.factor:.5f}, limit equilibrium {expected:.5f}; {found.warnings}")
+    if which == "one plane parts at an end":
+        assert found.factor == pytest.approx(expected, rel=1e-3)
+        assert found.factor_if_parted < 0.97 * expected and "touches at one end only" in found.warnings[-1]
+    else:
+        assert found.factor < 0.95 * expected and found.factor_if_rigid == pytest.approx(expected, rel=1e-3)
+        assert "rigid blocks have the factor" in found.warnings[-1]
+
+
+@pytest.mark.parametrize(("gap", "stands"), [(2e-4, True), (2e-3, False)])
+def test_what_stops_a_block_within_its_reach_is_waited_for(gap, stands):
+    """A block of 2 m² on a plane steeper than its friction angle, before a wall: within a two-thousandth of √2 m it
+    comes to rest, beyond it has failed."""
+    slope = math.radians(35)
+    polygons = [rectangle(-8, -3, 8, 0), rectangle(-3 - gap, 0, -gap, 1), rectangle(0, 0, 2, 1)]
+    blocks = Blocks.from_polygons([turned(points, slope) for points in polygons], fixed=[True, True, False])
+    found = dda.factor_of_safety(blocks, [ROCK], [JointLaw("joint", math.radians(30))], WEIGHT)
+    print(found.table())
+    if stands:
+        assert math.isinf(found.upper) and found.moved[2] == pytest.approx(gap, rel=0.1)
+    else:
+        assert found.factor == pytest.approx(math.tan(math.radians(30)) / math.tan(slope), rel=1e-4)

@@ -3,7 +3,7 @@
 Five families, each with or without cohesion, water and anchors, with sharp toes and cut ones:
 
     planar    a block on one plane before an upright tension crack (Hoek & Bray 1981, chapter 7)
-    stepped   a block on two parallel planes with a riser between them, which opens (rigid where there is cohesion)
+    stepped   a block on two parallel planes with a riser between them, which opens
     bilinear  an active block above a passive one, an upright joint between them (Jaeger 1971)
     wedge     the same with an inclined joint: the active block is a wedge
     toppling  columns on an inclined base (Goodman & Bray 1976): one that slides, one that an anchor or glue keeps from
@@ -22,7 +22,7 @@ import numpy as np
 
 from ...model import Problem
 from ..slopes.drawn_slopes import problem_of
-from .slope_limits import admissible_factor, pressed_throughout, sliding_factor
+from .slope_limits import admissible_factor, sliding_factor
 
 GRAVITY, DENSITY = 9.81, 2600.0
 FAMILIES = ("planar", "bilinear", "stepped", "wedge", "toppling")
@@ -78,7 +78,6 @@ class _Drawn:
     toe: str = "free"
     traits: list[str] = field(default_factory=list)
     limit: float | None = None
-    rigid: bool = False
 
     @property
     def planes_drawn(self) -> list[str]:
@@ -108,8 +107,7 @@ class _Drawn:
                 "dead_ends": "trim", "zones": zones,
                 "edges": [{"name": name, "line": [list(a), list(b)]} for name, a, b in self.edges],
             },
-            "materials": {"rock": {"youngs_modulus_pa": 20e9, "poissons_ratio": 0.25, "density_kg_m3": DENSITY,
-                                   "rigid": self.rigid}},
+            "materials": {"rock": {"youngs_modulus_pa": 20e9, "poissons_ratio": 0.25, "density_kg_m3": DENSITY}},
             "zones": {"base": {"fixed": True}},
             "joints": laws,
             "loads": loads,
@@ -143,20 +141,14 @@ def _with_limits(drawn: _Drawn, seed: int, family: str) -> FactorSlope | None:
             limit = sliding_factor(problem, drawn.planes, drawn.interface)
         except ValueError:
             return None
-        if limit > bound * (1 + _AS_GOOD) or (drawn.cohesion and not _keeps_cohesion(drawn, problem, limit)):
-            # Moments, not forces: it turns before it slides, or faces part at their edges and lose cohesion there.
+        if limit > bound * (1 + _AS_GOOD):
+            # Moments, not forces: it turns before it slides.
             return None
     if not _LEAST < (bound if math.isnan(limit) else limit) < _MOST:
         return None
     stretch = max(((b["yield_force_n_per_m"] - b.get("pretension_n_per_m", 0.0)) / b["stiffness_n_per_m"]
                    for b in drawn.bolts), default=0.0)  # fmt: skip
     return FactorSlope(seed, family, scene, limit, bound, drawn.toe, tuple(drawn.traits), stretch)
-
-
-def _keeps_cohesion(drawn: _Drawn, problem: Problem, limit: float) -> bool:
-    if drawn.interface:
-        return limit <= admissible_factor(problem, OPEN, whole=True) * (1 + _AS_GOOD)
-    return pressed_throughout(problem, drawn.planes, limit)
 
 
 def _frame(rng, toe: str, depth: float) -> list[tuple[float, float]]:
@@ -212,8 +204,6 @@ def _stepped(rng) -> _Drawn:
         dip + rng.uniform(-4, 12), toe=toe,
     )  # fmt: skip
     _strength(rng, drawn, 2e3 * height)
-    # An evenly strained block bears on one corner of each plane, and loses the cohesion of what parts: 2 to 10 % lower.
-    drawn.rigid = bool(drawn.cohesion)
     if rng.random() < 0.3:
         _anchor(rng, drawn, _inside(drawn.blocks["block"]), "block", dip)
     return drawn

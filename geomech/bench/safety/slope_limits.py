@@ -115,14 +115,11 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def admissible_factor(
-    problem: Problem, open_faces: Collection[str] = (), tolerance: float = 1e-5, whole: bool = False
-) -> float:
+def admissible_factor(problem: Problem, open_faces: Collection[str] = (), tolerance: float = 1e-5) -> float:
     """The largest F with admissible contact forces (0: none even at 1/64; inf: still at 64). ``open_faces``: names of
     edges that carry nothing, such as tension cracks. Bolts pull with anything up to their yield force; a tensile
-    strength lets the ends of a face pull by half of what all of it holds. ``whole``: faces with cohesion hold as long
-    as no fibre of them pulls beyond the tensile strength, 2 Nᵢ − Nⱼ ≥ −σₜ ℓ/(2 F)."""
-    programme = _Programme(problem, open_faces, whole)
+    strength lets the ends of a face pull by half of what all of it holds."""
+    programme = _Programme(problem, open_faces)
     low, high = 0.5, 2.0
     while not programme.balances(low):
         if low <= 1.0 / FARTHEST:
@@ -141,7 +138,7 @@ def admissible_factor(
 class _Programme:
     """Equilibrium of all free blocks by N₀, N₁, S of each face and the pull of each bolt."""
 
-    def __init__(self, problem: Problem, open_faces: Collection[str], whole: bool) -> None:
+    def __init__(self, problem: Problem, open_faces: Collection[str]) -> None:
         from scipy import sparse
 
         faces = shared_faces(problem)
@@ -182,7 +179,7 @@ class _Programme:
         shape = (3 * len(free), 3 * m + len(self.most))
         self.matrix = sparse.csr_matrix((values, (rows, columns)), shape)
         self.right = -loads.ravel() / self.unit
-        self.m, self.whole = m, (self.hold > 0) & whole
+        self.m = m
 
     def balances(self, factor: float) -> bool:
         from scipy import optimize, sparse
@@ -194,10 +191,6 @@ class _Programme:
                               sparse.vstack([eye, -eye]), bolts])  # fmt: skip
         hold = np.tile(self.hold / factor / self.unit, 2)
         pull = np.minimum(self.pull / factor / self.unit, 1e9)
-        if self.whole.any():
-            one, none = eye.tocsr()[self.whole], sparse.csr_matrix((int(self.whole.sum()), m + n_bolts))
-            fibres = sparse.vstack([sparse.hstack([a * one, b * one, none]) for a, b in ((-2, 1), (1, -2))])
-            cone, hold = sparse.vstack([cone, fibres]), np.append(hold, np.tile(pull[self.whole], 2))
         bounds = [(-low, None) for low in pull.tolist() * 2] + [(None, None)] * m
         bounds += [(0.0, most / self.unit if math.isfinite(most) else None) for most in self.most]
         found = optimize.linprog(
@@ -257,36 +250,6 @@ def sliding_factor(problem: Problem, planes: Collection[str], interface: str = "
     if (normal < 0).any():
         raise ValueError("a face of the sliding blocks would have to pull")
     return factor
-
-
-def pressed_throughout(problem: Problem, planes: Collection[str], factor: float) -> bool:
-    """Whether the one block on parallel ``planes`` presses on all of them with the strength divided by ``factor``, the
-    pressure being a straight line a + b s along their dip, as of a rigid block on even springs (Navier). Where it does
-    not, they part at an edge, and cohesion is lost there."""
-    faces = shared_faces(problem)
-    block = int(np.flatnonzero(~problem.blocks.fixed)[0])
-    held = _held_on(problem, faces, {block}, planes)
-    loads = loads_on_blocks(problem)[block]
-    for bolt in problem.loads.bolts:
-        pull = bolt.yield_force * (np.array(bolt.end) - bolt.start) / math.dist(bolt.start, bolt.end)
-        loads = loads + [*pull, _cross(np.array(bolt.start), pull)]
-    way, normal = held.way, held.normal
-    rows = [k for k, name in enumerate(faces.name) if name in planes]
-    spans = np.array([sorted([faces.start[k] @ way, faces.end[k] @ way]) for k in rows])
-    heights = np.array([faces.start[k] @ normal for k in rows])
-    law = problem.joints[faces.law[rows[0]]]
-    low, high = spans.T
-    parts = np.stack([high - low, 0.5 * (high**2 - low**2), (high**3 - low**3) / 3])  # ∫ 1, s, s² ds of each
-    friction, shear = math.tan(law.friction_angle) / factor, law.cohesion / factor
-    turn, lift = float(_cross(way, normal)), -float(_cross(normal, way))  # of N at s, of S at the height h
-    matrix = np.array([
-        [parts[0].sum(), parts[1].sum()],
-        [turn * parts[1].sum() + lift * friction * (heights * parts[0]).sum(),
-         turn * parts[2].sum() + lift * friction * (heights * parts[1]).sum()],
-    ])  # fmt: skip
-    right = [-loads[:2] @ normal, -loads[2] - lift * shear * (heights * parts[0]).sum()]
-    a, b = np.linalg.solve(matrix, right)
-    return bool((a + b * spans >= 0).all())
 
 
 @dataclass(frozen=True, eq=False)

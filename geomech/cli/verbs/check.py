@@ -20,6 +20,7 @@ def declare(verbs: Verbs) -> None:
 
 
 def _check(options: argparse.Namespace) -> int:
+    from ...coupling import crack_cost
     from ...model import counted
     from ...scene import load_scene
 
@@ -33,6 +34,10 @@ def _check(options: argparse.Namespace) -> int:
         problem = scene.problem()
         tips = f" with {counted(len(problem.cracks.tips), 'tip')}" if problem.cracks.n_cracks else ""
         print("\n".join([f"{problem.title}: {problem.inventory}{tips}: no errors", *scene.overview()]))
+        print(
+            "".join(f"  {'elements' if k == 0 else '':<9} {line}\n" for k, line in enumerate(crack_cost.told(problem))),
+            end="",
+        )
     if first.variants and not options.variants:
         print(f"variants: {', '.join(first.variants)}")
     return DONE

@@ -38,6 +38,11 @@ TOGETHER = 1e-3
 #: next one the rest: K at the event is then off by no more than the former, times what K depends on the shape of the
 #: blocks.
 NEAR, APPROACH = 1e-5, 0.98
+#: The same where crack faces have friction, of which a step leaves more than that: steps to events go all the way, and on the
+#: way to none no farther.
+NEAR_ROUGH = 1e-3
+#: A load that falls while faces with friction hold K is sought in parts of the last one.
+FURTHER_BACK = 0.75
 #: Steps on the way are to move blocks by this part of what a step may.
 USE = 0.8
 #: Solutions that one search may take, and those without the event between two of them.
@@ -64,6 +69,8 @@ class EventSteps:
         self._rate = 0.0
         #: Displacement ratio per second in the last step; None before there is one.
         self._pace: float | None = None
+        #: Whether crack faces have friction.
+        self._rough = False
         #: Whether the last first pass ended at an event.
         self.reached = False
         #: What contacts and faces do on the way.
@@ -74,6 +81,7 @@ class EventSteps:
         control "toughness" back to it where it lies behind. ``reached`` then says whether they are there. Raises
         `dda.NotConverged`."""
         start = now.state.time
+        self._rough = any(body.rough for body in now.bodies.values())
         search = Crossing(self._rate)
         if self._drive is None:
             found, excess = self._at(now, start, 0.0)
@@ -110,6 +118,9 @@ class EventSteps:
             event = limit = min(limit, start + self.time_step)
         whole = event <= limit and not self._far(event - start)
         aim = event if whole else min(start + APPROACH * (event - start), limit)
+        if self._rough and self._pace:
+            # While faces stick nothing tells how far the event is.
+            aim = min(aim, start + NEAR_ROUGH / self._pace)
         if self.changes.expected is not None:
             aim = min(aim, max(self.changes.expected * (1 + FOUND), start + FOUND * limit))
             self.changes.expected = None
@@ -138,11 +149,14 @@ class EventSteps:
     def _back(self, now: CrackedBlocks, search: Crossing, end: float) -> tuple[Balance, float]:
         """Down to the load at which tips are driven no further; where none is low enough, to no load."""
         start = now.state.time
+        # Faces with friction slip on as the crack grows, under a load that falls. Were the way back made in two steps, they
+        # would stick in the second, in which nothing grows, and keep K where it is however far the load falls.
+        rough = self._rough
         limit = max(0.0, start - self._most(now))
-        whole = search.next >= limit and not self._far(start - search.next)
+        whole = rough or (search.next >= limit and not self._far(start - search.next))
         aim = search.next if whole else max(start - APPROACH * (start - search.next), limit)
         for _ in range(MOST):
-            found, excess = self._at(now, aim, start - limit)
+            found, excess = self._at(now, aim, start - limit, look=not rough)
             at = found.result.state.time
             search.add(at, excess)
             self.reached = abs(excess) <= SETTLED or (excess > 0 and (at == 0.0 or search.width <= JUMP * at))
@@ -150,6 +164,9 @@ class EventSteps:
             if self.reached or (excess > 0 and not goes_on):
                 break
             aim = max(search.next, limit)
+            if rough and not search.enclosed:
+                # The drive hardly changes while faces stick: nothing tells how far back the event is.
+                aim = max(aim, FURTHER_BACK * at)
             whole = whole or not self._far(start - aim)
             if not whole:
                 aim = start - APPROACH * (start - aim)
@@ -157,12 +174,19 @@ class EventSteps:
             self.reached = True
         return found, excess
 
-    def _at(self, now: CrackedBlocks, time: float, most: float, free: bool = False) -> tuple[Balance, float]:
-        """A pass at the loads of ``time`` from the start of the step, or at those at which something changes its state
-        on the way there, and how far the drive then is above one. ``most`` is how long the step may be, s; a ``free`` one
-        may be cut short by how far blocks may move."""
+    def _at(
+        self, now: CrackedBlocks, time: float, most: float, free: bool = False, look: bool = True
+    ) -> tuple[Balance, float]:
+        """A pass at the loads of ``time`` from the start of the step, or, where there is a ``look`` at that, at those at
+        which something changes its state on the way there, and how far the drive then is above one. ``most`` is how long
+        the step may be, s; a ``free`` one may be cut short by how far blocks may move."""
         found = self._solve(now, time, free)
-        found = self.changes.first(now, found, partial(self._solve, now), partial(self._towards, now.state.time), most)
+        if look:
+            found = self.changes.first(
+                now, found, partial(self._solve, now), partial(self._towards, now.state.time), most
+            )
+        else:
+            self.changes.reached = False
         return found, drive(now, found) - 1
 
     def _solve(self, now: CrackedBlocks, time: float, free: bool = False) -> Balance:
@@ -179,7 +203,7 @@ class EventSteps:
         return start + APPROACH * (event - start) if self._far(abs(event - start)) else event
 
     def _far(self, way: float) -> bool:
-        return self._pace is None or self._pace * way > NEAR
+        return self._pace is None or self._pace * way > (NEAR_ROUGH if self._rough else NEAR)
 
     def may_pass(self, now: CrackedBlocks, end: float) -> bool:
         """Whether the next first pass would go beyond the time ``end`` s but for it, as far as can be said before: no

@@ -14,6 +14,7 @@ from ..counters import Work
 from ..joint_laws.bonds import BondedFaces
 from ..joint_laws.nonlinear_laws import CurvedJoints
 from ..joint_laws.penalty_springs import JointTable, Springs, contact_springs, least_face, penalties, resolved
+from ..joint_laws.whole_faces import WholeFaces
 from ..open_close.contact_set import ContactSet
 from ..statics.sharp_toes import SHARP, ToeCorners, stand_off
 from ..step_control.relative_motion import Approach, Windows, widths
@@ -119,6 +120,8 @@ class ContactFinder:
         self.rounding = np.minimum(self._rounding, self._longest)
         #: Whether toes hold: `SHARP`, `ROUNDED` or `FREE` (`toes`).
         self.toes = SHARP
+        #: Whether faces keep all their cohesion for as long as they touch anywhere (`whole_faces`).
+        self.whole_faces = False
         self._corners = ToeCorners(
             self._next, self._previous, self.rounding, np.sqrt(self._area)[self._owner], blocks.vertices
         )
@@ -206,6 +209,10 @@ class ContactFinder:
             released=eased,
             **remembered,
         )
+        if self.whole_faces:
+            cohesion = np.where(found.bonded > 0, self._table.cohesion[found.law], 0.0)
+            whole = WholeFaces.of(found.block, found.other, found.geometry, found.law, cohesion)
+            found = replace(found, whole=whole).sharing_cohesion(found.state, found.bonded)
         return found if lumped else self._with_springs_in_faces(found, vertices, broken)
 
     def _meeting(

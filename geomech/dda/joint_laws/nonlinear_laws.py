@@ -56,6 +56,7 @@ class CurvedJoints:
     def __init__(self, table: JointTable, found: ContactSet) -> None:
         at = np.flatnonzero(table.curved[found.law])
         self.rows, self.law, self.length = at, found.law[at], found.geometry[at, 4]
+        self._cohesive = self.length if found.cohesive is None else found.cohesive[at]
         self._wear, self._slip = found.wear[at], found.slip[at]
         self._table = table
 
@@ -123,8 +124,8 @@ class CurvedJoints:
         fall = t.friction[law] - t.residual_friction[law]
         peak, friction = t.residual_friction[law] + fall * left, t.residual_friction[law] + fall * left_sliding
         lost = t.cohesion[law] - t.residual_cohesion[law]
-        cohesion = (t.residual_cohesion[law] + lost * left) * length
-        sliding = np.where(bonded == 2, (t.residual_cohesion[law] + lost * left_sliding) * length, 0.0)
+        cohesion = (t.residual_cohesion[law] + lost * left) * self._cohesive
+        sliding = np.where(bonded == 2, (t.residual_cohesion[law] + lost * left_sliding) * self._cohesive, 0.0)
         hold = np.zeros(len(law))
         rough = (t.jrc[law] > 0) & (length > 0)
         if rough.any():

@@ -12,6 +12,7 @@ from ..contact_detection.contact_records import fill
 from ..contact_detection.face_quadrature import FacePoints
 from ..joint_laws.bonds import BondedFaces
 from ..joint_laws.penalty_springs import Springs
+from ..joint_laws.whole_faces import WholeFaces
 from .settled_states import Settled
 
 
@@ -48,6 +49,8 @@ class ContactSet:
     arc         (n,)     m that the step's motion, an arc where blocks turn, adds to the gap at its end beside the
                 straight one
     swing       (n,)     m that it adds so to the motion along the edge
+    cohesive    (n,)     m of its face whose cohesion the contact holds; None: its tributary length
+    whole                      faces that keep their cohesion while they touch anywhere (`whole_faces`); or None
     tried                      state, direction and bond that open–close iterations begin with, where these are others
     """
 
@@ -79,6 +82,8 @@ class ContactSet:
     by_length: np.ndarray | None = None
     points: FacePoints | None = None
     lumped: ContactSet | None = None
+    cohesive: np.ndarray | None = None
+    whole: WholeFaces | None = None
     arc: np.ndarray | float = 0.0
     swing: np.ndarray | float = 0.0
     tried: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -114,7 +119,7 @@ class ContactSet:
 
         own = {field.name: of(getattr(self, field.name)) for field in fields(self)}
         tried = None if self.tried is None else tuple(each[rows] for each in self.tried)
-        return ContactSet(**own | {"faces": None, "points": None, "lumped": None, "tried": tried})
+        return ContactSet(**own | {"faces": None, "whole": None, "points": None, "lumped": None, "tried": tried})
 
     def expecting(self, state: np.ndarray, direction: np.ndarray) -> ContactSet:
         """The same contacts, of which open–close iterations begin with these (n,)."""
@@ -145,6 +150,8 @@ class ContactSet:
         if points is None:
             return self
         was, springs = points.before(self.bare, self.by_length), points.springs(self.springs, self.by_length)
+        if self.whole is not None:
+            springs = replace(springs, cohesion=self.springs.cohesion)
         shear = points.passed_on(self.shear, was)
         stored = self.shear**2 / was.springs(self.springs, self.by_length).shear - shear**2 / springs.shear
         return replace(
@@ -169,6 +176,18 @@ class ContactSet:
             return None
         better = self.points.better(settled.gap, settled.state, (settled.bonded == 1) & (self.springs.tension > 0))
         return None if better is None else self.lumped.placed(better)
+
+    def sharing_cohesion(self, state: np.ndarray, bonded: np.ndarray) -> ContactSet:
+        """The contacts, of which those that are closed in ``state`` with ``bonded`` (n,) hold all the cohesion of their
+        whole faces; these ones if they do already."""
+        if self.whole is None:
+            return self
+        cohesive = self.whole.cohesive(state, bonded)
+        if self.cohesive is not None and np.array_equal(cohesive, self.cohesive):
+            return self
+        found = self if self.lumped is None else self.lumped
+        springs = replace(found.springs, cohesion=self.whole.cohesion * cohesive)
+        return replace(found, cohesive=cohesive, springs=springs).placed(self.points)
 
     def along(self, arc: np.ndarray, swing: np.ndarray) -> ContactSet:
         """The contacts with gaps that follow an ``arc`` and motion along the edges that follows a ``swing`` (n,) m at

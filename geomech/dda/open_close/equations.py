@@ -230,6 +230,8 @@ class Equations:
         forces, springs = answer.forces, answer.springs
         known = np.maximum(self.slack, self.found.precision)
         open_bonds = (states.bonded > 0) & (states.state == OPEN) & (forces[:, 2] > known)
+        if self.found.whole is not None:
+            open_bonds &= ~self.found.whole.touch(states.state)
         lifted = np.zeros(len(forces))
         slip = plastic_slip(forces, states.state, self.found.shear, springs)
         if self.curved is not None:

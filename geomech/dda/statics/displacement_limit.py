@@ -109,6 +109,12 @@ class DisplacementLimit:
         within = moved <= own
         return own + float(moved[within].max(initial=0.0))
 
+    def farthest(self) -> np.ndarray:
+        """(n_blocks,) m that no block may move more than, whatever else happens."""
+        own = MOVED * self._size + self.elastic
+        stretched = any(not math.isinf(bolt.yield_force) for bolt in self._loads.bolts)
+        return own + _FARTHEST * self._size if stretched else own
+
     def beyond(self, state: State) -> np.ndarray:
         """Indices of the blocks that have moved farther than they may, the one that has most so first."""
         moved, allowed = self.moved(state.vertices), self.allowed(state)

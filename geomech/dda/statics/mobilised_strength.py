@@ -13,7 +13,7 @@ import numpy as np
 
 from ...model import OPEN, SLIP, Blocks, JointLaw, State
 from ...model.joints.joint_law import STEEPEST
-from .strength_reduction import reduced
+from ..joint_laws.reduced_strength import reduced
 
 #: Faces without a name are told by their blocks up to so many pairs, and in one line beyond.
 _FEW = 12
@@ -61,7 +61,8 @@ def mobilised_joints(
         law = laws[index]
         touching = own[own["state"] != OPEN]
         length = float(own["length"].sum())
-        strength = sum(_strength(law, row) for row in touching)
+        # Open ends of faces that touch elsewhere keep their cohesion (`whole_faces`).
+        strength = sum(_strength(law, row) for row in own)
         out.append(
             MobilisedJoint(
                 name,

@@ -4,173 +4,56 @@ tan φ, cohesion and tensile strength of the joints are divided by F (Zienkiewic
 1992), and the blocks are asked for a static equilibrium, each trial beginning where the last one that held came to
 rest. The criterion is a force, not a displacement: a static step of length dt leaves out of balance what moves the
 blocks by a dt²/2. In a stable trial the unbalanced force falls to round-off within a few steps; in an unstable one it
-stays, however often the step is repeated, and for sliding it grows as A − B/F. Two unstable trials thus point at the
-factor between them, and few more close in. What falls too slowly to tell, as where a soft anchor has yet to be
-stretched, is followed with longer steps, until it is at rest or has moved farther than an equilibrium may
-(`displacement_limit`).
+stays (`stability_trial`), and for sliding it grows as A − B/F. Two unstable trials thus point at the factor between
+them, and few more close in.
 
-Sharp toes in re-entrant corners are rounded (`toes`): what else they would hold is told beside.
+Sharp toes in re-entrant corners are rounded (`sharp_toes`), and faces keep all their cohesion while they touch anywhere
+(`whole_faces`), as limit equilibrium has it: what the factor would be otherwise is told beside.
 """
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from ...model import GROUND, OPEN, Blocks, DdaSettings, JointLaw, Loads, Material, State
-from ..kinematics.simplex_integration import block_moments
-from ..loads.bolts import labels
-from ..results import NotConverged, StepResult
+from ...model import Blocks, DdaSettings, JointLaw, Loads, Material, State
+from ..joint_laws.reduced_strength import reduced
+from ..results import NotConverged
 from ..system import BlockSystem
-from .displacement_limit import MOVED, DisplacementLimit
+from .counted_resistance import (
+    bearing_toes,
+    hairline_faces,
+    parted_faces,
+    toes_in_the_way,
+    with_anchors,
+    with_hairlines,
+    with_parted_faces,
+    with_toes,
+)
+from .displacement_limit import DisplacementLimit
 from .pseudo_time_equilibrium import equilibrium
-from .sharp_toes import FREE, ROUNDED, SHARP, Toe
+from .safety_answer import FactorOfSafety, mechanism_of, moving_in
+from .sharp_toes import FREE, ROUNDED, SHARP
+from .stability_trial import Trial, TrialLoads, stability_trial
 
 log = logging.getLogger(__name__)
 
-#: Free fall over a step takes a block this part of its size √area: long beside contact vibrations, short for geometry.
-_FALL = 0.01
-#: An unbalanced force that has not fallen by this factor over so many steps does not fall.
-_FALLING, _STEPS = 0.8, 6
-#: No trial is called unstable before it has made so many steps.
-_LEAST_STEPS = 10
-#: So many blocks of a mechanism are described; one that turns by more than this (rad) as it goes its own size is said
-#: to.
-_TOLD, _TURNS = 8, 0.05
 #: So many steps of relaxation may go before the first trial.
 _RELAXING = 100
-#: A trial whose unbalanced force does not tell goes on with steps this many times as long, so many of them.
-_LONGER, _MORE_STEPS = 4.0, 30
 #: What bounds the factor from above is tried again from just below it, if it was begun from farther than so many times
 #: the tolerance.
 _FROM_AFAR = 3.0
-#: Toes bar the way of blocks that come nearer to what they touch by this part of the fastest block's way, and hold
-#: what is more than this part of their block's weight.
-_BARRED, _BEARS = 1e-3, 1e-3
-#: A bolt within this part of its yield force is at it.
-_AT_YIELD = 1e-6
-#: A bolt that never yields has taken on load when it bears more than its pretension by this part.
-_TAKEN = 1e-3
 #: The search for a trial that stands, and for one that does not, ends at this factor.
 _FARTHEST = 64.0
+#: From a factor that is known to be near, the search for one that stands goes down by this part of itself.
+_NEARBY = 0.85
 
 
 class NothingToReduce(ValueError):
     """What was asked for has no factor of safety: no such strength, nothing that could fail, a load that statics do not
     know."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One reduced strength. ``factor`` F; ``stable``; static ``steps`` made; ``unbalanced`` the part of the forces on a
-    block that is left to move it, where it is largest; ``drift`` m/s², that block's acceleration; ``displacement``
-    (n_blocks, 2) m and ``rotation`` (n_blocks,) rad of the last step; ``moved`` (n_blocks,) m, how far each block has
-    come since the search began; ``reason`` in words."""
-
-    factor: float
-    stable: bool
-    steps: int
-    unbalanced: float
-    drift: float
-    displacement: np.ndarray
-    rotation: np.ndarray
-    moved: np.ndarray
-    reason: str
-
-
-@dataclass(frozen=True)
-class Anchor:
-    """A bolt of the loads as it holds at the factor: ``force`` N/m in it, by how much it is stretched (``stretch`` m) since it
-    was installed, how far its block has ``moved`` (m) for that, and whether it ``yields``."""
-
-    name: str
-    force: float
-    stretch: float
-    moved: float
-    yields: bool
-
-
-@dataclass(frozen=True, eq=False)
-class FactorOfSafety:
-    """``factor`` lies between ``lower``, the largest F with an equilibrium that was found, and ``upper``, the smallest
-    without (inf: none up to 64); ``trials`` in the order made; ``mechanism``: what moves just above the factor, in
-    words, a line a block; ``moving`` those blocks, the fastest first; ``state`` the equilibrium at ``lower``; ``moved``
-    (n_blocks,) m, how far blocks have come to it, the initial settlement included; ``anchors`` what bolts hold there.
-
-    ``toes`` bar the way of what moves. Where they are rounded and hold nothing, ``other_factor`` is what it would be
-    were their tips sharp; where they hold (``toes_hold``), what it is without them; None where it is not known. ``warnings``
-    in words."""
-
-    factor: float
-    lower: float
-    upper: float
-    trials: tuple[Trial, ...]
-    moving: tuple[int, ...]
-    mechanism: tuple[str, ...]
-    state: State
-    moved: np.ndarray
-    anchors: tuple[Anchor, ...] = ()
-    toes: tuple[Toe, ...] = ()
-    toes_hold: bool = False
-    other_factor: float | None = None
-    warnings: tuple[str, ...] = ()
-
-    def table(self, title: str = "factor of safety") -> str:
-        """The trials by F, the factor under its ``title``, and the mechanism, as text."""
-        lines = ["       F  equilibrium  steps  unbalanced  drift m/s²"]
-        for t in sorted(self.trials, key=lambda t: t.factor):
-            answer = "yes" if t.stable else "no"
-            lines.append(
-                f"{t.factor:8.4f}  {answer:<11}  {t.steps:5d}  {t.unbalanced:10.2e}  {t.drift:10.2e}  {t.reason}"
-            )
-        found = f"{self.factor:.4f}" if math.isfinite(self.upper) else f"above {self.lower:g}"
-        lines.append(f"{title} {found}" + (", moving at failure:" if self.mechanism else ""))
-        lines += [f"  {line}" for line in self.mechanism]
-        for a in self.anchors:
-            state = "at its yield force" if a.yields else "not at its yield force"
-            lines.append(
-                f"  bolt {a.name}: {a.force / 1e3:.4g} kN/m, {state}, stretched by {1e3 * a.stretch:.3g} mm, its block "
-                f"has moved {1e3 * a.moved:.3g} mm"
-            )
-        return "\n".join([*lines, *(f"  warning: {line}" for line in self.warnings)])
-
-    def as_dict(self, blocks: Blocks) -> dict[str, object]:
-        """Plain numbers for a file: the answer, its trials, and how ``blocks`` move at failure, the farthest one
-        by 1."""
-        failed = min((t for t in self.trials if not t.stable), key=lambda t: t.factor, default=None)
-        moving = {}
-        if failed is not None and self.moving:
-            far = float(np.hypot(*failed.displacement[self.moving[0]]))
-            for b in self.moving:
-                way, turn = (failed.displacement[b] / far).tolist(), float(failed.rotation[b] / far)
-                moving[blocks.names[b]] = {"displacement": way, "rotation_per_m": turn}
-        plain = ("factor", "stable", "steps", "unbalanced", "drift", "reason")
-        return {
-            "factor_of_safety": self.factor,
-            "lower": self.lower,
-            "upper": self.upper if math.isfinite(self.upper) else None,
-            "moving": moving,
-            "moved_m": dict(zip(blocks.names, self.moved.tolist(), strict=True)),
-            "anchors": [vars(a) for a in self.anchors],
-            "toes": [
-                {
-                    "block": blocks.names[t.block],
-                    "other": blocks.names[t.other],
-                    "at": list(t.at),
-                    "stands_off_m": t.stands_off,
-                    "force": t.force,
-                }
-                for t in self.toes
-            ],
-            "toes_hold": self.toes_hold,
-            "factor_without_toes" if self.toes_hold else "factor_with_sharp_toes": self.other_factor,
-            "warnings": list(self.warnings),
-            "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],
-        }
 
 
 def factor_of_safety(
@@ -190,7 +73,8 @@ def factor_of_safety(
     max_steps: int = 200,
     watch: Callable[[Trial], None] | None = None,
     toes: str = ROUNDED,
-    compare_toes: bool = True,
+    whole_faces: bool = True,
+    compare: bool = True,
 ) -> FactorOfSafety:
     """The factor F by which the strength of the joints can be divided before no static equilibrium is left.
 
@@ -198,8 +82,10 @@ def factor_of_safety(
     (default: blocks at rest). ``reduce`` names the joint laws that are weakened (default: all). The answer is bracketed
     to ``tolerance`` (relative); a trial stands when no block has more than the part ``unbalanced`` of the forces on it
     left to move it. Static steps are ``time_step`` s long (default: free fall over it is a hundredth of the smallest
-    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `toes`; with ``compare_toes``
-    rounded ones whose tips would hold, and others that hold, are told with the factor that it would be otherwise.
+    block). ``watch`` sees every trial. ``toes`` are "rounded", "sharp" or "free", see `sharp_toes`; with
+    ``whole_faces`` a face keeps all its cohesion while it touches anywhere (`whole_faces`). With ``compare``, rounded
+    toes whose tips would hold, others that hold, and faces that have parted at one end, are told with the factor that
+    it would be otherwise.
 
     Coulomb friction does not settle the forces of a system uniquely: strengths are reduced step by step from what
     stands, and another way there may find a factor that differs by some thousandths where contacts slide and stick
@@ -227,325 +113,228 @@ def factor_of_safety(
             "is the"
             " weight's own kind of force, the one of the time that is asked for"
         )
-    trials: list[Trial] = []
+    under = TrialLoads(loads, load_time, unbalanced, max_steps, time_step)
+    rest = State.at_rest(blocks) if state is None else state
     settings = replace(settings or DdaSettings(), dynamic_factor=0.0)
+    search = _Search(blocks, materials, joints, joint_index, settings, chosen, under, rest, tolerance)
+    counted = Counted(toes, whole_faces)
+    return search.answer(counted, watch) if compare else search.run(counted, watch=watch)
 
-    def with_strength(factor: float) -> BlockSystem:
-        laws = [reduced(law, factor) if law.name in chosen else law for law in joints]
-        system = BlockSystem(blocks, materials, laws, joint_index, settings)
-        system.finder.toes = toes
+
+@dataclass(frozen=True)
+class Counted:
+    """What a factor counts on beside strength: ``toes`` that are "rounded", "sharp" or "free" (`sharp_toes`), and the
+    cohesion of ``whole_faces`` (`whole_faces`)."""
+
+    toes: str = ROUNDED
+    whole_faces: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The search for a factor; arguments as for `factor_of_safety`, ``chosen`` the names of laws that are weakened."""
+
+    blocks: Blocks
+    materials: Sequence[Material]
+    joints: Sequence[JointLaw]
+    joint_index: Callable[[str, str], int | None] | None
+    settings: DdaSettings
+    chosen: Collection[str]
+    under: TrialLoads
+    rest: State
+    tolerance: float
+
+    def system(self, factor: float, counted: Counted) -> BlockSystem:
+        """The blocks with joints whose strength is divided by the ``factor``."""
+        laws = [reduced(law, factor) if law.name in self.chosen else law for law in self.joints]
+        system = BlockSystem(self.blocks, self.materials, laws, self.joint_index, self.settings)
+        system.finder.toes, system.finder.whole_faces = counted.toes, counted.whole_faces
         return system
 
-    def otherwise(way: str) -> FactorOfSafety | None:
-        """The answer with other toes; None where the blocks do not stand."""
+    def answer(self, counted: Counted, watch: Callable[[Trial], None] | None) -> FactorOfSafety:
+        """The factor with what bolts hold, what toes do or would, and what faces count for that have parted."""
         try:
-            return factor_of_safety(
-                blocks, materials, joints, loads, settings, joint_index=joint_index, state=state, load_time=load_time,
-                reduce=reduce, tolerance=tolerance, unbalanced=unbalanced, time_step=time_step, max_steps=max_steps,
-                toes=way, compare_toes=False,
-            )  # fmt: skip
+            found = self.run(counted, watch=watch)
         except NotConverged:
+            if counted.toes != ROUNDED or not toes_in_the_way(self.system(1.0, counted), self.rest):
+                raise
+            sharp = replace(counted, toes=SHARP)
+            found = self.run(sharp)
+            return with_toes(self.blocks, found, self._bearing(found, sharp), None, True)
+        found = with_anchors(self.blocks, self.under.loads, found)
+        if counted.toes != FREE:
+            found = self._with_toes(found, counted)
+        return self._with_parted_faces(found, counted) if counted.whole_faces else found
+
+    def _with_toes(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+        bearing = self._bearing(found, counted)
+        if bearing:
+            return with_toes(self.blocks, found, bearing, self._otherwise(replace(counted, toes=FREE)), True)
+        if counted.toes == SHARP or not found.moving:
+            return found
+        bars = toes_in_the_way(self.system(found.lower, counted), found.state, found.failed)
+        if not bars:
+            return found
+        above = found.upper * (1.0 + 2.0 * self.tolerance)
+        sharp = self._otherwise(replace(counted, toes=SHARP), found.lower, above)
+        return found if sharp is None else with_toes(self.blocks, found, bars, sharp, False)
+
+    def _bearing(self, found: FactorOfSafety, counted: Counted):
+        return bearing_toes(self.system(found.lower, counted), found.state, self.under.loads, self.under.time)
+
+    def _with_parted_faces(self, found: FactorOfSafety, counted: Counted) -> FactorOfSafety:
+        system = self.system(found.lower, counted)
+        loose = hairline_faces(system, found.state)
+        if loose and math.isfinite(found.upper):
+            rigid = replace(self, materials=[replace(material, rigid=True) for material in self.materials])
+            above = found.upper * (1.0 + 2.0 * self.tolerance)
+            other = rigid._otherwise(counted, found.lower, above)
+            found = found if other is None else with_hairlines(self.blocks, found, loose, other)
+        parted = parted_faces(system, found.state)
+        if not parted:
+            return found
+        just_below = found.lower * (1.0 - 2.0 * self.tolerance)
+        other = self._otherwise(replace(counted, whole_faces=False), just_below, stands=True)
+        return found if other is None else with_parted_faces(self.blocks, found, parted, other)
+
+    def _otherwise(
+        self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False
+    ) -> FactorOfSafety | None:
+        """The answer with something else ``counted``; arguments as for `run`. None where the blocks do not stand, or
+        the answer is not another."""
+        try:
+            return self.run(counted, first, above, stands)
+        except (NotConverged, _NoOther):
             return None
 
-    def _told(found: FactorOfSafety, failed: Trial | None = None) -> FactorOfSafety:
-        """With what bolts hold, and what toes do or would."""
-        held = found.state
-        found = _with_anchors(blocks, loads, found)
-        system = with_strength(found.lower)
-        if toes == FREE or not compare_toes:
-            return found
-        holding = _holding(with_strength(found.lower), held, loads, load_time)
-        if holding:
-            return _held_by_toes(blocks, found, holding, otherwise(FREE))
-        bars = () if toes == SHARP or failed is None else _toes(system, held, failed)
-        if bars:
-            sharp = otherwise(SHARP)
-            if sharp is not None and sharp.upper > found.upper * (1.0 + tolerance):
-                lines = _of_toes(blocks, bars, sharp, False)
-                return replace(found, toes=bars, other_factor=sharp.factor, warnings=(*found.warnings, *lines))
-        return found
+    def run(
+        self, counted: Counted, first: float = 1.0, above: float = math.inf, stands: bool = False,
+        watch: Callable[[Trial], None] | None = None,
+    ) -> FactorOfSafety:  # fmt: skip
+        """The bracket of the factor, from a trial at ``first`` on. Raises `_NoOther` where blocks stand there, if it is
+        asked whether any ``stands``, or do not stand at a factor ``above`` it, and `NotConverged` where they do at
+        none."""
+        bracket = _Bracket(self, counted, watch)
+        near = stands or math.isfinite(above)
+        trial = bracket.begin(first)
+        if trial.stable and stands:
+            raise _NoOther
+        while not trial.stable:
+            if trial.factor <= 1.0 / _FARTHEST:
+                raise NotConverged(
+                    f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
+                    "what moves is not held by joint strength, or the contacts find no states"
+                )
+            trial = bracket.begin((_NEARBY if near else 0.5) * trial.factor)
+        if math.isfinite(above) and not bracket.tried(above).stable:
+            raise _NoOther
+        return bracket.closed(self.tolerance)
 
-    def tried(factor: float, start: State) -> tuple[Trial, State]:
-        trial, end = _trial(
-            with_strength(factor), start, loads, load_time, factor, unbalanced, max_steps, time_step, limit
-        )
-        trials.append(trial)
+
+class _NoOther(Exception):
+    """With something else counted, the factor is not another."""
+
+
+class _Bracket:
+    """Trials of a ``search`` between which the factor lies."""
+
+    def __init__(self, search: _Search, counted: Counted, watch: Callable[[Trial], None] | None) -> None:
+        self._search, self._counted, self._watch = search, counted, watch
+        self._limit: DisplacementLimit | None = None
+        self._state = search.rest
+        self.trials: list[Trial] = []
+        # Of each trial, the factor from whose equilibrium it was begun.
+        self._began: dict[float, float] = {}
+        self.lower = 0.0
+
+    def begin(self, factor: float) -> Trial:
+        """Try a ``factor`` from where the blocks come to rest with it."""
+        search = self._search
+        self._state, self._limit = _relaxed(search.system(factor, self._counted), search.under, search.rest)
+        return self.tried(factor)
+
+    def tried(self, factor: float) -> Trial:
+        """Try a ``factor`` from the last equilibrium."""
+        search = self._search
+        system = search.system(factor, self._counted)
+        trial, end = stability_trial(system, self._state, search.under, factor, self._limit)
+        self.trials.append(trial)
+        self._began[factor] = self.lower
         log.info("F = %.5g: %s", factor, trial.reason)
-        if watch is not None:
-            watch(trial)
-        return trial, end
-
-    rest = State.at_rest(blocks) if state is None else state
-    begun, limit = _relaxed(with_strength(1.0), loads, rest, load_time)
-    trial, held = tried(1.0, begun)
-    while not trial.stable:
-        if trial.factor <= 1.0 / _FARTHEST:
-            sharp = otherwise(SHARP) if toes == ROUNDED and compare_toes and _toes(with_strength(1.0), rest) else None
-            if sharp is not None:
-                return _held_by_toes(
-                    blocks, sharp, _holding(with_strength(sharp.lower), sharp.state, loads, load_time), None
-                )
-            raise NotConverged(
-                f"the blocks do not stand even with joints {_FARTHEST:g} times as strong: {trial.reason}; "
-                "what moves is not held by joint strength, or the contacts find no states"
-            )
-        weak = 0.5 * trial.factor
-        begun, limit = _relaxed(with_strength(weak), loads, rest, load_time)
-        trial, held = tried(weak, begun)
-    lower, began = trial.factor, {t.factor: 0.0 for t in trials}
-    while True:
-        # What has failed from far below may stand when it is come to by small steps.
-        known = {t.factor: t for t in trials if t.stable or t.factor > lower}
-        upper = min((factor for factor, t in known.items() if not t.stable), default=math.inf)
-        if math.isinf(upper):
-            if lower >= _FARTHEST:
-                return _told(
-                    FactorOfSafety(lower, lower, math.inf, tuple(trials), (), (), held, limit.moved(held.vertices))
-                )
-            factor = 2.0 * lower
-        elif upper > lower * (1.0 + tolerance):
-            factor = _next_factor(list(known.values()), lower, upper, tolerance)
-        elif began[upper] < lower * (1.0 - _FROM_AFAR * tolerance):
-            factor = upper
-        else:
-            break
-        began[factor] = lower
-        trial, end = tried(factor, held)
+        if self._watch is not None:
+            self._watch(trial)
         if trial.stable:
-            lower, held = trial.factor, end
-    last = known[upper]
-    moving = _moving(last)
-    factor = _pointed_at(list(known.values()), lower, upper)
-    return _told(
-        FactorOfSafety(
-            factor, lower, upper, tuple(trials), moving, _mechanism(blocks, last, moving), held,
-            limit.moved(held.vertices),
-        ),
-        last,
-    )  # fmt: skip
+            self.lower, self._state = factor, end
+        return trial
+
+    def _known(self) -> list[Trial]:
+        # What has failed from far below may stand when it is come to by small steps.
+        last = {t.factor: t for t in self.trials if t.stable or t.factor > self.lower}
+        return list(last.values())
+
+    def closed(self, tolerance: float) -> FactorOfSafety:
+        """The answer, once no factor lies between trials that are farther apart than the ``tolerance``."""
+        while True:
+            known = self._known()
+            upper = min((t.factor for t in known if not t.stable), default=math.inf)
+            if math.isinf(upper):
+                if self.lower >= _FARTHEST:
+                    return self._answer(self.lower, None)
+                factor = 2.0 * self.lower
+            elif upper > self.lower * (1.0 + tolerance):
+                factor = _next_factor(known, self.lower, upper, tolerance)
+            elif self._from_afar(known, upper, tolerance):
+                factor = upper
+            else:
+                failed = next(t for t in known if t.factor == upper)
+                return self._answer(_pointed_at(known, self.lower, upper), failed)
+            self.tried(factor)
+
+    def _from_afar(self, known: list[Trial], upper: float, tolerance: float) -> bool:
+        """Whether what has failed at ``upper`` was begun from so far below that it may stand, unless the drift of
+        failures says that it does not."""
+        if self._began[upper] >= self.lower * (1.0 - _FROM_AFAR * tolerance):
+            return False
+        return _drift_ends(known, self.lower, upper) is None
+
+    def _answer(self, factor: float, failed: Trial | None) -> FactorOfSafety:
+        moving = () if failed is None else moving_in(failed)
+        lines = () if failed is None else mechanism_of(self._search.blocks, failed, moving)
+        return FactorOfSafety(
+            factor, self.lower, math.inf if failed is None else failed.factor, tuple(self.trials), moving, lines,
+            self._state, self._limit.moved(self._state.vertices),
+        )  # fmt: skip
 
 
-def _relaxed(system: BlockSystem, loads: Loads, state: State, load_time: float) -> tuple[State, DisplacementLimit]:
-    """Where the blocks come to rest from ``state``, at ``load_time``: what is dug out or bolted by then is so in the
-    step that follows; ``state`` itself if they do not. And how far they may move from there."""
-    limit = DisplacementLimit(system, state, loads, load_time)
-    found = equilibrium(system, state, loads, load_time=load_time, max_steps=_RELAXING, limit=limit)
+def _relaxed(system: BlockSystem, under: TrialLoads, state: State) -> tuple[State, DisplacementLimit]:
+    """Where the blocks come to rest from ``state``: what is dug out or bolted by the loads' time is so in the step that
+    follows; ``state`` itself if they do not. And how far they may move from there."""
+    limit = DisplacementLimit(system, state, under.loads, under.time)
+    found = equilibrium(system, state, under.loads, load_time=under.time, max_steps=_RELAXING, limit=limit)
     if found.converged:
-        return replace(found.state, time=max(state.time, load_time)), limit
-    return state, DisplacementLimit(system, state, loads, load_time)
-
-
-def _toes(system: BlockSystem, state: State, failed: Trial | None = None) -> tuple[Toe, ...]:
-    """The toes of blocks in ``state`` that bar the way of what has ``failed``; all of them without."""
-    found = system.contacts_near(state)
-    off = system.finder.toes_among(found, state.vertices)
-    borne = {(int(row["vertex"]), int(row["edge"])): row for row in state.contacts[state.contacts["state"] != OPEN]}
-    centre = None if failed is None else block_moments(state.vertices, system.next, system.vertex_start)[:, 1:3]
-    out = []
-    for k in np.flatnonzero(off >= 0.0):
-        a, b = int(found.block[k]), int(found.other[k])
-        at = found.geometry[k, 5:7]
-        if failed is not None:
-            apart = np.zeros(2)
-            for block, sign in ((a, 1.0), (b, -1.0)):
-                x, y = at - centre[block]
-                apart += sign * (failed.displacement[block] + failed.rotation[block] * np.array([-y, x]))
-            fastest = float(np.hypot(*failed.displacement.T).max())
-            if not apart @ found.geometry[k, 1:3] < -_BARRED * fastest:
-                continue
-        row = borne.get((int(found.vertex[k]), int(found.edge[k])))
-        force = 0.0 if row is None else float(row["normal_force"])
-        out.append(
-            Toe(a, b, int(found.vertex[k]), int(found.edge[k]), (float(at[0]), float(at[1])), float(off[k]), force)
-        )
-    return tuple(out)
-
-
-def reduced(law: JointLaw, factor: float) -> JointLaw:
-    """``law`` with tan φ, cohesion and tensile strength (their residuals too) divided by ``factor``; an angle of
-    dilation is kept as long as it is below that of friction.
-
-    A face that yields before others do keeps its cohesion on what it slips until these yield too, unless the law says
-    what strength slip leaves: limit equilibrium counts all of it, and which face yields first is a matter of how stiff
-    springs share loads."""
-    if law.roughness is not None:
-        rough = replace(law.roughness, reduction=law.roughness.reduction * factor)
-        return replace(law, roughness=rough)
-
-    def angle(of: float | None) -> float | None:
-        return None if of is None else math.atan(math.tan(of) / factor)
-
-    friction = angle(law.friction_angle)
-    softens = law.residual_friction_angle is not None or law.residual_cohesion > 0 or law.softening_slip > 0
-    kept = law.residual_cohesion if softens else law.cohesion
-    return replace(
-        law,
-        friction_angle=friction,
-        cohesion=law.cohesion / factor,
-        tensile_strength=law.tensile_strength / factor,
-        residual_friction_angle=angle(law.residual_friction_angle),
-        residual_cohesion=kept / factor,
-        dilation_angle=min(law.dilation_angle, friction),
-    )
-
-
-def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...]:
-    """What the bolts of ``loads`` hold in ``state``."""
-    out = []
-    for bolt, name, row in zip(loads.bolts, labels(loads.bolts), state.bolts, strict=False):
-        if not row["installed"] or row["broken"]:
-            continue
-        force = float(row["force"])
-        stretch = (force - bolt.pretension) / bolt.stiffness + float(row["plastic"])
-        far = max(float(moved[b]) for b in (bolt.block, bolt.other) if b != GROUND)
-        out.append(Anchor(name, force, stretch, far, force >= bolt.yield_force * (1.0 - _AT_YIELD)))
-    return tuple(out)
-
-
-def _with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorOfSafety:
-    """The answer ``found`` with what bolts hold in it, and a warning where they hold less than they could or only after
-    their blocks have visibly moved."""
-    anchors, lines = _anchors(loads, found.state, found.moved), []
-    size = np.sqrt(blocks.areas())
-    for bolt, anchor in zip((b for b, row in zip(loads.bolts, found.state.bolts, strict=False)
-                             if row["installed"] and not row["broken"]), anchors, strict=True):  # fmt: skip
-        least = min(float(size[b]) for b in (bolt.block, bolt.other) if b != GROUND)
-        if math.isinf(bolt.yield_force) and anchor.force > bolt.pretension * (1.0 + _TAKEN):
-            lines.append(
-                f"bolt {anchor.name} has no yield force: it counts with the {anchor.force / 1e3:.4g} kN/m that it takes "
-                f"while its block moves {1e3 * anchor.moved:.3g} mm"
-            )
-        elif anchor.moved > MOVED * least and anchor.stretch > 0.0:
-            lines.append(
-                f"bolt {anchor.name} takes its {anchor.force / 1e3:.4g} kN/m only once its block has moved "
-                f"{1e3 * anchor.moved:.3g} mm, {100 * anchor.moved / least:.2g} % of the block's size"
-            )
-    return replace(found, anchors=anchors, warnings=(*found.warnings, *lines))
-
-
-def _holding(system: BlockSystem, state: State, loads: Loads, load_time: float) -> tuple[Toe, ...]:
-    """The toes that bear forces in ``state``."""
-    weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
-    system.finder.toes = FREE
-    return tuple(toe for toe in _toes(system, state) if toe.force > _BEARS * weight[toe.block])
-
-
-def _held_by_toes(
-    blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], without: FactorOfSafety | None
-) -> FactorOfSafety:
-    """The answer ``found`` with the ``toes`` that hold in it, and what it would be ``without`` them."""
-    other = None if without is None else without.factor
-    lines = _of_toes(blocks, toes, without, True)
-    return replace(found, toes=toes, toes_hold=True, other_factor=other, warnings=(*found.warnings, *lines))
-
-
-def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool) -> tuple[str, ...]:
-    """What toes hold or would, in words; ``other`` is the answer without them or with sharp tips."""
-
-    def factor(of: FactorOfSafety) -> str:
-        return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"
-
-    lines = []
-    for toe in toes[:_TOLD]:
-        a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (toe.block, toe.other))
-        where = f"the toe of {a!r} touches {b!r} at x = {_metres(toe.at[0])}, y = {_metres(toe.at[1])} m"
-        if hold:
-            without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
-            lines.append(f"{where} and holds {toe.force / 1e3:.4g} kN/m; without it {without}")
-        else:
-            lines.append(
-                f"{where}; rounded, it stands off by {toe.stands_off:.3g} m and holds nothing before it has moved as far. "
-                f"A sharp tip would hold: factor {factor(other)}, which is not to be relied on"
-            )
-    return tuple(lines)
-
-
-def _metres(value: float) -> str:
-    """To the millimetre; adding zero makes a plain 0 of −0."""
-    return f"{round(value, 3) + 0.0:.7g}"
+        return replace(found.state, time=max(state.time, under.time)), limit
+    return state, DisplacementLimit(system, state, under.loads, under.time)
 
 
 def _has_strength(law: JointLaw) -> bool:
     return law.friction_angle > 0 or law.cohesion > 0 or law.tensile_strength > 0 or law.roughness is not None
 
 
-def _trial(
-    system: BlockSystem,
-    state: State,
-    loads: Loads,
-    load_time: float,
-    factor: float,
-    tolerance: float,
-    max_steps: int,
-    time_step: float | None,
-    limit: DisplacementLimit,
-) -> tuple[Trial, State]:
-    """Static steps until the unbalanced force has gone or does not go, and where that does not tell, until blocks have
-    moved farther than the ``limit`` allows."""
-    blocks = system.blocks
-    size = math.sqrt(float(blocks.areas()[~blocks.fixed].min()))
-    pull = max(float(np.hypot(*loads.gravity.at(load_time))), 1e-3)
-    longest = dt = math.sqrt(2.0 * _FALL * size / pull) if time_step is None else float(time_step)
-    ratios: list[float] = []
-    told: StepResult | None = None
-    result: StepResult | None = None
-    stable, reason, more = False, f"still moving after {max_steps} steps", 0
-
-    def way(state: State) -> str:
-        return f"{limit.moved(state.vertices)[~blocks.fixed].max():.2g} m"
-
-    for _ in range(max_steps):
-        try:
-            result = system.step(state, loads, dt, load_time=load_time)
-        except NotConverged as failure:
-            reason = f"no consistent contacts: {failure}"
-            break
-        state = result.state
-        limit.follow(result)
-        ratios.append(result.statistics["unbalanced_ratio"])
-        at_rest, beyond = len(ratios) > 1 and ratios[-1] < tolerance, len(limit.beyond(state)) > 0
-        if at_rest:
-            stable, reason = not beyond, f"at rest {'only ' if beyond else ''}after {way(state)}"
-            break
-        slow = len(ratios) >= _LEAST_STEPS and ratios[-1] > _FALLING * ratios[-1 - _STEPS]
-        if slow and told is None:
-            # What moves now tells of the mechanism, with the step's length that all trials have.
-            told = result
-        if told is not None:
-            more += 1
-            if beyond or more > _MORE_STEPS:
-                reason = f"moves on after {way(state)}"
-                break
-            dt = _LONGER * result.dt
-            continue
-        # A step that was cut took less of the forces' time: go on with its length, and back to the full one by
-        # doubling.
-        dt = result.dt if result.statistics["step_cuts"] else min(longest, 2.0 * result.dt)
-    moved = limit.moved(state.vertices)
-    if result is None:
-        nothing = np.zeros((blocks.n_blocks, 2))
-        return Trial(factor, False, 0, math.nan, math.nan, nothing, nothing[:, 0], moved, reason), state
-    shown = result if stable or told is None else told
-    a, h = shown.acceleration, np.sqrt(shown.forces.area)
-    free = ~blocks.fixed
-    drift = np.maximum(np.hypot(a[:, 0], a[:, 1]), h * np.abs(a[:, 2]))[free].max()
-    step = 0.5 * shown.dt**2 * a
-    trial = Trial(
-        factor, stable, len(ratios), shown.statistics["unbalanced_ratio"], float(drift), step[:, :2] * free[:, None],
-        step[:, 2] * free, moved, reason,
-    )  # fmt: skip
-    return trial, replace(state, velocity=np.zeros_like(state.velocity))
-
-
 def _pointed_at(trials: Sequence[Trial], lower: float, upper: float) -> float:
-    """Where the drift of the two weakest failures goes to nothing, drift = A − B/F; between ``lower`` and ``upper``."""
+    """Where the drift of failures ends between ``lower`` and ``upper``; the middle where it does not say."""
+    end = _drift_ends(trials, lower, upper)
+    return 2.0 * lower * upper / (lower + upper) if end is None else end
+
+
+def _drift_ends(trials: Sequence[Trial], lower: float, upper: float) -> float | None:
+    """Where the drift of the two weakest failures goes to nothing, drift = A − B/F; None if that is not between
+    ``lower`` and ``upper``."""
     failed = sorted((t for t in trials if not t.stable and math.isfinite(t.drift)), key=lambda t: t.factor)[:2]
-    middle = 2.0 * lower * upper / (lower + upper)
     if len(failed) < 2 or not failed[1].drift > failed[0].drift:
-        return middle
+        return None
     (x, p), (y, q) = ((1.0 / t.factor, t.drift) for t in failed)
     inverse = x + p * (x - y) / (q - p)
-    return 1.0 / inverse if 1.0 / upper < inverse < 1.0 / lower else middle
+    return 1.0 / inverse if 1.0 / upper < inverse < 1.0 / lower else None
 
 
 def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance: float) -> float:
@@ -561,30 +350,3 @@ def _next_factor(trials: Sequence[Trial], lower: float, upper: float, tolerance:
     if lower < below and not lower > aim * (1.0 - 2.0 * margin):
         return below
     return above if above < upper else middle
-
-
-def _moving(trial: Trial) -> tuple[int, ...]:
-    """The blocks that move by more than a tenth of the farthest, the fastest first."""
-    far = np.hypot(*trial.displacement.T)
-    order = np.argsort(-far, kind="stable")
-    return tuple(order[far[order] > 0.1 * far.max()].tolist()) if far.max() > 0 else ()
-
-
-def _mechanism(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple[str, ...]:
-    """A line for each of the fastest blocks."""
-    fastest = float(np.hypot(*trial.displacement[list(moving[:1])].T).max()) if moving else 1.0
-    lines = []
-    for block in moving[:_TOLD]:
-        (x, y), turn = trial.displacement[block], trial.rotation[block]
-        far = math.hypot(x, y)
-        name = blocks.names[block] if blocks.names else f"block {block}"
-        # Adding zero makes a plain 0 of −0.
-        text = f"{name}: {far / fastest:.2f} of the fastest, towards {round(math.degrees(math.atan2(y, x))) + 0}°"
-        size = math.sqrt(abs(float(blocks.areas()[block])))
-        if abs(turn) * size > _TURNS * far:
-            turned = f"{math.degrees(abs(turn)) * size / far:.0f}° while it goes its own size, √area"
-            text += f", turning {'left' if turn > 0 else 'right'} by {turned}"
-        lines.append(text)
-    if len(moving) > _TOLD:
-        lines.append(f"and {len(moving) - _TOLD} more of {blocks.n_blocks} blocks")
-    return tuple(lines)

@@ -47,6 +47,8 @@ _FREEZES, _FROZEN_TOLERANCE = 60, 1e-6
 _ONE_BY_ONE = 3
 #: Factors for so many states are kept.
 _KEPT = 8
+#: Less than this part of the held jumps is another: then it is that part that is multiplied.
+FEW_CHANGED = 0.1
 
 
 class Missed(NamedTuple):
@@ -64,6 +66,7 @@ class FaceEquations:
         self.system, self.laws, self._work = system, laws, work
         self._factors: dict[bytes, tuple[np.ndarray, Factor | HeldFactor | Iterated]] = {}
         self._last: tuple[np.ndarray, np.ndarray] | None = None
+        self._pull: tuple[np.ndarray, np.ndarray] | None = None
 
     def solve(
         self, right: np.ndarray, states: FaceStates, memory: FaceMemory, limit: np.ndarray | None = None
@@ -87,7 +90,7 @@ class FaceEquations:
         extra[t] = states.way * bound + slides * right[a]
         extra[a] += spring[a] * laws.aperture
         extra[t] -= spring[t] * memory.rest
-        pull = s @ w if w.any() else np.zeros_like(w)
+        pull = self._pull_of(w)
         known = right + extra - pull
         known[t] -= slides * pull[a]
         w[free] = factor.solve(known[free])
@@ -105,6 +108,21 @@ class FaceEquations:
         slipping = states.way != 0
         reaction[t[slipping]] = -(states.way * bound + slides * reaction[a])[slipping]
         return w, reaction
+
+    def _pull_of(self, w: np.ndarray) -> np.ndarray:
+        """S ``w`` of held jumps; from state to state few of them change."""
+        if self._pull is not None:
+            changed = np.flatnonzero(w != self._pull[0])
+            if len(changed) < FEW_CHANGED * len(w):
+                if len(changed):
+                    step = w[changed] - self._pull[0][changed]
+                    pull = self._pull[1] + self.system.matrix.entries(np.arange(len(w)), changed) @ step
+                    self._pull = w.copy(), pull
+                return self._pull[1]
+        pull = self.system.matrix @ w if w.any() else np.zeros_like(w)
+        if not isinstance(self.system, IterativeCrackSystem):
+            self._pull = w.copy(), pull
+        return pull
 
     def _opened(self, right: np.ndarray, factor: HeldFactor) -> np.ndarray:
         """S⁻¹ ``right``, for one load after the other."""
@@ -161,7 +179,6 @@ class FaceEquations:
             mixed = np.zeros(self.system.n)
             mixed[self.laws.along] = slides
             self._factors[key] = self.system.changed(Rows(held, mixed, spring, self.laws.elements.per))
-            self._work.crack_factorisations += 1
         return self._factors[key]
 
 

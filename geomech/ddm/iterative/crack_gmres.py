@@ -20,15 +20,19 @@ if TYPE_CHECKING:
 #: Crack unknowns from which "auto" compresses. One load is quicker so, matrices included, from 1200, one with closing
 #: faces from 2000; factors answer further loads on the same cracks sooner.
 CROSSOVER = 2500
+#: The same where cracks have grown from some that were factored: factors are bordered with what is new.
+GROWN_CROSSOVER = 4500
 #: Crack unknowns up to which "auto" factors after all what the iteration does not solve (a gigabyte, half a minute).
 FACTORABLE = 12000
 
 
-def is_compressed(solver: str, n_unknowns: int) -> bool:
-    """Whether ``solver`` ("auto", "dense", "compressed") iterates on so many crack unknowns. Raises ValueError."""
+def is_compressed(solver: str, n_unknowns: int, factored: bool = False) -> bool:
+    """Whether ``solver`` ("auto", "dense", "compressed") iterates on so many crack unknowns; ``factored``: the cracks have
+    grown from some of which there are factors. Raises ValueError."""
     if solver not in ("auto", "dense", "compressed"):
         raise ValueError(f'solver: expected "auto", "dense" or "compressed", got {solver!r}')
-    return n_unknowns > 0 and (solver == "compressed" or (solver == "auto" and n_unknowns >= CROSSOVER))
+    many = GROWN_CROSSOVER if factored else CROSSOVER
+    return n_unknowns > 0 and (solver == "compressed" or (solver == "auto" and n_unknowns >= many))
 
 
 class Following:

@@ -198,6 +198,21 @@ class Bordered:
         out[:n, :n], out[n:, :n], out[:n, n:], out[n:, n:] = self.firm.matrix(n), *self.loose[:3]
         return out.T[np.ix_(self.places, self.places)].T
 
+    def entries(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """(len(rows), len(columns)) of S, column-major."""
+        if "dense" in vars(self):
+            return _entries(self.dense, rows, columns)
+        n, firm = self.n_firm, self.firm.matrix(self.n_firm)
+        r, c = self.places[rows], self.places[columns]
+        out = np.empty((len(r), len(c)), order="F")
+        up, down, left, right = r < n, r >= n, c < n, c >= n
+        for at, across, part in (
+            (up, left, firm), (down, left, self.loose.down), (up, right, self.loose.right), (down, right, self.loose.corner)
+        ):  # fmt: skip
+            i, j = r[at] - n * (at is down), c[across] - n * (across is right)
+            out.T[np.ix_(across, at)] = _entries(part, i, j).T
+        return out
+
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
         """S ``w`` (n,) or (n, k)."""
         if "dense" in vars(self):
@@ -237,6 +252,10 @@ class WholeMatrix:
             none = Border(np.empty((0, n)), np.empty((n, 0)), np.empty((0, 0)), np.empty(0), None)
             self._grown = Bordered(self.elements, firm, n, np.arange(self.elements.n), none)
         return self._grown.grown(elements, was, seen, compute)
+
+    def entries(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """See `Bordered.entries`."""
+        return _entries(self.dense, rows, columns)
 
     def __matmul__(self, w: np.ndarray) -> np.ndarray:
         return self.dense @ w
@@ -281,6 +300,13 @@ class BorderedFactor:
         x[:n] = self._firm.back(n, y - beside @ last, transposed)
         x[n:] = last * scale if transposed else last
         return x.T[..., self._places].T
+
+
+def _entries(matrix: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """``matrix[rows, columns]``, column-major, gathered along memory."""
+    if matrix.flags.f_contiguous or matrix.strides[0] < matrix.strides[1]:
+        return matrix.T[np.ix_(columns, rows)].T
+    return np.asfortranarray(matrix[np.ix_(rows, columns)])
 
 
 def _at_tips(elements: ElementSet, settled: np.ndarray) -> np.ndarray:

@@ -58,6 +58,8 @@ class GrowingFactor:
         #: and loss of accuracy so far.
         self._ends, self._known = [self.n], [None]
         self._trust: list[tuple[float, float]] = []
+        #: All of the matrix so far in one array, with room, and how many unknowns are in it; once asked for.
+        self._whole, self._in_whole = np.empty((0, 0), order="F"), 0
 
     def _room(self, n: int) -> None:
         room = int(ROOM * n) + MORE_ROOM
@@ -68,7 +70,8 @@ class GrowingFactor:
         """Without the room, which may hold anything."""
         n = self.n
         arrays = {name: getattr(self, name)[(slice(n),) * getattr(self, name).ndim].copy() for name in _ARRAYS}
-        return vars(self) | arrays | {"room": len(self.lu)}
+        none = {"_whole": np.empty((0, 0), order="F"), "_in_whole": 0}
+        return vars(self) | arrays | none | {"room": len(self.lu)}
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -109,15 +112,21 @@ class GrowingFactor:
         return out
 
     def matrix(self, n: int) -> np.ndarray:
-        """(n, n), column-major, the first ``n`` unknowns' matrix."""
-        out, first = np.empty((n, n), order="F"), len(self._first)
-        out[:first, :first] = self._first
+        """(n, n), column-major, the first ``n`` unknowns' matrix: a view, not to be written to."""
+        if n > len(self._whole):
+            room = int(ROOM * n) + MORE_ROOM
+            self._whole, self._in_whole = np.empty((room, room), order="F"), 0
+        out, first = self._whole, len(self._first)
+        if not self._in_whole:
+            out[:first, :first] = self._first
         for border in self._borders[: self._ends.index(n)]:
             end = first + len(border.corner)
-            out[first:end, :first], out[:first, first:end] = border.down, border.right
-            out[first:end, first:end] = border.corner
+            if end > self._in_whole:
+                out[first:end, :first], out[:first, first:end] = border.down, border.right
+                out[first:end, first:end] = border.corner
             first = end
-        return out
+        self._in_whole = max(self._in_whole, n)
+        return out[:n, :n]
 
     # -- elimination ---------------------------------------------------------------------------------------------
 

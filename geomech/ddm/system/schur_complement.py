@@ -16,21 +16,37 @@ from .bordered_factor import LOSS, SINGULAR, Bordered, BorderedFactor
 from .closed_face_factor import HeldFactor
 from .contact_rows import Rows
 from .dense_lu import Factor
+from .updated_factor import BaseOf, ContactBase, UpdatedFactor
 
 #: Reciprocal condition of S below which contact is not built on its inverse.
 _SAFE = 1e-11
-#: From so many unknowns on, of which less than this part is held, contact goes by the factors of S.
-WORTHWHILE, MOST_HELD = 400, 0.4
+#: From so many unknowns on contact goes by factors that outlast its states: where less than this part of the unknowns is
+#: held those of S, else those of other states (`updated_factor`).
+WORTHWHILE, MOST_HELD = 400, 0.05
 #: Factors for so many sets of free unknowns are kept.
 _KEPT = 8
+#: Factors of so many states are there for others to go by: those of faces that slip, and of faces that stick where the load
+#: falls, have little in common.
+_BASES = 3
 
 
 class CrackSystem:
-    """``matrix`` is S; factors and columns of its inverse are made when first asked for, and kept."""
+    """``matrix`` is S; factors and columns of its inverse are made when first asked for, and kept. ``before``: that
+    of the cracks before they grew, whose elements had the numbers ``was`` (n_elements,), −1 where new: states of contact go
+    on by its factors."""
 
-    def __init__(self, matrix: Bordered, work: Work | None = None):
+    def __init__(
+        self,
+        matrix: Bordered,
+        work: Work | None = None,
+        before: CrackSystem | None = None,
+        was: np.ndarray | None = None,
+    ):
         self.matrix, self._work = matrix, Work() if work is None else work
         self.n = matrix.n
+        grown = [] if before is None else [base.grown(matrix, was) for base in before.bases]
+        #: What states of contact go by, the last used one at the end.
+        self.bases: list[BaseOf] = [base for base in grown if base is not None]
         self._factors: dict[bytes, tuple[np.ndarray, Factor]] = {}
         self._column_at = np.full(self.n, -1)
         self._columns = np.empty((self.n, 0))
@@ -69,23 +85,43 @@ class CrackSystem:
         reaction[at] = (right - self.matrix @ w)[at]
         return w, reaction
 
-    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | HeldFactor]:
+    def changed(self, rows: Rows) -> tuple[np.ndarray, Factor | BorderedFactor | HeldFactor | UpdatedFactor]:
         """The unknowns that are not held (indices) and factors of their equations."""
         free, moving = np.flatnonzero(~rows.held), np.flatnonzero(rows.mixed)
         if len(free) == self.n and not len(moving) and not rows.spring.any() and self.open_factor is not None:
             return free, self.open_factor
-        few = self.n >= WORTHWHILE and self.n - len(free) < MOST_HELD * self.n and not rows.spring.any()
-        if few and self.open_factor is not None:
+        lasting = self.n >= WORTHWHILE and not rows.spring.any()
+        if lasting and self.n - len(free) < MOST_HELD * self.n and self.open_factor is not None:
             return free, HeldFactor(rows, self.open_factor, self, SINGULAR)
-        whole = self.matrix.dense
-        matrix = whole[np.ix_(free, free)]
+        updated = self._updated(rows) if lasting else None
+        if updated is not None:
+            return free, updated
+        matrix = self.matrix.entries(free, free)
         if len(moving):
             at = np.full(self.n, -1)
             at[free] = np.arange(len(free))
-            matrix[at[moving]] += rows.mixed[moving, None] * whole[np.ix_(moving + rows.per, free)]
+            matrix[at[moving]] += rows.mixed[moving, None] * self.matrix.entries(moving + rows.per, free)
         diagonal = np.arange(len(free))
         matrix[diagonal, diagonal] -= rows.spring[free]
-        return free, Factor(matrix, SINGULAR)
+        factor = Factor(matrix, SINGULAR)
+        self._work.crack_factorisations += 1
+        if lasting:
+            at = np.full(self.n, -1)
+            at[free] = np.arange(len(free))
+            self.bases = self.bases[-(_BASES - 1) :]
+            self.bases.append(BaseOf(ContactBase(factor, rows.mixed[free]), self.matrix, at, rows.per))
+        return free, factor
+
+    def _updated(self, rows: Rows) -> UpdatedFactor | None:
+        """Factors by those of the states that are most like ``rows``; None where these are too unlike."""
+        borders = [base.border(rows) for base in self.bases]
+        if not borders:
+            return None
+        nearest = min(range(len(borders)), key=lambda k: borders[k].n)
+        updated = self.bases[nearest].changed(rows, borders[nearest], SINGULAR)
+        if updated is not None:
+            self.bases.append(self.bases.pop(nearest))
+        return updated
 
     def rcond(self, closed: np.ndarray) -> float:
         """Reciprocal condition of the matrix solved with when ``closed`` (n,) bool are held."""

@@ -203,6 +203,8 @@ def closing_lines(summary: dict[str, Any], folder: Path) -> list[str]:
     """The few lines that end a run: why it ended, at what loads (times, where nothing leads), how long it took, where
     the files are."""
     lines = [f"{summary.get('title', 'run')}: {summary.get('end', 'done')}"]
+    if "not_reached" in summary:
+        lines.append(f"  {summary['not_reached']}")
     for kind, first in summary.get("first", {}).items():
         # A load of 0 is that of a scene which has no leading one: it is driven by time.
         load = first.get("load_pa")

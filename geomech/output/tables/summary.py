@@ -17,6 +17,7 @@ import numpy as np
 
 from geomech.model import Cycle, Event, Problem
 
+from ..unreached import unreached
 from .crack_reliability import crack_trust
 from .deepest_penetration import Deepest, step_limits
 from .motion_state import energy_summary, key_block_summary, motion_summary
@@ -116,7 +117,11 @@ class Summary:
         if any(self._problem.origin):
             summary["world_origin_m"] = list(self._problem.origin)
         summary["versions"] = versions()
-        write_json(self._path, summary)
+        missed = "" if error is not None else unreached(self._problem, last, counts)
+        if missed:
+            summary["not_reached"] = missed
+        first_told = {name: summary[name] for name in ("title", "end", "not_reached") if name in summary}
+        write_json(self._path, first_told | summary)
 
     def _told(self, event: Event) -> dict[str, Any]:
         told = {"load_pa": _finite(event.load), "time_s": event.time, "cycle": event.cycle, "point": list(event.point)}

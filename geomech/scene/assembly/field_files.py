@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
+from ...shapes.assembly import TOLERANCE
+from ...shapes.parts import extent_of
 from ...shapes.traces.field_lines import (
     UNFINISHED,
     FieldDrawing,
@@ -16,6 +19,7 @@ from ...shapes.traces.field_lines import (
     drawing_of_lines,
     named_lines,
 )
+from ...shapes.traces.simplification import simplified
 from ...shapes.traces.trace_tables import read_field_file
 from ..errors import Fault
 from ..locator import Path
@@ -62,6 +66,9 @@ def read_traces(
                     )
                 )
         named = _named_lines(file, k, entry, place, faults, warnings)
+        if entry.simplify_m is not None:
+            named, told = _simplified(named, entry.simplify_m, geometry.tolerance_m)
+            warnings.append(Fault(place(source), f"{FilePath(entry.file).name}: {told}", ""))
         every += named
         by_file[k] = [item for item in named if item.role == "joint"]
         path_of.update((item.line.place, source) for item in named)
@@ -88,6 +95,25 @@ def read_traces(
             warnings.append(Fault(place(at), message, way_out))
         add(part, partial(_source, part, path_of), zones)
     return True, crs
+
+
+def _simplified(named: list[Named], tolerance: float, meets: float | None) -> tuple[list[Named], str]:
+    """``named`` with joints and cracks simplified, and what to tell of it."""
+    at = [
+        k
+        for k, item in enumerate(named)
+        if item.role in ("joint", "crack") and item.line.shape == "line" and len(item.line.points) > 1
+    ]
+    lines = [named[k].line.points for k in at]
+    if meets is None:
+        meets = TOLERANCE * extent_of(lines) if lines else 0.0
+    found, out = simplified(lines, tolerance, meets), list(named)
+    for k, points in zip(at, found.lines):
+        out[k] = named[k]._replace(line=replace(named[k].line, points=points, away=None))
+    told = (
+        f"{found.before} sides of its joints and cracks are {found.after}, off by up to {found.off:.3g} m (simplify_m)"
+    )
+    return out, told
 
 
 def _named_lines(

@@ -12,6 +12,7 @@ from .loads import LoadsTable
 from .output import GaugeTable, MonitorTable, OutputTable, RenderTable
 from .rock import CrackTable, JointTable, MaterialTable, ZoneTable
 from .solvers import DdaTable, DdmTable, GrowthTable, RunTable
+from .sweep import SweepTable
 
 __all__ = ["SceneTables"]
 
@@ -36,6 +37,7 @@ class SceneTables(Table):
     monitors: Annotated[tuple[MonitorTable, ...], Strict(False)] = Field((), description="points that are recorded")
     output: OutputTable = Field(OutputTable(), description="files of a run")
     render: RenderTable = Field(RenderTable(), description="pictures of a run")
+    sweep: SweepTable | None = Field(None, description="many runs of the scene, for `geomech sweep`")
     variants: dict[FolderName, dict[str, Any]] = Field(
         {},
         description='named sets of changes: [variants.NAME] with "section.key" = value; NAME becomes the name of a run '

@@ -158,6 +158,12 @@ class TraceFile(Table):
         None, description="unit it is drawn in (unset: geometry.unit, else what a DXF says, else m)"
     )
     zones: Names = Field((), description="names of the zones that its joints cut (unset: all)")
+    simplify_m: Positive | None = Field(
+        None,
+        description="vertices of its joints and cracks within this of the line through the others are left out, m, and told; "
+        "ends go on meeting what they met. Every side of a cracked block, and of a crack, takes an element or more "
+        "(unset: lines as they were digitised)",
+    )
     set_property: str = Field("set", description="property of GeoJSON features that names their set")
 
 

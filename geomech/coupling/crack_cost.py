@@ -1,0 +1,82 @@
+"""What the cracked blocks of a problem ask of memory and time, told from their elements before any matrix is made.
+
+A block with m unknowns on its outline and n on its cracks keeps A_ΓΓ and its factors (2 m² numbers), A_CΓ and A_ΓΓ⁻¹ A_ΓC
+(2 m n), S and factors of its states (4 n²), and takes ⅔ m³ + 2 m² n + 2 m n² + ⅔ n³ multiplications to make. What is iterated
+on instead takes a memory and a time that grow with m + n (`ddm.iterative.gmres`, `ddm.iterative.boundary_gmres`).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..ddm.iterative.boundary_gmres import CROSSOVER as MANY_ON_SIDES
+from ..ddm.iterative.crack_gmres import CROSSOVER as MANY_ON_CRACKS
+from ..ddm.mesh.elements import mesh
+from ..model import Problem, counted
+
+#: Multiplications a second of dense factors, and bytes and seconds of an unknown that is iterated on; measured on one thread
+#: by `geomech bench many`, to a factor of two.
+RATE, BYTES, SECONDS = 1.5e10, 4e4, 3e-4
+#: Unknowns of one block from which its size is worth a word on what makes it so.
+LARGE = 3000
+#: An outline has been digitised finer than elements are long where its sides are more than so many times `elements_per_side`
+#: about its four sides.
+FINE = 5
+
+
+class CrackCost(NamedTuple):
+    """Cracked ``blocks`` (numbers), their unknowns ``on_sides`` and ``on_cracks``, and their ``sides`` (n,); ``memory``,
+    bytes, and ``seconds`` to make them."""
+
+    blocks: np.ndarray
+    on_sides: np.ndarray
+    on_cracks: np.ndarray
+    sides: np.ndarray
+    memory: float
+    seconds: float
+
+
+def crack_cost(problem: Problem) -> CrackCost:
+    """Of the blocks of ``problem`` that hold cracks and move; bodies without an end are left out. Raises ValueError where
+    rock is too thin for elements."""
+    blocks, cracks = problem.blocks, problem.cracks
+    rigid = np.array([material.rigid for material in problem.materials], bool)
+    cracked = np.unique(cracks.block) if problem.endless is None else np.zeros(0, int)
+    cracked = cracked[~(blocks.fixed | rigid[blocks.material])[cracked]]
+    counts, memory, seconds = np.zeros((len(cracked), 3), int), 0.0, 0.0
+    for k, block in enumerate(cracked.tolist()):
+        loops = blocks.loops(block)
+        made = mesh(loops, cracks.take(np.flatnonzero(cracks.block == block)), problem.ddm)
+        m, n = made.boundary.n_unknowns, made.cracks.n_unknowns
+        counts[k] = m, n, sum(map(len, loops))
+        dense = [(m, MANY_ON_SIDES), (n, MANY_ON_CRACKS)]
+        a, b = (size if size < many or problem.ddm.solver == "dense" else 0 for size, many in dense)
+        memory += 8.0 * (2 * a * a + 2 * a * b + 4 * b * b) + BYTES * (m + n - a - b)
+        seconds += (2 * a**3 / 3 + 2 * a * a * b + 2 * a * b * b + 2 * b**3 / 3) / RATE + SECONDS * (m + n - a - b)
+    return CrackCost(cracked, *counts.T, memory, seconds)
+
+
+def told(problem: Problem) -> list[str]:
+    """Lines that tell the `crack_cost` of ``problem``; none without cracked blocks."""
+    if not problem.cracks.n_cracks or problem.endless is not None:
+        return []
+    cost = crack_cost(problem)
+    if not len(cost.blocks):
+        return []
+    most = int(np.argmax(cost.on_sides + cost.on_cracks))
+    name = problem.blocks.names[cost.blocks[most]] if problem.blocks.names else f"block {cost.blocks[most]}"
+    each = f" (most in {name}: {cost.on_sides[most]} and {cost.on_cracks[most]})" if len(cost.blocks) > 1 else ""
+    lines = [
+        f"{counted(len(cost.blocks), 'cracked block')}, {cost.on_sides.sum()} unknowns on sides, {cost.on_cracks.sum()} on "
+        f"cracks{each}: about {cost.memory / 1e9:.2g} GB, {cost.seconds:.2g} s of processor time to make, a share of it for "
+        "every change of cracks"
+    ]
+    per_block = 4 * FINE * problem.ddm.elements_per_side
+    if cost.on_sides[most] + cost.on_cracks[most] > LARGE and cost.sides[most] > per_block:
+        lines.append(
+            f"{name} has {cost.sides[most]} sides: where they were digitised finer than is known of them, simplify_m in "
+            "[[geometry.traces]] leaves out vertices within a distance that you say"
+        )
+    return lines

@@ -1,0 +1,209 @@
+"""What a factor of safety counts on that is not joint strength alone: toes, anchors, cohesion of faces that have parted
+at one end; and the warnings that name it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...model import GROUND, OPEN, Blocks, Loads, State
+from ..kinematics.simplex_integration import block_moments
+from ..loads.bolts import labels
+from ..system import BlockSystem
+from .displacement_limit import MOVED
+from .safety_answer import Anchor, FactorOfSafety
+from .sharp_toes import FREE, Toe
+from .stability_trial import Trial
+
+#: So many toes are told of.
+_TOLD = 8
+#: Toes bar the way of blocks that come nearer to what they touch by this part of the fastest block's way, and hold
+#: what is more than this part of their block's weight.
+_BARRED, _BEARS = 1e-3, 1e-3
+#: A bolt within this part of its yield force is at it.
+_AT_YIELD = 1e-6
+#: A bolt that never yields has taken on load when it bears more than its pretension by this part.
+_TAKEN = 1e-3
+
+
+def toes_in_the_way(system: BlockSystem, state: State, failed: Trial | None = None) -> tuple[Toe, ...]:
+    """The toes of blocks in ``state`` that bar the way of what has ``failed``; all of them without."""
+    found = system.contacts_near(state)
+    off = system.finder.toes_among(found, state.vertices)
+    borne = {(int(row["vertex"]), int(row["edge"])): row for row in state.contacts[state.contacts["state"] != OPEN]}
+    centre = None if failed is None else block_moments(state.vertices, system.next, system.vertex_start)[:, 1:3]
+    out = []
+    for k in np.flatnonzero(off >= 0.0):
+        a, b = int(found.block[k]), int(found.other[k])
+        at = found.geometry[k, 5:7]
+        if failed is not None:
+            apart = np.zeros(2)
+            for block, sign in ((a, 1.0), (b, -1.0)):
+                x, y = at - centre[block]
+                apart += sign * (failed.displacement[block] + failed.rotation[block] * np.array([-y, x]))
+            fastest = float(np.hypot(*failed.displacement.T).max())
+            if not apart @ found.geometry[k, 1:3] < -_BARRED * fastest:
+                continue
+        row = borne.get((int(found.vertex[k]), int(found.edge[k])))
+        force = 0.0 if row is None else float(row["normal_force"])
+        out.append(
+            Toe(a, b, int(found.vertex[k]), int(found.edge[k]), (float(at[0]), float(at[1])), float(off[k]), force)
+        )
+    return tuple(out)
+
+
+def bearing_toes(system: BlockSystem, state: State, loads: Loads, load_time: float) -> tuple[Toe, ...]:
+    """The toes that bear forces in ``state``."""
+    weight = system.mass * float(np.hypot(*loads.gravity.at(load_time)))
+    system.finder.toes = FREE
+    return tuple(toe for toe in toes_in_the_way(system, state) if toe.force > _BEARS * weight[toe.block])
+
+
+def with_toes(
+    blocks: Blocks, found: FactorOfSafety, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool
+) -> FactorOfSafety:
+    """The answer ``found`` with the ``toes`` that ``hold`` in it, or would were their tips sharp, and the ``other``
+    answer without them, or with them."""
+    lines = _of_toes(blocks, toes, other, hold)
+    factor = None if other is None else other.factor
+    return replace(found, toes=toes, toes_hold=hold, other_factor=factor, warnings=(*found.warnings, *lines))
+
+
+def _of_toes(blocks: Blocks, toes: tuple[Toe, ...], other: FactorOfSafety | None, hold: bool) -> tuple[str, ...]:
+    """What toes hold or would, in words; ``other`` is the answer without them or with sharp tips."""
+
+    def factor(of: FactorOfSafety) -> str:
+        return f"{of.factor:.4f}" if math.isfinite(of.upper) else f"above {of.lower:g}"
+
+    lines = []
+    for toe in toes[:_TOLD]:
+        a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (toe.block, toe.other))
+        where = f"the toe of {a!r} touches {b!r} at x = {_metres(toe.at[0])}, y = {_metres(toe.at[1])} m"
+        if hold:
+            without = "the blocks do not stand" if other is None else f"the factor is {factor(other)}"
+            lines.append(f"{where} and holds {toe.force / 1e3:.4g} kN/m; without it {without}")
+        else:
+            lines.append(
+                f"{where}; rounded, it stands off by {toe.stands_off:.3g} m and holds nothing before it has moved "
+                f"as far. A sharp tip would hold: factor {factor(other)}, which is not to be relied on"
+            )
+    return tuple(lines)
+
+
+def _metres(value: float) -> str:
+    """To the millimetre; adding zero makes a plain 0 of −0."""
+    return f"{round(value, 3) + 0.0:.7g}"
+
+
+def _anchors(loads: Loads, state: State, moved: np.ndarray) -> tuple[Anchor, ...]:
+    """What the bolts of ``loads`` hold in ``state``."""
+    out = []
+    for bolt, name, row in zip(loads.bolts, labels(loads.bolts), state.bolts, strict=False):
+        if not row["installed"] or row["broken"]:
+            continue
+        force = float(row["force"])
+        stretch = (force - bolt.pretension) / bolt.stiffness + float(row["plastic"])
+        far = max(float(moved[b]) for b in (bolt.block, bolt.other) if b != GROUND)
+        out.append(Anchor(name, force, stretch, far, force >= bolt.yield_force * (1.0 - _AT_YIELD)))
+    return tuple(out)
+
+
+def with_anchors(blocks: Blocks, loads: Loads, found: FactorOfSafety) -> FactorOfSafety:
+    """The answer ``found`` with what bolts hold in it, and a warning where they hold less than they could or only after
+    their blocks have visibly moved."""
+    anchors, lines = _anchors(loads, found.state, found.moved), []
+    size = np.sqrt(blocks.areas())
+    for bolt, anchor in zip((b for b, row in zip(loads.bolts, found.state.bolts, strict=False)
+                             if row["installed"] and not row["broken"]), anchors, strict=True):  # fmt: skip
+        least = min(float(size[b]) for b in (bolt.block, bolt.other) if b != GROUND)
+        if math.isinf(bolt.yield_force) and anchor.force > bolt.pretension * (1.0 + _TAKEN):
+            lines.append(
+                f"bolt {anchor.name} has no yield force: it counts with the {anchor.force / 1e3:.4g} kN/m that it "
+                f"takes while its block moves {1e3 * anchor.moved:.3g} mm"
+            )
+        elif anchor.moved > MOVED * least and anchor.stretch > 0.0:
+            lines.append(
+                f"bolt {anchor.name} takes its {anchor.force / 1e3:.4g} kN/m only once its block has moved "
+                f"{1e3 * anchor.moved:.3g} mm, {100 * anchor.moved / least:.2g} % of the block's size"
+            )
+    return replace(found, anchors=anchors, warnings=(*found.warnings, *lines))
+
+
+@dataclass(frozen=True)
+class PartedFace:
+    """A face between ``block`` and ``other`` that holds cohesion though it is open by up to ``gap`` m at an end, on
+    ``length`` m of it."""
+
+    block: int
+    other: int
+    gap: float
+    length: float
+
+
+def parted_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
+    """Faces that in ``state`` touch at some of their ends and not at others, the one that is open farthest first."""
+    near = system.contacts_near(state)
+    if near.whole is None:
+        return ()
+    face = near.whole.face
+    open_ends = (near.state == OPEN) & (near.bonded > 0) & near.whole.touch(near.state)
+    out = []
+    for number in np.unique(face[open_ends]):
+        own = np.flatnonzero(open_ends & (face == number))
+        first = int(own[0])
+        length = float(near.whole.length[own].sum())
+        out.append(
+            PartedFace(int(near.block[first]), int(near.other[first]), float(near.gap_before[own].max()), length)
+        )
+    return tuple(sorted(out, key=lambda each: -each.gap))
+
+
+def hairline_faces(system: BlockSystem, state: State) -> tuple[PartedFace, ...]:
+    """Faces with whole cohesion that in ``state`` are open at all of their ends, by less than what blocks are known to,
+    and so hold nothing; the one that is open farthest first."""
+    near = system.contacts_near(state)
+    if near.whole is None:
+        return ()
+    face, hair = near.whole.face, near.gap_before <= near.precision
+    loose = (near.state == OPEN) & (near.bonded > 0) & ~near.whole.touch(near.state)
+    out = []
+    for number in np.unique(face[loose & (face >= 0)]):
+        own = np.flatnonzero(face == number)
+        if hair[own].all():
+            first, length = int(own[0]), float(near.whole.length[own].sum())
+            gap = float(near.gap_before[own].max())
+            out.append(PartedFace(int(near.block[first]), int(near.other[first]), gap, length))
+    return tuple(sorted(out, key=lambda each: -each.gap))
+
+
+def with_hairlines(
+    blocks: Blocks, found: FactorOfSafety, loose: tuple[PartedFace, ...], rigid: FactorOfSafety
+) -> FactorOfSafety:
+    """The answer ``found`` with the faces that are ``loose`` in it by a hair, and the answer of ``rigid`` blocks."""
+    worst = loose[0]
+    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+    one = len(loose) == 1
+    line = (
+        f"{'a face' if one else f'{len(loose)} faces'} with cohesion between {a!r} and {b!r}"
+        f"{'' if one else ' and others'} hold{'s' if one else ''} nothing, open by {1e3 * worst.gap:.2g} mm because "
+        f"blocks strain evenly; rigid blocks have the factor {rigid.factor:.4f}"
+    )
+    return replace(found, factor_if_rigid=rigid.factor, warnings=(*found.warnings, line))
+
+
+def with_parted_faces(
+    blocks: Blocks, found: FactorOfSafety, parted: tuple[PartedFace, ...], other: FactorOfSafety
+) -> FactorOfSafety:
+    """The answer ``found`` with the faces that have ``parted`` in it, and the ``other`` answer if these lose
+    cohesion."""
+    worst = parted[0]
+    a, b = (blocks.names[k] if blocks.names else f"block {k}" for k in (worst.block, worst.other))
+    one = len(parted) == 1
+    line = (
+        f"{'a face' if one else f'{len(parted)} faces'} with cohesion touch{'es' if one else ''} at one end only, open by "
+        f"up to {1e3 * worst.gap:.2g} mm ({a!r} and {b!r}): as in limit equilibrium, cohesion counts on the whole length; "
+        f"were it lost where faces are open, the factor would be {other.factor:.4f}"
+    )
+    return replace(found, factor_if_parted=other.factor, warnings=(*found.warnings, line))

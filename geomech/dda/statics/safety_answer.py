@@ -1,0 +1,145 @@
+"""The answer of a search for a factor of safety: its bracket, the mechanism, and what counted in it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import Blocks, State
+from .sharp_toes import Toe
+from .stability_trial import Trial
+
+#: So many blocks of a mechanism are described; one that turns by more than this (rad) as it goes its own size is said
+#: to.
+_TOLD, _TURNS = 8, 0.05
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A bolt of the loads as it holds at the factor: ``force`` N/m in it, by how much it is stretched (``stretch`` m)
+    since it was installed, how far its block has ``moved`` (m) for that, and whether it ``yields``."""
+
+    name: str
+    force: float
+    stretch: float
+    moved: float
+    yields: bool
+
+
+@dataclass(frozen=True, eq=False)
+class FactorOfSafety:
+    """``factor`` lies between ``lower``, the largest F with an equilibrium that was found, and ``upper``, the smallest
+    without (inf: none up to 64); ``trials`` in the order made; ``mechanism``: what moves just above the factor, in
+    words, a line a block; ``moving`` those blocks, the fastest first; ``state`` the equilibrium at ``lower``; ``moved``
+    (n_blocks,) m, how far blocks have come to it, the initial settlement included; ``anchors`` what bolts hold there.
+
+    ``toes`` bar the way of what moves. Where they are rounded and hold nothing, ``other_factor`` is what it would be
+    were their tips sharp; where they hold (``toes_hold``), what it is without them; None where it is not known.
+    ``factor_if_parted``: what it is if faces lose the cohesion of an end that opens, where that is another;
+    ``factor_if_rigid``: what it is of rigid blocks, where faces of elastic ones hold nothing for being open by a hair.
+    ``warnings`` in words."""
+
+    factor: float
+    lower: float
+    upper: float
+    trials: tuple[Trial, ...]
+    moving: tuple[int, ...]
+    mechanism: tuple[str, ...]
+    state: State
+    moved: np.ndarray
+    anchors: tuple[Anchor, ...] = ()
+    toes: tuple[Toe, ...] = ()
+    toes_hold: bool = False
+    other_factor: float | None = None
+    factor_if_parted: float | None = None
+    factor_if_rigid: float | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> Trial | None:
+        """The trial at ``upper``; None without any."""
+        return next((t for t in reversed(self.trials) if t.factor == self.upper), None)
+
+    def table(self, title: str = "factor of safety") -> str:
+        """The trials by F, the factor under its ``title``, and the mechanism, as text."""
+        lines = ["       F  equilibrium  steps  unbalanced  drift m/s²"]
+        for t in sorted(self.trials, key=lambda t: t.factor):
+            answer = "yes" if t.stable else "no"
+            lines.append(
+                f"{t.factor:8.4f}  {answer:<11}  {t.steps:5d}  {t.unbalanced:10.2e}  {t.drift:10.2e}  {t.reason}"
+            )
+        found = f"{self.factor:.4f}" if math.isfinite(self.upper) else f"above {self.lower:g}"
+        lines.append(f"{title} {found}" + (", moving at failure:" if self.mechanism else ""))
+        lines += [f"  {line}" for line in self.mechanism]
+        for a in self.anchors:
+            state = "at its yield force" if a.yields else "not at its yield force"
+            lines.append(
+                f"  bolt {a.name}: {a.force / 1e3:.4g} kN/m, {state}, stretched by {1e3 * a.stretch:.3g} mm, its block "
+                f"has moved {1e3 * a.moved:.3g} mm"
+            )
+        return "\n".join([*lines, *(f"  warning: {line}" for line in self.warnings)])
+
+    def as_dict(self, blocks: Blocks) -> dict[str, object]:
+        """Plain numbers for a file: the answer, its trials, and how ``blocks`` move at failure, the farthest one
+        by 1."""
+        failed = min((t for t in self.trials if not t.stable), key=lambda t: t.factor, default=None)
+        moving = {}
+        if failed is not None and self.moving:
+            far = float(np.hypot(*failed.displacement[self.moving[0]]))
+            for b in self.moving:
+                way, turn = (failed.displacement[b] / far).tolist(), float(failed.rotation[b] / far)
+                moving[blocks.names[b]] = {"displacement": way, "rotation_per_m": turn}
+        plain = ("factor", "stable", "steps", "unbalanced", "drift", "reason")
+        return {
+            "factor_of_safety": self.factor,
+            "lower": self.lower,
+            "upper": self.upper if math.isfinite(self.upper) else None,
+            "moving": moving,
+            "moved_m": dict(zip(blocks.names, self.moved.tolist(), strict=True)),
+            "anchors": [vars(a) for a in self.anchors],
+            "toes": [
+                {
+                    "block": blocks.names[t.block],
+                    "other": blocks.names[t.other],
+                    "at": list(t.at),
+                    "stands_off_m": t.stands_off,
+                    "force": t.force,
+                }
+                for t in self.toes
+            ],
+            "toes_hold": self.toes_hold,
+            "factor_without_toes" if self.toes_hold else "factor_with_sharp_toes": self.other_factor,
+            "factor_if_parted_faces_lose_cohesion": self.factor_if_parted,
+            "factor_of_rigid_blocks": self.factor_if_rigid,
+            "warnings": list(self.warnings),
+            "trials": [{name: getattr(t, name) for name in plain} for t in self.trials],
+        }
+
+
+def moving_in(trial: Trial) -> tuple[int, ...]:
+    """The blocks that move by more than a tenth of the farthest, the fastest first."""
+    far = np.hypot(*trial.displacement.T)
+    order = np.argsort(-far, kind="stable")
+    return tuple(order[far[order] > 0.1 * far.max()].tolist()) if far.max() > 0 else ()
+
+
+def mechanism_of(blocks: Blocks, trial: Trial, moving: tuple[int, ...]) -> tuple[str, ...]:
+    """A line for each of the fastest blocks."""
+    fastest = float(np.hypot(*trial.displacement[list(moving[:1])].T).max()) if moving else 1.0
+    lines = []
+    for block in moving[:_TOLD]:
+        (x, y), turn = trial.displacement[block], trial.rotation[block]
+        far = math.hypot(x, y)
+        name = blocks.names[block] if blocks.names else f"block {block}"
+        # Adding zero makes a plain 0 of −0.
+        text = f"{name}: {far / fastest:.2f} of the fastest, towards {round(math.degrees(math.atan2(y, x))) + 0}°"
+        size = math.sqrt(abs(float(blocks.areas()[block])))
+        if abs(turn) * size > _TURNS * far:
+            turned = f"{math.degrees(abs(turn)) * size / far:.0f}° while it goes its own size, √area"
+            text += f", turning {'left' if turn > 0 else 'right'} by {turned}"
+        lines.append(text)
+    if len(moving) > _TOLD:
+        lines.append(f"and {len(moving) - _TOLD} more of {blocks.n_blocks} blocks")
+    return tuple(lines)

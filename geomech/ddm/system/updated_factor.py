@@ -1,0 +1,225 @@
+"""Equations of crack faces in contact by those of other states, on a crack network that may have grown since.
+
+Let A₀ be the equations of the free unknowns in some states of contact on some geometry, factored once. In other states,
+or once cracks have grown, a few unknowns and equations are others. With x the unknowns of A₀, and y what is new,
+
+    [[A₀, B], [C, D]] (x, y) = (f, g),      T = D − C Z,   Z = A₀⁻¹ B,
+    T y = g − C A₀⁻¹ f,                      x = A₀⁻¹ f − Z y                    (block elimination; Golub & Van Loan §3.2),
+
+where y are the unknowns that A₀ has not got (with their columns in B, rows in C); one multiplier each for those it has
+and that are held or gone (unit column: the equation is given up; unit row: x = 0); and one for every equation that has
+changed, because a node slides another way (unit column, the new row). Columns of Z outlast states, loads and, where their
+elements do, geometries. A state then costs a factor of the size of y and a few solutions with A₀, in place of a factor of
+all unknowns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .bordered_factor import Bordered, WholeMatrix
+from .contact_rows import Rows
+from .dense_lu import Factor
+from .influence_matrix import unknowns_of
+
+#: A new base is factored where the border would have more than this part of its unknowns, and more than so many.
+MOST_NEW, FEW = 0.2, 40
+#: Reciprocal condition of the border's own equations below which all is factored anew.
+TRUSTED = 1e-11
+
+
+class ContactBase:
+    """The ``factor`` of n_base equations; ``mixed`` (n_base,) is what each has of the one across its node. ``units`` are
+    the columns of the inverse that have been asked for."""
+
+    def __init__(self, factor: Factor, mixed: np.ndarray):
+        self.factor, self.mixed, self.n = factor, mixed, factor.n
+        self._units = _Columns(self.n)
+
+    def units(self, at: np.ndarray) -> np.ndarray:
+        """(n_base, k) columns ``at`` (k,) of the inverse."""
+
+        def make(missing):
+            right = np.zeros((self.n, len(missing)), order="F")
+            right[missing, np.arange(len(missing))] = 1.0
+            return self.factor.solve(right)
+
+        return self._units.of(at, make)
+
+
+class BaseOf:
+    """A ``base`` as the crack system ``matrix`` has it: ``at`` (n,) where in the base an unknown is, −1 for those it has
+    not got; ``per`` nodes an element."""
+
+    def __init__(self, base: ContactBase, matrix: Bordered | WholeMatrix, at: np.ndarray, per: int):
+        self.base, self.matrix, self.at, self.per = base, matrix, at, per
+        self._came = _Columns(base.n)
+
+    def grown(self, matrix: Bordered | WholeMatrix, was: np.ndarray) -> BaseOf | None:
+        """The same for the ``matrix`` of cracks that have grown: ``was`` (n_elements,) are the numbers that its elements
+        had, −1 where new. None where it is of little use."""
+        width = 2 * self.per
+        old, new = unknowns_of(was[was >= 0], width), unknowns_of(np.flatnonzero(was >= 0), width)
+        at = np.full(matrix.n, -1)
+        at[new] = self.at[old]
+        if self.base.n - np.count_nonzero(at >= 0) > _most(self.base.n):
+            return None
+        out = BaseOf(self.base, matrix, at, self.per)
+        out._came = self._came.renumbered(old, new)
+        return out
+
+    def border(self, rows: Rows) -> Border:
+        """What the equations that ``rows`` (without springs) leave have beside those of the base."""
+        return Border(self, rows)
+
+    def changed(self, rows: Rows, border: Border, what: str) -> UpdatedFactor | None:
+        """Factors of the equations with this ``border``; None where factors of their own are worth it."""
+        if border.n > _most(self.base.n):
+            return None
+        try:
+            factor = UpdatedFactor(self, border, rows, what)
+        except np.linalg.LinAlgError:
+            return None
+        return factor if factor.trusted else None
+
+    def came(self, unknowns: np.ndarray) -> np.ndarray:
+        """(n_base, k) A₀⁻¹ times the columns of ``unknowns`` (k,) that the base has not got."""
+
+        def make(missing):
+            there = np.flatnonzero(self.at >= 0)
+            place = self.at[there]
+            right = np.zeros((self.base.n, len(missing)), order="F")
+            right[place] = self.matrix.entries(there, missing)
+            mixed = self.base.mixed[place]
+            slides = np.flatnonzero(mixed)
+            right[place[slides]] += mixed[slides, None] * self.matrix.entries(there[slides] + self.per, missing)
+            return self.base.factor.solve(right)
+
+        return self._came.of(unknowns, make)
+
+
+class Border:
+    """Which unknowns (numbers in the crack system) and equations are others than in the base: ``new`` unknowns; places
+    ``gone`` in the base whose unknown is held or no longer there; unknowns ``turned`` whose equation is another."""
+
+    def __init__(self, of: BaseOf, rows: Rows):
+        free = ~rows.held
+        known = free & (of.at >= 0)
+        self.free, self.kept = np.flatnonzero(free), np.flatnonzero(known)
+        self.places = of.at[self.kept]
+        self.new = np.flatnonzero(free & (of.at < 0))
+        stays = np.zeros(of.base.n, bool)
+        stays[self.places] = True
+        self.gone = np.flatnonzero(~stays)
+        self.turned = self.kept[rows.mixed[self.kept] != of.base.mixed[self.places]]
+        self.n = len(self.new) + len(self.gone) + len(self.turned)
+
+
+class UpdatedFactor:
+    """Solves the equations of the free unknowns that ``rows`` leave; as `Factor`."""
+
+    def __init__(self, of: BaseOf, border: Border, rows: Rows, what: str):
+        base, matrix = of.base, of.matrix
+        self._base, self._border = base.factor, border
+        self._turned = of.at[border.turned]
+        new, own = border.new, np.concatenate([border.new, border.turned])
+        self._z = np.concatenate(
+            [of.came(new), base.units(border.gone), base.units(self._turned)], axis=1
+        )  # (n_base, n_border)
+        # Rows of the new equations, of unknowns that stay and of new ones.
+        every = np.concatenate([border.kept, new])
+        values = matrix.entries(own, every)
+        slides = np.flatnonzero(rows.mixed[own])
+        if len(slides):
+            across = own[slides] + of.per
+            values[slides] += rows.mixed[own[slides], None] * matrix.entries(across, every)
+        self._down = np.zeros((len(own), base.n))
+        self._down[:, border.places] = values[:, : len(border.kept)]
+        a, g = len(new), len(border.gone)
+        self._parts = slice(a), slice(a, a + g), slice(a + g, border.n)
+        t = -self._times(self._z)
+        t[self._parts[0], :a] += values[:a, len(border.kept) :]
+        t[self._parts[2], :a] += values[a:, len(border.kept) :]
+        size = np.abs(t).max(axis=0, initial=0.0)
+        self._scale = np.ldexp(1.0, -np.frexp(np.where(size > 0, size, 1.0))[1])
+        self._small = Factor(t * self._scale, what)
+        self.n, self.rcond = len(border.free), min(base.factor.rcond, self._small.rcond)
+        self._new_at = np.searchsorted(border.free, new)
+        self._kept_at = np.searchsorted(border.free, border.kept)
+        self._turned_at = np.searchsorted(border.free, border.turned)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the border's equations lose no digits that matter."""
+        return self._small.rcond > TRUSTED
+
+    def _times(self, x: np.ndarray) -> np.ndarray:
+        """C ``x``, (n_border, k) for (n_base, k)."""
+        of, a = self._down @ x, self._parts[0].stop
+        return np.concatenate([of[:a], x[self._border.gone], of[a:]])
+
+    def _times_transposed(self, y: np.ndarray) -> np.ndarray:
+        """Cᵀ ``y``."""
+        new, gone, turned = self._parts
+        out = self._down.T @ np.concatenate([y[new], y[turned]])
+        out[self._border.gone] += y[gone]
+        return out
+
+    def solve(self, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+        """Solution (n_free,) or (n_free, k) for ``right``, of the ``transposed`` system if asked."""
+        flat = right.ndim == 1
+        right = right[:, None] if flat else right
+        f = np.zeros((self._base.n, right.shape[1]), order="F")
+        g = np.zeros((self._border.n, right.shape[1]), order="F")
+        new, _, turned = self._parts
+        f[self._border.places], g[new] = right[self._kept_at], right[self._new_at]
+        scale = self._scale[:, None]
+        out = np.empty_like(right)
+        if not transposed:
+            f[self._turned], g[turned] = 0.0, right[self._turned_at]
+            x = self._base.solve(f)
+            y = scale * self._small.solve(g - self._times(x))
+            x -= self._z @ y
+        else:
+            y = self._small.solve(scale * (g - self._z.T @ f), transposed=True)
+            x = self._base.solve(f - self._times_transposed(y), transposed=True)
+        out[self._kept_at], out[self._new_at] = x[self._border.places], y[new]
+        if transposed:
+            out[self._turned_at] = y[turned]
+        return out[:, 0] if flat else out
+
+
+class _Columns:
+    """Columns (n,) that are known by a number, made when first asked for."""
+
+    def __init__(self, n: int):
+        self.n, self._at, self._values = n, {}, np.empty((n, 0), order="F")
+
+    def of(self, numbers: np.ndarray, make) -> np.ndarray:
+        """(n, k) those of ``numbers`` (k,); ``make(missing)`` makes what is not there."""
+        missing = np.array([k for k in numbers.tolist() if k not in self._at], dtype=int)
+        if len(missing):
+            first, end = len(self._at), len(self._at) + len(missing)
+            if end > self._values.shape[1]:
+                room = np.empty((self.n, 2 * end), order="F")
+                room[:, :first] = self._values[:, :first]
+                self._values = room
+            self._values[:, first:end] = make(missing)
+            self._at.update(zip(missing.tolist(), range(first, end)))
+        return self._values[:, [self._at[k] for k in numbers.tolist()]]
+
+    def renumbered(self, old: np.ndarray, new: np.ndarray) -> _Columns:
+        """The same columns, of which the numbers ``old`` (k,) are now ``new`` (k,), and others are not known."""
+        out, names = _Columns(self.n), dict(zip(old.tolist(), new.tolist()))
+        kept = [(names[k], at) for k, at in self._at.items() if k in names]
+        out._at = {k: j for j, (k, _) in enumerate(kept)}
+        out._values = np.asfortranarray(self._values[:, [at for _, at in kept]])
+        return out
+
+    def __getstate__(self) -> dict:
+        """Without the room, which may hold anything."""
+        return vars(self) | {"_values": self._values[:, : len(self._at)].copy(order="F")}
+
+
+def _most(n: int) -> float:
+    return max(FEW, MOST_NEW * n)

@@ -1,0 +1,327 @@
+"""Runs in processes of this machine: as many as it has cores, one thread each, nothing to set up.
+
+Workers are processes of their own (not forked, so that no thread and no lock is inherited), which take jobs over a pipe
+and hand rows back one by one. One that is killed is replaced and its job handed out again, `ATTEMPTS` times; where the
+system has killed it (as it does when memory runs out) one worker fewer goes on. Short jobs are handed out several at a
+time, so that workers do not wait for this process.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+from .measures import FAILED, Job, carry_out
+
+#: A job whose worker was killed so many times counts as failed.
+ATTEMPTS = 3
+#: Jobs are handed out so many seconds of work at a time, no more than `_MOST` of them.
+_AHEAD, _MOST = 0.25, 64
+#: Set in every worker: libraries take one thread.
+ONE_THREAD = {
+    f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA", "NUMEXPR", "VECLIB_MAXIMUM")
+}  # fmt: skip
+#: A worker is replaced after a job when it holds more than this part of the memory, divided by their number.
+_MEMORY = 0.8
+_WORKER = "from geomech.sweep.engine import work; work({handle})"
+#: Parts of the package that runs depend on.
+_PARTS = ("model", "shapes", "scene", "dda", "ddm", "coupling", "output", "report", "pipeline.py", "sweep/measures.py",
+          "sweep/expressions.py")  # fmt: skip
+
+
+class Engine(Protocol):
+    """What makes runs: `results` yields the row of every job, in the order in which they end."""
+
+    workers: int
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def results(self, jobs: Iterable[Job]) -> Iterator[dict[str, Any]]: ...
+
+    def stop(self) -> None:
+        """Hand out no more jobs; `results` ends with those under way."""
+
+
+@functools.cache
+def program() -> str:
+    """A digest of the sources that runs depend on: rows of different programs do not belong into one table."""
+    package, digest = Path(__file__).parent.parent, hashlib.sha256()
+    for part in _PARTS:
+        place = package / part
+        for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+class _Worker:
+    """A process and the jobs that it has."""
+
+    def __init__(self) -> None:
+        ours, theirs = _pipe()
+        environment = {**os.environ, **ONE_THREAD}
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", _WORKER.format(handle=theirs)], pass_fds=[theirs], env=environment,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        )  # fmt: skip
+        os.close(theirs)
+        self.pipe = Connection(ours)
+        self.jobs: deque[Job] = deque()
+        self.retiring = False
+
+    def give(self, jobs: list[Job]) -> None:
+        self.jobs += jobs
+        with suppress(OSError):  # it has ended: noticed when its end is read
+            self.pipe.send(jobs)
+
+    def end(self, kill: bool = False) -> None:
+        with suppress(OSError):
+            if kill:
+                self.process.kill()
+            else:
+                self.pipe.send(None)
+        self.pipe.close()
+
+
+def _pipe() -> tuple[int, int]:
+    import socket
+
+    ours, theirs = socket.socketpair()
+    return ours.detach(), theirs.detach()
+
+
+class LocalEngine:
+    """``workers`` processes of this machine (default: one a core that this process may use)."""
+
+    def __init__(self, workers: int | None = None) -> None:
+        self.workers = workers or len(os.sched_getaffinity(0))
+        self._all: list[_Worker] = []
+        self._stopping = False
+        self._seconds = 0.0
+        self._known: deque[float] = deque(maxlen=50)
+        self.notes: list[str] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for each in self._all:
+            each.end(kill=bool(each.jobs))
+        for each in self._all:
+            try:
+                each.process.wait(5)
+            except subprocess.TimeoutExpired:
+                each.process.kill()
+                each.process.wait()
+        self._all = []
+
+    def stop(self) -> None:
+        self._stopping = True
+
+    def results(self, jobs: Iterable[Job]) -> Iterator[dict[str, Any]]:
+        waiting, again, attempts = iter(jobs), deque(), {}
+        exhausted = False
+        while True:
+            while not self._stopping and (worker := self._idle(bool(again) or not exhausted)) is not None:
+                taken = self._take(waiting, again)
+                exhausted = exhausted or not taken
+                if not taken:
+                    break
+                worker.give(taken)
+            busy = [each for each in self._all if each.jobs]
+            if not busy:
+                return
+            by_pipe = {each.pipe: each for each in busy}
+            for pipe in wait(list(by_pipe), timeout=0.5):
+                yield from self._read(by_pipe[pipe], again, attempts)
+
+    def _idle(self, wanted: bool) -> _Worker | None:
+        """A worker that has run out of jobs, or has but its last; a new one as long as there are too few."""
+        if not wanted:
+            return None
+        usable = [each for each in self._all if not each.retiring]
+        free = next((each for each in usable if not each.jobs), None)
+        if free is None and len(usable) < self.workers:
+            free = _Worker()
+            self._all.append(free)
+        if free is None and self._pace() < _AHEAD:
+            free = next((each for each in usable if len(each.jobs) <= 1), None)
+        return free
+
+    def _pace(self) -> float:
+        """Seconds of a job, the mean of the last; infinite before any is known."""
+        return sum(self._known) / len(self._known) if self._known else float("inf")
+
+    def _take(self, waiting: Iterator[Job], again: deque[Job]) -> list[Job]:
+        count = max(1, min(_MOST, int(_AHEAD / max(self._pace(), 1e-4)))) if self._known else 1
+        taken: list[Job] = []
+        while len(taken) < count:
+            if again:
+                # Alone: its worker may be killed once more.
+                return taken if taken else [again.popleft()]
+            job = next(waiting, None)
+            if job is None:
+                break
+            taken.append(job)
+        return taken
+
+    def _read(self, worker: _Worker, again: deque[Job], attempts: dict[int, int]) -> Iterator[dict[str, Any]]:
+        try:
+            row = worker.pipe.recv()
+        except (EOFError, OSError):
+            yield from self._buried(worker, again, attempts)
+            return
+        job = worker.jobs.popleft()
+        self._known.append(row["seconds"])
+        row["attempts"] = attempts.get(job.number, 0) + 1
+        if not worker.jobs and _memory(worker.process.pid) > _MEMORY * _all_memory() / self.workers:
+            worker.retiring = True
+            worker.end()
+        yield row
+
+    def _buried(self, worker: _Worker, again: deque[Job], attempts: dict[int, int]) -> Iterator[dict[str, Any]]:
+        """What becomes of the jobs of a worker that is gone."""
+        worker.pipe.close()
+        code = worker.process.wait()
+        self._all.remove(worker)
+        if worker.jobs:
+            job = worker.jobs.popleft()
+            again.extendleft(reversed(worker.jobs))
+            worker.jobs.clear()
+            attempts[job.number] = attempts.get(job.number, 0) + 1
+            why = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+            if -code == signal.SIGKILL and self.workers > 1:
+                self.workers -= 1
+                self.notes.append(f"a worker was killed, as when memory runs out: {self.workers} go on")
+            if attempts[job.number] < ATTEMPTS:
+                again.append(job)
+            else:
+                yield lost(job, f"its worker ended with {why}, {ATTEMPTS} times", attempts[job.number])
+
+
+def lost(job: Job, reason: str, attempts: int) -> dict[str, Any]:
+    """The row of a ``job`` that no worker has come back from."""
+    return {
+        "run": job.number, "status": FAILED, "reason": reason, "fails": None, "warnings": 0, "first_warnings": [],
+        "seconds": 0.0, "processor_seconds": 0.0, "host": "", "process": 0, "attempts": attempts,
+    }  # fmt: skip
+
+
+def work(handle: int) -> None:
+    """A worker's life: jobs from the pipe ``handle``, rows back, until None comes or the other end is gone."""
+    prepare_worker()
+    pipe = Connection(handle)
+    with suppress(EOFError, OSError):
+        while (jobs := pipe.recv()) is not None:
+            for job in jobs:
+                pipe.send(made(job))
+
+
+def prepare_worker() -> None:
+    """Ctrl-C in the terminal is for the sweep, which lets runs under way end; loops of references are seldom sought."""
+    import gc
+
+    with suppress(ValueError):  # another thread than the main one
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.set_threshold(50_000, 20, 20)
+
+
+def made(job: Job) -> dict[str, Any]:
+    """`carry_out`, the first on a machine of this program alone, so that kernels are compiled once."""
+    with _compiling_alone(job):
+        return carry_out(job)
+
+
+_WARM: set[str] = set()
+
+
+@contextmanager
+def _compiling_alone(job: Job) -> Iterator[None]:
+    """While no run of this kind has been made on this machine by this program, one goes on alone and the others wait:
+    kernels are kept, and compiled by none but the first."""
+    kind = f"{job.program}-{job.settings['measure']}"
+    if job.settings["measure"] == "pause" or kind in _WARM:
+        yield
+        return
+    from ..kernel_folder import kernel_place
+
+    folder = Path(kernel_place().folder)
+    mark = folder / f"sweep-{kind}.warm"
+    if mark.exists():
+        _WARM.add(kind)
+        yield
+        return
+    with _locked(folder / "sweep.lock"):
+        if mark.exists():
+            # Another one was first.
+            alone = False
+        else:
+            alone = True
+            yield
+            with suppress(OSError):
+                mark.touch()
+    _WARM.add(kind)
+    if not alone:
+        yield
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """The system's lock on ``path``; none where it has none."""
+    try:
+        import fcntl
+
+        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except (ImportError, OSError):
+        yield
+        return
+    try:
+        with suppress(OSError):
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _memory(process: int) -> float:
+    """Bytes that a process holds; 0 where it cannot be told."""
+    try:
+        return int(Path(f"/proc/{process}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError):
+        return 0.0
+
+
+@functools.cache
+def _all_memory() -> float:
+    """Bytes of this machine, or of what this process may have."""
+    found = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        with suppress(OSError, ValueError):
+            found = min(found, float(Path(path).read_text()))
+    return found
+
+
+def time_left(done: int, total: int, durations: Iterable[float], workers: int, began: float) -> float:
+    """Seconds until ``total`` runs are done: what is left at the mean duration on all ``workers``, or, where waiting
+    has made the sweep slower than that, at the pace kept so far."""
+    known = list(durations)
+    if not known or not done:
+        return float("nan")
+    ideal = (total - done) * sum(known) / len(known) / max(1, min(workers, total - done))
+    kept = (total - done) * (time.monotonic() - began) / done
+    return max(ideal, min(kept, 2.0 * ideal))
+
+
+Progress = Callable[[dict[str, Any]], None]

@@ -1,0 +1,144 @@
+"""What a sweep leaves: a journal that a row is added to as each run ends, and the table made of it.
+
+runs.jsonl     a line a run, in the order in which they ended, with times and hosts: what a sweep goes on from
+runs.csv       the table, a row a run, by number; the same whatever made the runs, and in which order
+runs.parquet   the same, where pyarrow is installed
+times.csv      what each run took, and where
+sweep.json     the plan, and what it came to
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Self
+
+from .measures import DONE, TIMES, kind_of_reason
+
+JOURNAL, TABLE, PARQUET, TOOK, PLAN = "runs.jsonl", "runs.csv", "runs.parquet", "times.csv", "sweep.json"
+#: In the journal alone.
+_HIDDEN = ("first_warnings",)
+
+
+class Journal:
+    """The rows of a sweep in ``path``: those that are there are read, a last line that was cut off is dropped; a run
+    stands once."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.rows: dict[int, dict[str, Any]] = {}
+        self._file: Any = None
+
+    def __enter__(self) -> Self:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        if self.path.exists():
+            self.rows, whole = _read(self.path)
+            os.truncate(self.path, whole)
+        self._file = open(self.path, "a", encoding="utf-8")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            with suppress(OSError):
+                self._file.flush()
+                os.fsync(self._file.fileno())
+            self._file.close()
+            self._file = None
+
+    def add(self, row: dict[str, Any]) -> bool:
+        """Add the row of a run; False where the run is there already."""
+        if row["run"] in self.rows:
+            return False
+        self._file.write(json.dumps(row, default=str) + "\n")
+        self._file.flush()
+        self.rows[row["run"]] = row
+        return True
+
+
+def read_journal(path: Path) -> dict[int, dict[str, Any]]:
+    """run → row of the whole lines in ``path``."""
+    return _read(path)[0] if path.exists() else {}
+
+
+def _read(path: Path) -> tuple[dict[int, dict[str, Any]], int]:
+    """Rows, and how many bytes of the file they are."""
+    rows: dict[int, dict[str, Any]] = {}
+    whole = 0
+    with path.open("rb") as file:
+        for line in file:
+            if not line.endswith(b"\n"):
+                break
+            try:
+                row = json.loads(line)
+            except ValueError:
+                break
+            whole += len(line)
+            rows.setdefault(row["run"], row)
+    return rows, whole
+
+
+def columns_of(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The columns of the table, as they first appear."""
+    names = dict.fromkeys(name for row in rows for name in row)
+    return [name for name in names if not name.startswith("_") and name not in TIMES and name not in _HIDDEN]
+
+
+def write_tables(folder: Path, rows: Sequence[Mapping[str, Any]]) -> list[Path]:
+    """Write the tables of ``rows`` (in the order of their runs), whole or not at all."""
+    names = columns_of(rows)
+    written = [_write_csv(folder / TABLE, names, rows), _write_csv(folder / TOOK, ["run", *TIMES], rows)]
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        return written
+    arrays = {name: _array(pyarrow, [_plain(row.get(name)) for row in rows]) for name in names}
+    beside = folder / f"{PARQUET}.part"
+    pyarrow.parquet.write_table(pyarrow.table(arrays), beside)
+    os.replace(beside, folder / PARQUET)
+    return [*written, folder / PARQUET]
+
+
+def _array(pyarrow: Any, values: list[Any]) -> Any:
+    kinds = {type(value) for value in values if value is not None}
+    if kinds <= {int, float} and float in kinds:
+        values = [None if value is None else float(value) for value in values]
+    elif len(kinds) > 1:
+        values = [None if value is None else str(value) for value in values]
+    return pyarrow.array(values)
+
+
+def _write_csv(path: Path, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Path:
+    beside = path.with_name(path.name + ".part")
+    with open(beside, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([_cell(row.get(name)) for name in names] for row in rows)
+    os.replace(beside, path)
+    return path
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _cell(value: Any) -> Any:
+    value = _plain(value)
+    return "" if value is None else repr(value) if isinstance(value, float) else value
+
+
+def counted_by_reason(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Runs without an answer: status, reason (numbers and names left out), how many, an example's run and words; the
+    most frequent first."""
+    kinds = Counter((row["status"], kind_of_reason(row["reason"])) for row in rows if row["status"] != DONE)
+    found = []
+    for (status, kind), number in sorted(kinds.items(), key=lambda each: (-each[1], each[0])):
+        one = next(row for row in rows if row["status"] == status and kind_of_reason(row["reason"]) == kind)
+        found.append({"status": status, "kind": kind, "runs": number, "run": one["run"], "reason": one["reason"]})
+    return found

@@ -1,0 +1,42 @@
+"""What do many flaws do to a specimen's strength? Random specimens with more and more of them, open or closed with friction,
+pressed through their peak while the load follows the cracks, beside a closed form and published experiments.
+
+`geomech run pipelines/flawed_specimen` calls `main`; copy the folder to make a study of your own.
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+import numpy as np
+from compare_flawed_specimen import check, draw, report, worst_angle
+from specimen import FLAW, FRICTION_DEG, course, flaws
+
+#: Of each kind so many flaws, and so many specimens.
+NUMBERS, SEEDS = (5, 10, 20), (1, 2, 3)
+VARIANTS = {"closed": True, "open": False}
+
+
+def main(folder: Path, out: Path, overrides=(), variants=(), quiet: bool = False) -> int:
+    if overrides:
+        raise ValueError("this study has no scene to override: change run.py and specimen.py")
+    out = Path(out)
+    angle = np.radians(worst_angle(FRICTION_DEG))
+    half = 0.5 * FLAW * np.array([np.cos(angle), np.sin(angle)])
+    alone = course(out / "one", [np.array([-half, half])], True, most=12)
+    runs = {}
+    for name in variants or VARIANTS:
+        for number in NUMBERS:
+            runs[VARIANTS[name], number] = []
+            for seed in SEEDS:
+                found = course(out / f"{name}_{number}_{seed}", flaws(number, seed), VARIANTS[name])
+                runs[VARIANTS[name], number].append(found)
+                if not quiet:
+                    print(f"{number} {name} flaws, seed {seed}: peak {1e-6 * found.peak:.1f} MPa", flush=True)
+    text = report(alone, runs)
+    (out / "comparison.txt").write_text(text + "\n", encoding="utf-8")
+    draw(out / "flawed_specimen.png", runs)
+    if not quiet:
+        print(text)
+    check(alone, runs)
+    return 0
