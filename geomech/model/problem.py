@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .blocks.block_arrays import Blocks
+from .contact_solver import ContactSolver
 from .cracks.crack_arrays import Cracks
 from .joints.joint_law import JointLaw
 from .loads.applied_loads import Loads
@@ -46,7 +47,8 @@ class DdaSettings:
     tenth of √(√A √A′) in a step, and turn by 0.15, A and A′ their areas, and a step in which anything goes into or through
     a block is made again (`dda.step_control.relative_motion`, `dda.step_control.continuous_collision`). ``equilibrium`` says when a run seeks
     static equilibrium (`dda.statics.pseudo_time_equilibrium`): "" never, "start" before it begins, "loads" at every load of a static run
-    too; ``unbalanced_tolerance`` is its unbalanced force over the mean force. Raises ValueError naming the setting
+    too; ``unbalanced_tolerance`` is its unbalanced force over the mean force. ``contact_solver`` holds what the open–close
+    iteration is tuned by; no scene sets it. Raises ValueError naming the setting
     that is none of its numbers (`_DDA_NUMBERS`) or words.
     """
 
@@ -69,6 +71,7 @@ class DdaSettings:
     penetration_tolerance: float = 1e-8
     max_open_close_iterations: int = 60
     max_step_cuts: int = 12
+    contact_solver: ContactSolver = field(default_factory=ContactSolver)
 
     def __post_init__(self) -> None:
         refuse_numbers(self, _DDA_NUMBERS)

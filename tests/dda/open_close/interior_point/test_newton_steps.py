@@ -23,8 +23,8 @@ def given():
             blocks, [block_scenes.ROCK], [block_scenes.JOINT], settings=block_scenes.settings(0.01)
         )
         system.step(State.at_rest(blocks), block_scenes.WEIGHT)
-    pattern, matrix, right, found, vectors, springs, gap, *_ = asked[0]
-    return pattern, matrix, right, found, vectors, springs, gap, found.bonded, found.normal
+    of = asked[0][0]
+    return of.pattern, of.matrix, of.right, of.found, of.vectors, of.springs, of.gap, of.found.bonded, of.found.normal
 
 
 def test_steps_solve_the_linearised_equations(given):
