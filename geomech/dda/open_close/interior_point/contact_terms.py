@@ -29,9 +29,9 @@ def linearise(
     pulled,
 ):  # fmt: skip
     """The ``numbers`` (n, 6) of what is at hand, N ``normals`` (n,), w ``widths`` (n,), α and β ``slip`` (2, n) and S
-    ``shear`` (n,); what is ``missed`` (n, 2) m of gap and slip, and ``laws`` by which
-    contacts answer motions (n, 4): N m by which the product of N and w goes with N, −∂N/∂g, −∂S/∂s and ∂S/∂N; returns the sum of the products, each in its ``unit`` (n,) J. What is
-    ``pulled`` then, see `pull`, are the forces at hand."""
+    ``shear`` (n,); what is ``missed`` (n, 2) m of gap and slip, and ``laws`` by which contacts answer motions (n, 4):
+    N m by which the product of N and w goes with N, −∂N/∂g, −∂S/∂s and ∂S/∂N; returns the sum of the products, each in
+    its ``unit`` (n,) J. What is ``pulled`` then, see `pull`, are the forces at hand."""
     total = 0.0
     for c in range(uintp(first), uintp(last)):
         normal, width, back, ahead = normals[c], widths[c], slip[0, c], slip[1, c]

@@ -133,7 +133,7 @@ class PathSteps:
 
     def products(self) -> float:
         """Their sum where the present step ends."""
-        *_, rough, _, unit = self._springs
+        *_, rough, unit = self._springs
         return products(self.numbers, self.step.changed, self.step.far, rough, unit)
 
     def go(self, far: float) -> int:
