@@ -39,6 +39,7 @@ EDGE = {
     "bench",
     "cli",
     "doctor",
+    "examples",
     "installing",
     "interruption",
     "pipeline",
@@ -53,7 +54,7 @@ ONLY_IN = {
     "ezdxf": {"shapes"},
     "vtk": {"output", "render"},
     "vtkmodules": {"output", "render"},
-    "pyvista": {"output", "render", "bench"},
+    "pyvista": {"output", "render", "bench", "report"},
     "matplotlib": {"render"},
     "imageio": {"render"},
     "pydantic": {"scene"},
@@ -77,18 +78,21 @@ def is_for_checkers(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
+def statements(tree: ast.AST, top: bool = True):
+    """All (import, whether at module level) below ``tree``; expressions hold none."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield node, top
+        elif not isinstance(node, ast.expr):
+            deeper = isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) or is_for_checkers(node)
+            yield from statements(node, top and not deeper)
+
+
 def imports(path: Path, package: str | None = None, source: str | None = None):
     """All (dotted name, line, at module level) that ``path`` imports, those inside functions too."""
     package = package or ".".join(path.relative_to(ROOT).parts[:-1])
     tree = ast.parse(path.read_text(encoding="utf-8") if source is None else source, filename=str(path))
-    inner = {
-        id(node)
-        for outer in ast.walk(tree)
-        if isinstance(outer, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)) or is_for_checkers(outer)
-        for node in ast.walk(outer)
-    }
-    for node in ast.walk(tree):
-        top = id(node) not in inner
+    for node, top in statements(tree):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield alias.name, node.lineno, top

@@ -350,7 +350,7 @@ def test_a_scene_runs_from_the_command_line_to_its_folder(tmp_path, capsys):
     assert "Two cracks" in capsys.readouterr().err
     run = Run(out)
     assert {path.name for path in out.iterdir()} >= {
-        "scene.toml", "blocks.pvd", "cracks.pvd", "tips.pvd", "contacts.pvd", "interior.pvd",
+        "scene.toml", "view.py", "blocks.pvd", "cracks.pvd", "tips.pvd", "contacts.pvd", "interior.pvd",
         "history.csv", "tips.csv", "events.csv", "summary.json", "run.log",
     }  # fmt: skip
     last = run.tips[run.tips["cycle"] == run.history["cycle"][-1]]

@@ -12,7 +12,10 @@ from .verb import BadInput
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:
     """The arguments of every verb that takes a scene: where it is, keys to override, variants."""
-    parser.add_argument("scene", type=Path, metavar="SCENE", help="a scene.toml, or a folder that holds one")
+    parser.add_argument(
+        "scene", type=scene_place, metavar="SCENE",
+        help="a scene.toml, a folder that holds one, or the name of an example",
+    )  # fmt: skip
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="override a key of the scene, e.g. growth.increment_m=2e-3 (may be repeated)",
@@ -22,6 +25,17 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
         help="a variant that the scene names, or 'all' (may be repeated)",
     )  # fmt: skip
     trust_argument(parser)
+
+
+def scene_place(text: str) -> Path:
+    """Where the scene ``text`` is: that path, or where there is none the example of this name."""
+    place = Path(text)
+    if place.exists() or place.name != text:
+        return place
+    from ..examples import find
+
+    example = find(text)
+    return place if example is None else example.place
 
 
 def trust_argument(parser: argparse.ArgumentParser) -> None:

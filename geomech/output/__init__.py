@@ -17,6 +17,7 @@ from .run_record import RunLog, SceneCopy
 from .tables.histories import Histories
 from .tables.joint_histories import JointHistories
 from .tables.summary import Summary
+from .vtk.paraview_script import ViewScript
 from .vtk.series import Series
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "SceneCopy",
     "Series",
     "Summary",
+    "ViewScript",
     "standard_observers",
 ]
 
@@ -57,6 +59,7 @@ def standard_observers(scene: Any = None, *, quiet: bool = False) -> list[Observ
             interior_every=interior_every,
             configuration=getattr(output, "configuration", "reference"),
         ),
+        ViewScript(getattr(output, "configuration", "reference")),
         Checkpoints(every=getattr(output, "checkpoint_every", None), scene=resolved),
         Summary(),  # after the writers, whose times it takes in
         Progress(quiet=quiet),

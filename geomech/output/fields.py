@@ -115,6 +115,15 @@ SERIES: dict[str, tuple[Field, ...]] = {
     ),
 }
 
+#: What readers show first: series → (section, attributes of its tag).
+ACTIVE: dict[str, dict[str, str]] = {
+    "blocks": {"PointData": 'Vectors="displacement"', "CellData": 'Scalars="displacement_rank"'},
+    "cracks": {"PointData": 'Scalars="opening" Vectors="displacement"', "CellData": 'Scalars="birth_cycle"'},
+    "tips": {"PointData": 'Scalars="K_eq" Vectors="displacement"'},
+    "contacts": {"PointData": 'Scalars="normal_force" Vectors="force"'},
+    "interior": {"PointData": 'Scalars="von_mises" Vectors="displacement"', "CellData": 'Scalars="block_id"'},
+}
+
 #: Columns every ``history.csv`` begins with, and their units; the step's statistics and the monitors follow.
 HISTORY: dict[str, str] = {
     "cycle": "-",
@@ -145,6 +154,7 @@ TIPS: dict[str, str] = {
     "K_eq": "Pa √m",
     "angle_deg": "°, from the crack's direction, counter-clockwise",
     "grown_m": "m, in this cycle",
+    "crack_name": "as in the scene",
 }
 
 #: Columns of ``joints.csv``: a row a joint and cycle. A joint goes by the name of its edges, else by that of its law.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pyvista
 
 #: Columns that hold text; every other one holds numbers, nan where a cell is empty.
-_TEXT = ("kind", "detail")
+_TEXT = ("kind", "detail", "crack_name", "joint", "support")
 
 
 class Run:
@@ -94,8 +94,8 @@ class Run:
 
 
 def read_table(path: Path, numeric: Any) -> np.ndarray:
-    """A CSV file with a header as a structured array: float columns (nan for empty cells), text for ``kind`` and
-    ``detail``. A last line that a crash cut short is left out. Missing files read as no rows of ``numeric`` columns."""
+    """A CSV file with a header as a structured array: float columns (nan for empty cells), text for those of
+    names. A last line that a crash cut short is left out. Missing files read as no rows of ``numeric`` columns."""
     if not path.is_file():
         return np.empty(0, [(name, float) for name in numeric])
     with open(path, newline="", encoding="utf-8") as file:

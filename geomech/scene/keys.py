@@ -146,6 +146,34 @@ def describe_keys() -> str:
     return "\n".join(lines).strip() + "\n"
 
 
+def schema() -> dict[str, Any]:
+    """The JSON schema (2020-12) of a scene: keys, types, bounds, defaults and what they mean. TOML knows no null."""
+    whole = _without_null(SceneTables.model_json_schema(by_alias=True))
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A scene of geomech",
+        **{key: value for key, value in whole.items() if key != "title"},
+    }
+
+
+def _without_null(node: Any, names: bool = False) -> Any:
+    """``node`` of a schema without its nulls and without the titles that pydantic makes of names; ``names``: its keys are
+    names that the scene gives."""
+    if isinstance(node, list):
+        return [_without_null(entry) for entry in node if entry != {"type": "null"}]
+    if not isinstance(node, dict):
+        return node
+    out = {
+        key: _without_null(value, key in ("properties", "$defs") and not names)
+        for key, value in node.items()
+        if names or not (key == "title" or (key == "default" and value is None))
+    }
+    if not names and len(out.get("anyOf", ())) == 1:
+        (only,) = out.pop("anyOf")
+        out = {**only, **out}
+    return out
+
+
 def _describe(table: type[BaseModel], prefix: str, header: str, lines: list[str]) -> None:
     later = []
     for name, field in table.model_fields.items():

@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
 from ..model import Blocks, Cracks, Problem
+from ..shapes.mesh_exchange import SUFFIXES as OTHER_MESHES
 from .assembly.drawn_marks import with_marks
 from .build import build_problem
 from .checks.action_checks import check_actions
@@ -22,7 +23,7 @@ from .drawing import Drawing, draw
 from .errors import Fault, SceneError, one_a_cause
 from .keys import describe_keys
 from .locator import Path, dotted, locate
-from .overrides import OverrideError, assign, flattened, parse_override
+from .overrides import OverrideError, assign, changes_of, flattened
 from .overview import overview
 from .tables import SceneTables
 from .tables.output import OutputTable, RenderTable
@@ -34,7 +35,7 @@ from .world import moved
 SCENE_FILE = "scene.toml"
 
 #: What a scene's geometry.model may be, and is taken for a scene at times.
-MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf")
+MODELS = (".geo", ".geo_unrolled", ".msh", ".step", ".stp", ".brep", ".dxf", *OTHER_MESHES)
 
 #: A scene nests tables and arrays some six deep; what is nested deeper than this is a mistake, or meant to exhaust.
 DEEPEST = 40
@@ -155,13 +156,17 @@ class _Places:
 
 
 def load_scene(
-    path: str | FilePath, overrides: Iterable[str] = (), variant: str | None = None, *, to_run: bool = True
+    path: str | FilePath,
+    overrides: Iterable[str] | Mapping[str, Any] = (),
+    variant: str | None = None,
+    *,
+    to_run: bool = True,
 ) -> Scene:
     """Load, change and check a scene.
 
     ``path`` is a .toml file or a pipeline folder (then its scene.toml); ``variant`` one of the scene's [variants];
-    ``overrides`` are changes "section.key=value" on top, values in TOML's way or bare words. Raises SceneError with
-    every fault: place (file, line, key), message and way out. A scene that is not ``to_run`` may leave [run] out.
+    ``overrides`` are changes on top, {"section.key": value} with Python values, or a list of "section.key=value" with
+    values in TOML's way or bare words. Raises SceneError with every fault: place (file, line, key), message and way out. A scene that is not ``to_run`` may leave [run] out.
     """
     path = _file(FilePath(path))
     data, text = _parsed(path)
@@ -176,13 +181,12 @@ def load_scene(
         if variant not in names:
             raise SceneError([Fault(str(path), f"the scene has no variant {variant!r}", nearest(variant, list(names)))])
         _apply_variant(data, variant, places, faults)
-    for number, override in enumerate(overrides):
+    for number, (called, key, value) in enumerate(_changes(overrides, faults)):
         try:
-            key, value = parse_override(override)
-            # Changes on the command line are listed after the file's own faults.
-            places.changed_by(assign(data, key, value), f"--set {override}", 1e9 + number)
+            # Changes from outside are listed after the file's own faults.
+            places.changed_by(assign(data, key, value), called, 1e9 + number)
         except OverrideError as error:
-            faults.append(Fault(f"--set {override}", error.message, error.way_out))
+            faults.append(Fault(called, error.message, error.way_out))
 
     if not to_run and "run" not in data:
         step = data["dda"].get("time_step_s") if isinstance(data.get("dda"), dict) else None
@@ -209,6 +213,19 @@ def load_scene(
     # Building asks the same questions as the checks did; whatever it would find has been found.
     quiet = Check(tables, data, drawing, place, [], [])
     return Scene(path, variant, tables, drawing, names, tuple(places.sorted(one_a_cause(warnings))), quiet, written)
+
+
+def _changes(overrides: Iterable[str] | Mapping[str, Any], faults: list[Fault]) -> list[tuple[str, Path, Any]]:
+    """The `changes_of` overrides that can be read; what is wrong with the others goes to ``faults``."""
+    each = [{key: value} for key, value in overrides.items()] if isinstance(overrides, Mapping) else overrides
+    found = []
+    for one in [each] if isinstance(each, str) else each:
+        try:
+            found += changes_of(one if isinstance(one, Mapping) or isinstance(each, str) else [one])
+        except OverrideError as error:
+            called = next(iter(one)) if isinstance(one, Mapping) else f"--set {one}"
+            faults.append(Fault(called, error.message, error.way_out))
+    return found
 
 
 def _file(path: FilePath) -> FilePath:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import PurePath
 from typing import Any
 
 from .locator import Path, dotted, path_of
@@ -29,6 +31,32 @@ def parse_override(text: str) -> tuple[Path, Any]:
         return path_of(key.strip()), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         return path_of(key.strip()), {"True": True, "False": False}.get(value, value)
+
+
+def changes_of(overrides: Iterable[str] | Mapping[str, Any]) -> list[tuple[str, Path, Any]]:
+    """What is to be changed in a scene, as (what to call the change, path, value): of a list of "section.key=value", or
+    of a table of Python values by "section.key" (numbers of NumPy, paths and tuples as TOML has them). Raises
+    OverrideError for what is neither."""
+    if isinstance(overrides, Mapping):
+        return [(f"{key} = {value!r}", path_of(key), _as_toml(value, key)) for key, value in overrides.items()]
+    if isinstance(overrides, str):
+        raise OverrideError(f"{overrides!r} is one text", 'write ["section.key=value"] or {"section.key": value}')
+    return [(f"--set {text}", *parse_override(text)) for text in overrides]
+
+
+def _as_toml(value: Any, key: str) -> Any:
+    """``value`` in the types that TOML is read as."""
+    if hasattr(value, "tolist") and not isinstance(value, (list, tuple)):
+        value = value.tolist()
+    if isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(name): _as_toml(inner, key) for name, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_as_toml(inner, key) for inner in value]
+    raise OverrideError(f"{key}: {value!r} cannot stand in a scene", "give a number, a text, a list or a table")
 
 
 def flattened(changes: dict[str, Any]) -> list[tuple[Path, Path, Any]]:

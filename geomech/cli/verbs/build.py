@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from ..messages import say_warnings
 from ..scenes import default_folder, scene_arguments, scenes_asked
-from ..verb import DONE, Verbs, add_verb, check_folder, check_writable
+from ..verb import DONE, BadInput, Verbs, add_verb, check_folder, check_writable
 
 
 def declare(verbs: Verbs) -> None:
@@ -22,17 +24,32 @@ def declare(verbs: Verbs) -> None:
     )
     scene_arguments(build)
     build.add_argument("--out", type=Path, metavar="DIR", help="folder (default outputs/NAME[/VARIANT]/build)")
+    build.add_argument(
+        "--export",
+        type=Path,
+        metavar="FILE",
+        help="the blocks as a mesh for another program: .inp, .vtk, .bdf, .exo, …",
+    )
+    build.add_argument(
+        "--mesh-size", type=float, metavar="M", help="side of the exported triangles, m (default: as few as possible)"
+    )
     build.add_argument("--picture", type=Path, metavar="FILE", help="where the picture goes (default DIR/blocks.png)")
 
 
 def _build(options: argparse.Namespace) -> int:
     check_folder("--out", options.out)
     check_writable("--picture", options.picture)
+    check_writable("--export", options.export)
+    if options.mesh_size is not None and not (options.export and options.mesh_size > 0):
+        raise BadInput("--mesh-size: a positive length, m, for the mesh that --export writes")
     from ...output.block_model.block_system import write_block_system
+    from ...output.block_model.mesh_export import check_format, export_blocks
     from ...render.pictures.block_map import draw_block_map
     from ...scene import load_scene
     from ...scene.drawing import MENDED
 
+    if options.export:
+        _refused(lambda: check_format(options.export))
     first = load_scene(options.scene, options.overrides, None, to_run=False)
     scenes = scenes_asked(first, options, to_run=False)
     # What was mended stands among the lines of each scene.
@@ -48,5 +65,18 @@ def _build(options: argparse.Namespace) -> int:
             from ...render.pictures.network_statistics import draw_network_statistics
 
             pictures += f", {draw_network_statistics(scene, told, folder / 'joint_statistics.png').name}"
+        if options.export:
+            target = options.export if len(scenes) == 1 else options.export.with_stem(f"{options.export.stem}_{name}")
+            export = partial(export_blocks, scene.problem(), scene.drawing.zones, target, options.mesh_size)
+            exported = _refused(export)
+            told["lines"].append(f"  exported  {exported}")
         print("\n".join([f"{told['title']}: {told['summary']}", *told["lines"], f"  written   {folder}, {pictures}"]))
     return DONE
+
+
+def _refused(export: Callable[[], str | None]) -> str | None:
+    """What ``export`` returns; what it refuses is bad input."""
+    try:
+        return export()
+    except ValueError as error:
+        raise BadInput(f"--export: {error}") from error

@@ -11,6 +11,7 @@ from geomech.model import Blocks, Cracks, counted
 from geomech.scene.assembly.load_functions import deepest_pond, said_of_pond
 from geomech.shapes.joint_networks.fracture_statistics import Topology, block_sizes, passing_curve
 from geomech.shapes.joint_networks.rock_bridges import rock_bridges
+from geomech.shapes.mesh_exchange import PhysicalMesh, msh_text
 
 from ..tables.joint_statistics import given, joint_statistics, network_of, table
 from ..tables.summary import write_json
@@ -84,34 +85,19 @@ def _write_msh(
     """Gmsh's format 2.2: a surface a block, zones, edge names and cracks as physical groups. Read as a model it gives
     the same blocks."""
     curves = [name for name in blocks.edge_names if name] + [f"crack:{name}" for name in cracks.names]
-    number = {name: k for k, name in enumerate(curves, 1)}
-    groups = [f'1 {k} "{name}"' for name, k in number.items()]
-    groups += [f'2 {len(curves) + k} "{name}"' for k, name in enumerate(zones, 1)]
-    points = np.concatenate([blocks.vertices, cracks.nodes])
-    rows = [f"{k} {x!r} {y!r} 0" for k, (x, y) in enumerate(points.tolist(), 1)]
-    elements = []
+    number = {name: k for k, name in enumerate(curves)}
+    lines = []
     for edge, name in enumerate(blocks.edge_name.tolist()):
         label = blocks.edge_names[name]
         if label:
-            elements.append(f"1 2 {number[label]} {number[label]} {edge + 1} {blocks.next_vertex[edge] + 1}")
-    first = blocks.n_vertices + 1
+            lines.append((number[label], number[label] + 1, edge, int(blocks.next_vertex[edge])))
+    first = blocks.n_vertices
     for (a, b), crack in zip(cracks.segments.tolist(), cracks.crack.tolist()):
         k = number[f"crack:{cracks.names[crack]}"]
-        elements.append(f"1 2 {k} {k} {first + a} {first + b}")
-    for (a, b, c), block in zip((cells + 1).tolist(), owner.tolist()):
-        elements.append(f"2 2 {len(curves) + 1 + zone[block]} {block + 1} {a} {b} {c}")
-    text = [
-        "$MeshFormat",
-        "2.2 0 8",
-        "$EndMeshFormat",
-        "$PhysicalNames",
-        str(len(groups)),
-        *groups,
-        "$EndPhysicalNames",
-    ]
-    text += ["$Nodes", str(len(rows)), *rows, "$EndNodes", "$Elements", str(len(elements))]
-    text += [f"{k} {element}" for k, element in enumerate(elements, 1)]
-    path.write_text("\n".join([*text, "$EndElements", ""]), encoding="utf-8")
+        lines.append((k, k + 1, first + a, first + b))
+    faces = [(int(zone[block]), block + 1, *nodes) for nodes, block in zip(cells.tolist(), owner.tolist())]
+    points = np.concatenate([blocks.vertices, cracks.nodes])
+    path.write_text(msh_text(PhysicalMesh(points, curves, zones, lines, faces)), encoding="utf-8")
 
 
 def _statistics(

@@ -182,9 +182,14 @@ def tip_rows(cycle: Cycle) -> list[dict[str, Any]]:
         "K_eq": tips["k_eq"],
         "angle_deg": np.degrees(tips["angle"]),
         "grown_m": tips["grown"],
+        "crack_name": _names(cycle.cracks.names, tips["crack"]),
     }
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return [same | dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _names(names: tuple[str, ...], crack: np.ndarray) -> np.ndarray:
+    return np.array([names[k] if k < len(names) else "" for k in crack.tolist()], dtype=object)
 
 
 def _written(value: Any) -> Any:

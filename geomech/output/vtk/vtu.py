@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..fields import PREPARED, SERIES, declared
+from ..fields import ACTIVE, PREPARED, SERIES, declared
 
 #: Cell types of the VTK file format.
 VERTEX, LINE, TRIANGLE = 1, 3, 5
@@ -107,7 +107,7 @@ class _Layout:
     """The file of a grid of so many points, cells and corners, with field data ``numbers`` (name, dtype)."""
 
     def __init__(self, series: str, n_points: int, n_cells: int, n_corners: int, numbers: tuple) -> None:
-        self.key = (n_points, n_cells, n_corners, numbers)
+        self.key, self._series = (n_points, n_cells, n_corners, numbers), series
         columns = [_Column("FieldData", name, dtype, (1,)) for name, dtype in numbers]
         for section, place, count in (("PointData", "point", n_points), ("CellData", "cell", n_cells)):
             columns += [
@@ -165,7 +165,11 @@ class _Layout:
             attributes += "".join(f' ComponentName{k}="{c}"' for k, c in enumerate(column.components))
             tags[column.section].append(f'<DataArray {tuples}{attributes} offset="{at}"/>\n')
             at += size
-        text = {name: f"<{name}>\n{''.join(reversed(lines))}</{name}>\n" for name, lines in tags.items()}
+        active = {name: f" {said}" for name, said in ACTIVE.get(self._series, {}).items()}
+        text = {
+            name: f"<{name}{active.get(name, '')}>\n{''.join(reversed(lines))}</{name}>\n"
+            for name, lines in tags.items()
+        }
         order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
         packing = ' compressor="vtkZLibDataCompressor"' if self._compress else ""
         n_points, n_cells = self.key[:2]

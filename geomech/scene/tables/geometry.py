@@ -151,7 +151,9 @@ class TraceFile(Table):
 
 class Geometry(Table):
     model: str | None = Field(
-        None, description="Gmsh model (.geo, .geo_unrolled, .msh, .step, .brep), relative to the scene file"
+        None,
+        description="Gmsh model (.geo, .geo_unrolled, .msh, .step, .brep) or a mesh of another program (.inp, .bdf, .nas, .mesh, "
+        ".su2, .vtk, .vtu), relative to the scene file",
     )
     parameters: dict[str, Finite | str] = Field({}, description="values for the model's parameters, by name")
     zones: Annotated[tuple[ZoneShape, ...], Strict(False)] = Field(

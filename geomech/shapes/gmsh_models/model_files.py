@@ -5,10 +5,13 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from ..curves import ended_on
+from ..mesh_exchange import SUFFIXES as OTHER_MESHES
+from ..mesh_exchange import as_gmsh_mesh
 from ..parts import JOINT, Joint, Mark, Trace, is_mark
 from ..traces.field_lines import METRES
 from .mesh_files import drawing_of_mesh
@@ -31,8 +34,8 @@ def read_gmsh_model(
     unit: str | None = None,
     folder: Path | None = None,
 ) -> GmshDrawing:
-    """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep,
-    .step.
+    """Read a model with ``parameters`` set: .geo, .geo_unrolled, .msh (any version, its mesh is not kept), .brep, .step,
+    and meshes of other programs (`mesh_exchange.SUFFIXES`).
 
     A parameter is known by the last part of its name in the side panel ("Parameters/Cracks/phi_deg" is ``phi_deg``) or
     by the whole; where the model offers named choices the name may be given. Physical surfaces are zones, one block a
@@ -78,9 +81,10 @@ def read_here(
         # Every length of a STEP file arrives in millimetres, whatever its unit.
         metres = 1e-3 if unit is None else 1e-3 * metres / metres_in_step(path)
     try:
-        with gmsh_session() as gmsh:
-            known = open_with_parameters(gmsh, path, parameters)
-            if path.suffix == ".msh":
+        with gmsh_session() as gmsh, TemporaryDirectory() as folder:
+            opened = path if path.suffix.lower() not in OTHER_MESHES else as_gmsh_mesh(path, Path(folder))
+            known = open_with_parameters(gmsh, opened, parameters)
+            if opened.suffix == ".msh":
                 found = drawing_of_mesh(gmsh, path)
             else:
                 found = _drawing(gmsh, path, known, None if chord_tolerance is None else chord_tolerance / metres)

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from ..mesh_exchange import SUFFIXES as OTHER_MESHES
 from .model_drawing import GmshModelError
 
 #: Set to anything but "" or "0", this environment variable lets models do what Gmsh lets them do.
@@ -86,10 +87,12 @@ def refuse_commands(path: Path, folder: Path | None = None) -> list[Path]:
 
 def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
     """The files that ``path`` reads, after a look at what else it does."""
+    if not is_script and path.suffix.lower() in OTHER_MESHES:
+        return _other_mesh(path)
     if not is_script and path.suffix not in (*SCRIPTS, *MESHES, *SHAPES):
         raise GmshModelError(
             f"{path}: Gmsh would take a file called *{path.suffix} for a script, or for what is no drawing",
-            f"models are {', '.join((*SCRIPTS, *MESHES, '.step', '.stp', '.brep'))} (in lower case)",
+            f"models are {', '.join((*SCRIPTS, *MESHES, '.step', '.stp', '.brep', *OTHER_MESHES))} (in lower case)",
         )
     if not is_script and path.suffix in SHAPES:
         return []
@@ -102,6 +105,17 @@ def _files_of(path: Path, homes: Sequence[Path], is_script: bool) -> list[Path]:
             )
         return []
     return _script(path, data, homes)
+
+
+def _other_mesh(path: Path) -> list[Path]:
+    """Meshes that meshio reads name no other files, but those of Abaqus may include some."""
+    if path.suffix.lower() == ".inp":
+        for number, line in enumerate(path.read_bytes().split(b"\n"), 1):
+            if line.strip().upper().startswith(b"*INCLUDE"):
+                raise GmshModelError(
+                    f"{path}:{number}: *INCLUDE reads another file", "put what it includes in its place"
+                )
+    return []
 
 
 def _script(path: Path, data: bytes, homes: Sequence[Path]) -> list[Path]:

@@ -1,0 +1,95 @@
+"""The block system as a mesh for other programs: every format that meshio writes, by the suffix of the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from geomech.model import Blocks, Problem
+from geomech.shapes.mesh_exchange import BLOCK
+from geomech.shapes.meshing import mesh_interior
+
+from ..vtk.triangulate import Triangles
+
+
+def check_format(path: Path) -> None:
+    """Raise ValueError for a file whose suffix meshio does not write."""
+    import meshio
+
+    known = sorted(meshio.extension_to_filetypes)
+    if path.suffix.lower() not in known:
+        raise ValueError(f"{path.suffix or path.name!r} is no format that meshes are written in: {', '.join(known)}")
+
+
+def export_blocks(problem: Problem, zones: list[str], path: Path, size: float | None = None) -> str:
+    """Write the blocks of ``problem`` and their cracks to ``path``; what was written, in a line.
+
+    Every block is cut into triangles of its own nodes: as few as possible, or with sides of about ``size`` m by Gmsh,
+    torn along its cracks. Sets are the ``zones`` (by block), "block:NUMBER", the names of edges and "crack:NAME"; cells
+    have ``block_id``, ``zone`` and ``material``. Raises ValueError for a suffix that meshio does not know and for what
+    its writer refuses.
+    """
+    import meshio
+
+    check_format(path)
+    blocks, cracks = problem.blocks, problem.cracks
+    points, triangles, owner = (_coarse if size is None else _fine)(problem, size)
+    edges = np.stack([np.arange(blocks.n_vertices), blocks.next_vertex], axis=1)
+    named = np.flatnonzero(np.array([bool(name) for name in blocks.edge_names])[blocks.edge_name])
+    start = len(points)
+    if size is not None:
+        # Nodes of a mesh by Gmsh are its own: edges and cracks stand on theirs.
+        points = np.concatenate([points, blocks.vertices])
+        edges = edges + start
+    first_crack = len(points)
+    points = np.concatenate([points, cracks.nodes])
+    lines = np.concatenate([edges[named], cracks.segments + first_crack]).astype(int)
+    label = [blocks.edge_names[k] for k in blocks.edge_name[named]]
+    label += [f"crack:{cracks.names[k]}" for k in cracks.crack]
+    sets: dict[str, list[np.ndarray]] = {}
+    nothing = np.zeros(0, int)
+    for name in dict.fromkeys(label):
+        sets[name] = [np.flatnonzero(np.array(label) == name), nothing]
+    zone_of = np.array([list(dict.fromkeys(zones)).index(zone) for zone in zones])
+    for number, zone in enumerate(dict.fromkeys(zones)):
+        sets[zone] = [nothing, np.flatnonzero(zone_of[owner] == number)]
+    for block in range(blocks.n_blocks):
+        sets[f"{BLOCK}{block}"] = [nothing, np.flatnonzero(owner == block)]
+    whole = np.full(len(lines), -1)
+    cells = [("line", lines), ("triangle", triangles)]
+    data = {
+        "block_id": [whole, owner],
+        "zone": [whole, zone_of[owner]],
+        "material": [whole, np.asarray(blocks.material)[owner]],
+    }
+    if not len(lines):
+        cells, data = cells[1:], {name: values[1:] for name, values in data.items()}
+        sets = {name: values[1:] for name, values in sets.items()}
+    nodes = np.column_stack([points, np.zeros(len(points))])
+    try:
+        meshio.Mesh(nodes, cells, cell_data=data, cell_sets=sets).write(path)
+    except (Exception, SystemExit) as error:  # meshio's writers raise whatever they stumble over
+        raise ValueError(f"{path}: meshio cannot write this format here: {error}") from error
+    if path.suffix.lower() == ".inp":
+        # meshio names the last types of its table, rigid faces and hybrid beams in space.
+        text = path.read_text(encoding="utf-8")
+        path.write_text(text.replace("TYPE=R3D3", "TYPE=CPS3").replace("TYPE=B31H", "TYPE=T2D2"), encoding="utf-8")
+    return f"{len(triangles)} triangles of {blocks.n_blocks} blocks, {len(lines)} edges and crack segments in {path}"
+
+
+def _coarse(problem: Problem, size: None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    cells, owner = Triangles().of(problem.blocks)
+    return problem.blocks.vertices, cells, owner
+
+
+def _fine(problem: Problem, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    blocks: Blocks = problem.blocks
+    points, triangles, owner, n = [], [], [], 0
+    for block in range(blocks.n_blocks):
+        mesh = mesh_interior(blocks.loops(block), problem.cracks.in_block(block), size, size)
+        points.append(mesh.points)
+        triangles.append(mesh.triangles + n)
+        owner.append(np.full(len(mesh.triangles), block))
+        n += len(mesh.points)
+    return np.concatenate(points), np.concatenate(triangles), np.concatenate(owner)

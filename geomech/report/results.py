@@ -1,0 +1,155 @@
+"""A finished run in Python: tables as pandas DataFrames, series as PyVista meshes, pictures, a page in a notebook."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..output import Run
+from ..output.reading import read_table
+
+if TYPE_CHECKING:
+    import pandas
+    import pyvista
+
+#: Entries of the summary that a notebook shows, where the run has them.
+_SHOWN = ("end", "time_s", "peak_load_pa", "wall_s")
+
+
+def open_run(folder: str | Path) -> RunResults:
+    """The run in ``folder``, one that lasts or failed included, as far as it has come. Raises FileNotFoundError where
+    there is none, with the runs below the folder, if any.
+
+    >>> results = open_run("outputs/two_cracks/phi_30")          # doctest: +SKIP
+    >>> results.history[["time", "load", "crack_length"]].tail()  # doctest: +SKIP
+    >>> results.mesh("blocks", time=0.5).plot(scalars="stress")   # doctest: +SKIP
+    """
+    folder = Path(folder)
+    if not (folder / "history.csv").is_file():
+        below = sorted(str(path.parent) for path in folder.glob("*/history.csv")) if folder.is_dir() else []
+        raise FileNotFoundError(
+            f"{folder} holds no run"
+            + (f"; there are runs in {', '.join(below)}" if below else ": history.csv is missing")
+        )
+    return RunResults(Run(folder))
+
+
+class RunResults:
+    """What a run has left in its folder. Nothing is read before it is asked for; units as in the files (SI)."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    def __repr__(self) -> str:
+        return f"<run {self.title!r} in {self.folder}: {len(self._run.history)} cycles>"
+
+    @property
+    def folder(self) -> Path:
+        """Where the run is."""
+        return self._run.folder
+
+    @property
+    def title(self) -> str:
+        """The scene's title, or the folder's name."""
+        return self._run.title
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """``summary.json``; empty while the run lasts."""
+        return self._run.summary
+
+    @property
+    def scene(self) -> dict[str, Any]:
+        """The scene as it was understood, every default filled in."""
+        return self._run.scene
+
+    @cached_property
+    def history(self) -> pandas.DataFrame:
+        """A row a cycle: time (s), load (Pa), energies (J/m), displacements of monitors (m), …"""
+        return _frame(self._run.history)
+
+    @cached_property
+    def tips(self) -> pandas.DataFrame:
+        """A row a crack tip and cycle: K_I, K_II, K_eq (Pa √m), place (m), growth (m)."""
+        return _frame(self._run.tips)
+
+    @cached_property
+    def events(self) -> pandas.DataFrame:
+        """A row an event: kind, cycle, time (s), load (Pa), place (m), detail."""
+        return _frame(self._run.events)
+
+    @cached_property
+    def joints(self) -> pandas.DataFrame:
+        """A row a joint and cycle, where the run has written ``joints.csv``: lengths, openings and slips (m), forces
+        (N/m)."""
+        return _frame(read_table(self.folder / "joints.csv", ("cycle", "time")))
+
+    @property
+    def series(self) -> list[str]:
+        """The series that the run has written for ParaView, by name."""
+        from ..output.fields import SERIES
+
+        return [name for name in SERIES if self._run.series(name)]
+
+    def mesh(self, series: str = "blocks", cycle: int | None = None, time: float | None = None) -> pyvista.DataSet:
+        """A ``series`` as a PyVista mesh at a ``cycle`` or ``time`` (s), or the last one written before it; at the end of
+        the run where neither is given. Raises KeyError for a series that was not written and a time before its first
+        cycle."""
+        if series not in self.series:
+            raise KeyError(f"{self.folder} has no series {series!r}; it has {', '.join(self.series) or 'none'}")
+        if cycle is not None and time is not None:
+            raise ValueError("give a cycle or a time, not both")
+        if cycle is None:
+            written = self._run.history
+            upto = np.inf if time is None else time * (1 + 1e-12)
+            known = written["cycle"][written["time"] <= upto]
+            if not len(known):
+                raise KeyError(f"{self.folder}: nothing was written up to t = {time:g} s")
+            cycle = int(known[-1])
+        return self._run.grid(series, cycle)
+
+    def plot(self, out: str | Path | None = None, **options: Any) -> list[Path]:
+        """The usual pictures, movie and curves, into ``out`` (default: ``pictures`` in the run folder); their paths.
+        ``options`` as of `geomech.render.draw`: component, width, movie."""
+        from ..render import draw
+
+        return draw(self._run, out, **options)
+
+    def _repr_html_(self) -> str:
+        rows = [("folder", str(self.folder)), ("cycles", str(len(self._run.history)))]
+        rows += [(key, str(self.summary[key])) for key in _SHOWN if self.summary.get(key) is not None]
+        events = self._run.events
+        if len(events):
+            kinds, counts = np.unique(events["kind"], return_counts=True)
+            rows.append(("events", ", ".join(f"{n} × {kind}" for kind, n in zip(kinds, counts, strict=True))))
+        table = "".join(f"<tr><th>{html.escape(a)}</th><td>{html.escape(b)}</td></tr>" for a, b in rows)
+        return f"<h4>{html.escape(self.title)}</h4><table>{table}</table>{_shown(self._pictures())}"
+
+    def _pictures(self) -> Sequence[Path]:
+        return [path for path in (self.folder / "pictures" / "specimen.png",) if path.is_file()]
+
+
+def _shown(pictures: Sequence[Path]) -> str:
+    coded = [base64.b64encode(path.read_bytes()).decode() for path in pictures]
+    return "".join(f'<img style="max-width:30em" src="data:image/png;base64,{text}">' for text in coded)
+
+
+def _frame(table: np.ndarray) -> pandas.DataFrame:
+    try:
+        import pandas
+    except ImportError as error:
+        raise ImportError(
+            "tables come as pandas DataFrames: `pip install pandas`; without it `geomech.output.Run(folder)` has them "
+            "as NumPy arrays"
+        ) from error
+    frame = pandas.DataFrame(table)
+    for name in ("cycle", "crack", "end", "tip", "load_step", "growth_pass"):
+        if name in frame and frame[name].notna().all() and frame[name].dtype.kind == "f":
+            frame[name] = frame[name].astype(int)
+    return frame
