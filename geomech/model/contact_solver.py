@@ -41,7 +41,7 @@ class ContactSolver:
     central_path            whether it is followed
     path_iterations         so many at most in a step; what ends well takes 13 to 40
     path_undecided          it proposes states when no more contacts are undecided than so many, …
-    path_undecided_share    … or than this part of them (of 10 000 bricks; more cost more iterations afterwards), …
+    path_undecided_share    … nor than this part of them, or than two, …
     path_balance            … and no more than this part of the loads is out of balance
     path_start              ε begins at so many times the mean of N²/kₙ (1 takes a third more iterations) …
     path_least_start        … and not below this, in units of the squared load over the stiffness
@@ -74,7 +74,7 @@ class ContactSolver:
     central_path: bool = True
     path_iterations: int = 60
     path_undecided: int = 12
-    path_undecided_share: float = 2e-4
+    path_undecided_share: float = 0.006
     path_balance: float = 1e-3
     path_start: float = 100.0
     path_least_start: float = 0.1

@@ -239,7 +239,8 @@ class _Search:
             if not path.arrived and (path.ended or path.blocked or (self.large and path.stopped)):
                 return None
             # Where no load comes to in so short a time, contacts neither bear nor part: round-off decides.
-            decided = path.arrived or undecided <= max(solver.path_undecided, solver.path_undecided_share * n)
+            few = max(2, min(solver.path_undecided, solver.path_undecided_share * n))
+            decided = path.arrived or undecided <= few
             if decided and path.missed < solver.path_balance and path.epsilon < 1.0:
                 states = States(*path.states(), path.bonded)
                 if states.key not in self.offered:
